@@ -1,7 +1,7 @@
-"""Chattering: the dimensionless theory under a sine (asymptotic, semi-analytical, series, exact), and what lies beyond.
+"""Chattering: dimensionless theory under a sine (asymptotic, semi-analytical, series, exact), and simulations.
 
-Parameters throughout: amplitude ``a`` of the ground acceleration over g alpha, ``omega`` = forcing frequency over the
-block's p, ``eta`` = coefficient of restitution; times are p t, speeds theta'/(p alpha).
+The parameters are the amplitude ``a`` of the ground acceleration, divided by g alpha, the forcing frequency ``omega``,
+divided by p of the block, and the coefficient of restitution ``eta``. Times are p t, speeds theta'/(p alpha).
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""How long chattering lasts, and up to which amplitude it is complete: exact, and by the paper's approximations."""
+"""Chattering time and critical amplitude, exact and by the approximations of the paper."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, rest_phases, semianalytical_phases
 from rocking.simulation.simulate import simulate
 
-#: Sequences that one thread computes at a time.
+#: Sequences per task of a thread.
 _PART: Final = 1 << 12
 
-#: Impacts that the paper resolves, and at which restitution.
+#: Number of impacts in the paper, at this restitution.
 _PAPER_IMPACTS: Final = 60
 _PAPER_RESTITUTION: Final = 0.92
 
-#: Two ulp: what adding to a phase and dividing by omega may lose of the bracket.
+#: Two ulp: largest loss of the bracket by adding to the phase and dividing by omega.
 _ROUNDING: Final = 2.0**-51
 
 _LARGEST_CAPACITY: Final = 1 << 23
@@ -64,47 +64,53 @@ def chattering_time(
     order: int = 4,
     resolved: int | None = None,
 ) -> Floats:
-    """Dimensionless time from uplift to rest of a slender block under a sine.
+    """Compute the dimensionless time from uplift to rest of a slender block under a sine.
 
-    The block lifts off at rest as the ground acceleration a sin(omega tau + psi) reaches 1, and chatters. Chattering
-    is complete if its impacts accumulate before half a period, pi/omega, is over, when the acceleration would lift
-    it again.
+    The block lifts off from rest as the ground acceleration a sin(omega tau + psi) reaches 1, and chatters. Chattering
+    is complete if the impacts accumulate within half a period, pi/omega, after which the acceleration would lift the
+    block again.
 
     Parameters
     ----------
     a : array_like
-        Amplitude of the ground acceleration over g alpha, dimensionless.
+        Amplitude of the ground acceleration, divided by g alpha.
     omega : array_like
-        Forcing frequency over the block's p, from 1e-6 to 1e6.
+        Forcing frequency, divided by p of the block, from 1e-6 to 1e6.
     eta : array_like
-        Coefficient of restitution, above 0 and at most 0.99999, or 1 (which never rests).
+        Coefficient of restitution, above 0 and at most 0.99999, or 1 (for which the block never rests).
     method : {"exact", "asymptotic", "series", "semianalytical"}
-        "exact": every impact to a few ulp, completeness proven by certificate, the infinite rest of the sequence
-        extrapolated with its known ratios; accurate to 1e-13 relative (5e-13 above eta = 0.95), and close to the
-        critical amplitude to what two ulp of a change (Notes). "asymptotic": the paper's Eq. 65. "series": the
-        consistent expansion in a - 1. "semianalytical": the paper's Eq. 75, which says nothing of completeness: that
-        is decided by the certificate of "exact".
+        "exact": impacts to a few ulp, completeness by certificate, and the infinite rest of the sequence by
+        extrapolation with its known ratios; accurate to 1e-13 relative (5e-13 above eta = 0.95), except close to the
+        critical amplitude, where a change of two ulp limits the accuracy (Notes). "asymptotic": Eq. 65 of the paper.
+        "series": the consistent expansion in a - 1. "semianalytical": Eq. 75 of the paper, with the certificate of
+        "exact" for completeness.
     order : int
-        Terms of "series", 1 to 40.
+        Number of terms of "series", 1 to 40.
     resolved : int, optional
-        Impacts that "semianalytical" resolves before its geometric sum; by default 60, and above eta = 0.92 so many
-        that the speed has fallen as far as after 60 there.
+        Number of impacts that "semianalytical" resolves before its geometric sum. By default 60, and above eta = 0.92
+        enough for the same decrease of the speed as 60 impacts at 0.92.
 
     Returns
     -------
     array of float
-        p times the chattering time, of the broadcast shape of a, omega and eta (a number for numbers). NaN where
-        a < 1, 0 where a = 1. "exact" and "semianalytical" give NaN for incomplete chattering, and infinity where
-        double precision decides nothing (known nowhere but possible within rounding of the critical amplitude); the two
-        expansions have a value for every a >= 1 (infinity at eta = 1, and beyond the range of a double) and know
-        nothing of it.
+        Chattering time multiplied by p, of the broadcast shape (a scalar for scalars). NaN if a < 1, 0 if a = 1.
+        "exact" and "semianalytical" return NaN for incomplete chattering, and infinity if double precision decides
+        nothing (possible within rounding of the critical amplitude, but no case is known). The two expansions return a
+        value for every a >= 1 (infinity at eta = 1, and beyond the range of a double), even if chattering is
+        incomplete.
+
+    See Also
+    --------
+    is_complete : Determine whether chattering is complete.
+    critical_amplitude : Compute the largest amplitude with complete chattering.
+    sequence : Resolve one sequence impact by impact.
 
     Notes
     -----
     Source: "Chattering: An overlooked peculiarity of rocking motion", Eqs 4 to 13 (problem), 65 and 75.
 
     Close to the critical amplitude a_cr the relative error of "exact" is at most 2^-51 nu (pi/omega - tau)/((a_cr - a)
-    tau) besides those 1e-13, with an exponent nu of eta alone (`critical_amplitude`): 3e-12 at 1e-8 below a_cr for
+    tau) plus 1e-13, with an exponent nu of eta alone (`critical_amplitude`): for example, 3e-12 at 1e-8 below a_cr for
     omega = 2 and eta = 0.92 (documentation, "The critical amplitude, and how it is approached").
 
     Examples
@@ -127,7 +133,7 @@ def chattering_time(
 
 
 def is_complete(a: ArrayLike, omega: ArrayLike, eta: ArrayLike) -> NDArray[np.bool_]:
-    """Whether chattering is complete: the block comes to rest before the next threshold crossing.
+    """Determine whether the block comes to rest before the next threshold crossing (complete chattering).
 
     Parameters
     ----------
@@ -137,8 +143,12 @@ def is_complete(a: ArrayLike, omega: ArrayLike, eta: ArrayLike) -> NDArray[np.bo
     Returns
     -------
     array of bool
-        Of the broadcast shape. True is proven by certificate, False by an arc that outlasts half a period (or, within
-        rounding of the critical amplitude, by the lack of a proof); a < 1 never lifts off and is False.
+        Array of the broadcast shape. True is proven by a certificate, False by an arc that outlasts half a period (or,
+        within rounding of the critical amplitude, by the lack of a proof). False if a < 1 (no uplift).
+
+    See Also
+    --------
+    critical_amplitude : Compute the largest amplitude with complete chattering.
 
     Examples
     --------
@@ -150,19 +160,23 @@ def is_complete(a: ArrayLike, omega: ArrayLike, eta: ArrayLike) -> NDArray[np.bo
 
 @dataclass(frozen=True, eq=False)
 class ChatteringSequence:
-    """The resolved impacts of one chattering sequence and what follows from the last.
+    """Resolved impacts of one chattering sequence, with its time of rest.
 
     Attributes
     ----------
     impacts : structured array
-        time (since uplift), side (entered, +1 or -1; the first arc is on side -1), interval (since the impact before,
-        or since uplift), speed_before and speed_after (|phi'|), all dimensionless.
+        Fields time (since uplift), side (entered, +1 or -1; the first arc is on side -1), interval (since the previous
+        impact, or since uplift), and speed_before and speed_after (|phi'|), all dimensionless.
     complete : bool
-        Whether the impacts accumulate before half a period is over.
+        Whether the impacts accumulate within half a period.
     time, lower, upper : float
-        Time of rest and the bracket on it that the certificate proves from the last impact's time and speed; NaN where
-        chattering is incomplete. Within rounding of the critical amplitude the bracket may be as wide as from the last
-        impact to half a period.
+        Time of rest, and its bounds proven by the certificate from the time and speed of the last impact; NaN if
+        chattering is incomplete. Within rounding of the critical amplitude the bracket may extend from the last impact
+        to half a period.
+
+    See Also
+    --------
+    sequence : Resolve one sequence impact by impact.
     """
 
     impacts: NDArray[np.void]
@@ -184,12 +198,17 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     a, omega, eta : float
         As in `chattering_time`, with a at least 1.
     tolerance : float
-        Width of the bracket over the time of rest at which to stop, 1e-15 or more.
+        Width of the bracket, divided by the time of rest, at which to stop; at least 1e-15.
 
     Returns
     -------
     ChatteringSequence
         Impacts and bracket.
+
+    See Also
+    --------
+    chattering_time : Compute the time of rest of many sequences.
+    interval_ratios : Compute the ratios of the intervals.
 
     Examples
     --------
@@ -213,9 +232,9 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
             raise InvalidOption(
                 f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower {{}} = {eta!r}", "eta", value=eta
             )
-    # So near to half a period the amplitude may be within rounding of the critical one.
+    # This late, the amplitude may be within rounding of the critical one.
     if status == Verdict.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - 1e-6):
-        # Where rounding decides, the verdict is that of `chattering_time`, which says no more than half a period.
+        # If rounding decides, the outcome of `chattering_time` counts.
         settled = float(chattering_time(amplitude, frequency, restitution))
         if status != Verdict.FOUND and math.isfinite(settled):
             impacts = impacts[impacts["time"] < settled]
@@ -227,20 +246,24 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
 
 
 def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
-    """Ratios of the intervals between every second impact, which tend to eta^2 (paper, Eq. 73 and Fig. 3).
+    """Compute the ratios of the intervals between every second impact, which tend to eta^2 (paper, Eq. 73 and Fig. 3).
 
     Parameters
     ----------
     a, omega, eta : float
         As in `chattering_time`, with a above 1.
     n : int
-        How many ratios, 1 to 100,000.
+        Number of ratios, 1 to 100,000.
 
     Returns
     -------
     array of float, shape (n,)
-        Interval k + 2 over interval k, for k = 0 ... n - 1, from resolved impacts; NaN from where an arc outlasts
-        half a period, or the intervals fall below 1e-120.
+        Ratios of interval k + 2 to interval k, k = 0 ... n - 1; NaN once an arc outlasts half a period or intervals
+        fall below 1e-120.
+
+    See Also
+    --------
+    sequence : Resolve one sequence impact by impact.
 
     Examples
     --------
@@ -266,7 +289,7 @@ def _single_case(a: float, omega: float, eta: float) -> tuple[float, float, floa
 def _resolved(
     a: float, omega: float, eta: float, tolerance: float, capacity: int
 ) -> tuple[int, NDArray[np.void], tuple[float, float, float]]:
-    """Status, impacts, and time of rest with its bracket; the status is UNRESOLVED where the capacity is used up."""
+    """Return the status (UNRESOLVED if the capacity is exhausted), impacts, and time of rest with its bracket."""
     table = np.zeros(capacity, RESOLVED)
     status, count, rest, lower, upper = resolve(a - 1.0, 1.0 / (omega * omega), eta, tolerance, table)
     table = table[:count]
@@ -307,14 +330,14 @@ def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int |
     phases = np.zeros(complete.size)
     statuses = np.full(complete.size, Verdict.UNRESOLVED, np.int8)
     semianalytical_phases(sequences, impacts, phases, statuses)
-    # Complete by proof: an estimate beyond half a period is a bad one, not a verdict.
+    # Proven complete: an estimate beyond half a period is inaccurate.
     phases[statuses == Verdict.UNRESOLVED] = math.inf
     times[complete] = phases / sequences[1]
     return times.reshape(shape)[()]
 
 
 def resolved_by_default(eta: Floats) -> NDArray[np.int64]:
-    """Return how many impacts Eq. 75 resolves by default."""
+    """Return the default number of impacts that Eq. 75 resolves."""
     count = np.ceil(_PAPER_IMPACTS * math.log(_PAPER_RESTITUTION) / np.log(eta))
     return np.maximum(count, _PAPER_IMPACTS).astype(np.int64)
 
@@ -324,31 +347,36 @@ _LEAD: Final = 0.1
 
 
 def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact") -> Floats:
-    """Amplitude of the ground acceleration up to which chattering is complete.
+    """Compute the amplitude of the ground acceleration up to which chattering is complete.
 
     Parameters
     ----------
     omega, eta : array_like
-        Forcing frequency over p, and coefficient of restitution.
+        Forcing frequency, divided by p, and coefficient of restitution.
     method : {"exact", "eq76", "eq77"}
-        "exact": by root finding on certified sequences, to 1e-14. "eq76", "eq77": the paper's fits, off by up to 1.1
-        and 5.4 % in eta from 0.5 to 0.97, omega from 0.5 to 8.
+        "exact": root finding on certified sequences, to 1e-14. "eq76", "eq77": fits of the paper, with errors up to 1.1
+        and 5.4 % for eta from 0.5 to 0.97, omega from 0.5 to 8.
 
     Returns
     -------
     array of float
-        a_cr, over g alpha, of the broadcast shape (a number for numbers): the supremum of all amplitudes whose first
-        sequence of impacts accumulates within half a period of uplift.
+        a_cr, divided by g alpha, of the broadcast shape (a scalar for scalars): supremum of the amplitudes whose first
+        impacts accumulate within half a period of uplift.
 
     Warns
     -----
     OutsideFit
-        Where "eq76" or "eq77" is asked for omega or eta beyond those ranges: there they mean nothing.
+        If "eq76" or "eq77" is used beyond these ranges, where the fits are meaningless.
+
+    See Also
+    --------
+    critical_amplitude_nonlinear : Compute the critical amplitude of the nonlinear block.
+    critical_report : Compare all methods.
 
     Notes
     -----
-    Source: the paper's section 5.1, Eqs 76 and 77. As a approaches a_cr the time of rest approaches pi/omega like a
-    power of a_cr - a whose exponent depends on eta only: 0.600 at eta = 0.92 and above, 0.612 at 0.5, to 1 towards 0.
+    Source: section 5.1 of the paper, Eqs 76 and 77. As a approaches a_cr, the time of rest approaches pi/omega like a
+    power of a_cr - a with an exponent of eta alone: 0.600 at eta = 0.92 and above, 0.612 at 0.5, to 1 towards 0.
 
     Examples
     --------
@@ -363,7 +391,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
 def critical_amplitude_nonlinear(
     omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike, *, threads: int | None = None, progress: bool | None = None
 ) -> Floats:
-    """Critical amplitude of the nonlinear block, which `critical_amplitude` gives in the slender limit.
+    """Compute the critical amplitude of the nonlinear block, which tends to `critical_amplitude` in the slender limit.
 
     Parameters
     ----------
@@ -372,19 +400,22 @@ def critical_amplitude_nonlinear(
     alpha : array_like
         Slenderness angle, rad, between 0 and pi/2.
     threads, progress : int or bool, optional
-        As for `rocking.simulate_many`.
+        As in `rocking.simulate_many`.
 
     Returns
     -------
     array of float
-        Ground acceleration over g tan(alpha), the block's own threshold of uplift, of the broadcast shape; NaN where a
-        simulation is given up since eta is too close to 1. Multiply by tan(alpha)/alpha to get it over g alpha, as in
-        the slender theory.
+        Ground acceleration, divided by the uplift acceleration g tan(alpha), of the broadcast shape; NaN if eta is too
+        close to 1 for a simulation. Multiply by tan(alpha)/alpha to normalise by g alpha, as in the slender theory.
+
+    See Also
+    --------
+    critical_amplitude : Compute the critical amplitude of a slender block.
 
     Notes
     -----
-    By bisection to 1e-12 on whether `rocking.simulate`, nonlinear and certified, finds the block at rest within half
-    a period of uplift; some 40 simulations for each value. Source: the paper's Eqs 1, 2 and 13 and section 5.1.
+    The method is bisection to 1e-12 on rest within half a period of uplift in `rocking.simulate` (nonlinear,
+    certified), with about 40 simulations per value. Source: Eqs 1, 2 and 13 and section 5.1 of the paper.
 
     Examples
     --------
@@ -408,7 +439,7 @@ def _critical(omega: float, eta: float, alpha: float) -> float:
     if eta == 1.0:
         return 1.0
     block = Block.from_parameters(p=1.0, alpha=alpha, restitution=eta)
-    # Beyond 1.5 no block's first sequence has been seen to be complete.
+    # No complete first sequence has been observed above 1.5.
     low, high = 1.0, 1.5
     try:
         while _comes_to_rest(block, high, omega):

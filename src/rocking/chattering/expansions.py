@@ -1,4 +1,4 @@
-"""Expansions of the chattering time in eps = a - 1: the paper's asymptotic one, and the consistent one to any order."""
+"""Expansions of the chattering time in eps = a - 1: asymptotic (from the paper), and consistent to any order."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from rocking.core.arrays import Flags, Floats
 from rocking.errors import InvalidOption
 from rocking.kernels.sine.series import eq65_sums, eq65_terms, phase_coefficients
 
-#: Frequencies (forcing over the block's p) for which double precision resolves the problem.
+#: Frequencies, divided by p of the block, for which double precision resolves the problem.
 LOWEST_FREQUENCY: Final = 1e-6
 HIGHEST_FREQUENCY: Final = 1e6
 
-#: Closer to one a sequence takes more than a million impacts; at one it never ends.
+#: Closer to one, a sequence has more than a million impacts; at one it never ends.
 LARGEST_RESTITUTION: Final = 0.99999
 
-#: Terms of the consistent expansion.
+#: Maximum number of terms of the consistent expansion.
 HIGHEST_ORDER: Final = 40
 
-#: Powers of an amplitude that no block is shaken with are infinite; so is what is made of them.
+#: Powers of absurdly large amplitudes are infinite, and so are results from them.
 _BEYOND_RANGE: Final = np.errstate(over="ignore", invalid="ignore")
 
 CYCLE: Final = np.dtype(
@@ -47,7 +47,7 @@ def _checked(given: ArrayLike, name: str, meaning: str, allowed: Callable[[Float
 
 
 def checked_amplitude(a: ArrayLike) -> Floats:
-    """Return amplitudes as an array; any finite number is one."""
+    """Return amplitudes as an array of finite numbers."""
     return _checked(a, "a", "the acceleration amplitude over g alpha", np.isfinite, "")
 
 
@@ -84,14 +84,14 @@ def checked_slenderness(alpha: ArrayLike) -> Floats:
 
 
 def single(values: Floats, name: str) -> float:
-    """Return the one value of a parameter that may not be an array."""
+    """Return the single value of a parameter that must not be an array."""
     if values.ndim:
         raise InvalidOption(f"{{}} must be a single number here, not an array of shape {values.shape}", name)
     return float(values)
 
 
 def lifting_amplitude(a: ArrayLike, *, above: bool = False) -> float:
-    """Return one amplitude that lifts the block; where it must be above 1, one that also makes it rock."""
+    """Return one amplitude that lifts the block, and with ``above`` also rocks it (above 1)."""
     amplitude = single(checked_amplitude(a), "a")
     if amplitude < 1.0 or (above and amplitude == 1.0):
         bound = "above" if above else "at least"
@@ -111,7 +111,7 @@ def broadcast(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
 
 @_BEYOND_RANGE
 def asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
-    """Eq. 65; its sums depend on eta alone and are formed once for each value of it."""
+    """Compute Eq. 65, with its sums once per value of eta."""
     values, where = np.unique(eta, return_inverse=True)
     sums = np.array([eq65_sums(float(value)) for value in values])[where.reshape(eta.shape)]
     shape, (amplitudes, frequencies, first, third) = broadcast(a, omega, sums[..., 0], sums[..., 1])
@@ -125,7 +125,7 @@ def asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
 
 @_BEYOND_RANGE
 def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
-    """Run the paper's iterative procedure, cycle by cycle.
+    """Compute the iterative procedure of the paper, cycle by cycle.
 
     Parameters
     ----------
@@ -135,16 +135,21 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     Returns
     -------
     structured array
-        A row for each cycle n: sign i_n of the rotation (i_0 = -1); order 1 or 3 and term T_{n;1} (i_n = i_0, Eq. 62)
-        or T_{n;3} (i_n = -i_0, Eq. 64); interval term eps^(order/2). Then what ends the cycle, impact n + 1: time, the
-        intervals' sum; phase omega time + psi of the ground acceleration a sin(phase), rad, with psi of Eq. 12;
-        speed_before and speed_after |phi'|, to their lowest order, eps^(3/2) (Eqs 57 and 58). The last row's time is
-        Eq. 65: the table ends where the terms vanish in double precision.
+        One row for each cycle n: sign i_n of the rotation (i_0 = -1); order 1 or 3 and term T_{n;1} (i_n = i_0, Eq. 62)
+        or T_{n;3} (i_n = -i_0, Eq. 64); interval term eps^(order/2). Then for impact n + 1, which ends the cycle: time,
+        the sum of the intervals; phase omega time + psi of the ground acceleration a sin(phase), rad, with psi of Eq.
+        12; speed_before and speed_after |phi'|, to their lowest order, eps^(3/2) (Eqs 57 and 58). The last time is Eq.
+        65, because the table ends where the terms vanish in double precision.
+
+    See Also
+    --------
+    chattering_time : Compute the chattering time by several methods.
 
     Notes
     -----
-    Source: the paper's Eqs 12, 57, 58, 60, 62, 64 and 65. Corrected: the procedure is to end, as printed, when Eq. 62
-    "returns a negative solution", but its cubic always has one positive root, so it ends when the terms vanish.
+    Source: Eqs 12, 57, 58, 60, 62, 64 and 65 of the paper. Correction: as printed, the procedure ends when Eq. 62
+    "returns a negative solution". However, its cubic always has one positive root, so that here it ends when the terms
+    vanish.
 
     Examples
     --------
@@ -167,7 +172,7 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     table["interval"] = table["term"] * np.sqrt(excess) ** table["order"]
     table["time"] = np.cumsum(table["interval"])
     table["phase"] = frequency * table["time"] + math.asin(1.0 / (1.0 + excess))
-    # An arc of the second side takes as long, in these units, as the speed that it starts with, and keeps it.
+    # In these units an arc of the second side lasts as long as its initial speed, which is conserved.
     entering = np.repeat(terms[1, :count], 2)
     table["speed_before"] = np.where(even, entering / restitution, entering) * np.float64(excess) ** 1.5 / frequency
     table["speed_after"] = restitution * table["speed_before"]
@@ -176,23 +181,27 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
 
 @_BEYOND_RANGE
 def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
-    """Time from uplift to the first impact, to two orders (Eq. 32).
+    """Compute the time from uplift to the first impact, to two orders (Eq. 32).
 
     Parameters
     ----------
     a, omega : array_like
-        Amplitude over g alpha, NaN being returned below 1, and forcing frequency over p.
+        Amplitude, divided by g alpha (NaN is returned below 1), and forcing frequency, divided by p.
 
     Returns
     -------
     array of float
-        tau_1 = (4 sqrt(2)/omega) eps^(1/2) + (sqrt(2)/omega) [1 - 32 (omega^2 - 1)/(15 omega^2)] eps^(3/2), with
-        eps = a - 1, of the broadcast shape.
+        tau_1 = (4 sqrt(2)/omega) eps^(1/2) + (sqrt(2)/omega) [1 - 32 (omega^2 - 1)/(15 omega^2)] eps^(3/2), with eps =
+        a - 1, of the broadcast shape.
+
+    See Also
+    --------
+    first_impact_speed : Compute the speed at the first impact.
 
     Notes
     -----
-    Source: the paper's Eq. 32. Corrected: Eqs 31 and 32 print 32/5 for 32/15, because T_{0;3} stops at Phi^(5) although
-    Phi^(6) enters at the same order. The exact value is the first interval of `sequence`.
+    Source: Eq. 32 of the paper. Correction: Eqs 31 and 32 print 32/5 for 32/15, because T_{0;3} stops at Phi^(5)
+    although Phi^(6) enters at the same order. The exact value is the first interval of `sequence`.
 
     Examples
     --------
@@ -205,7 +214,7 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
 
 @_BEYOND_RANGE
 def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
-    """Angular velocity just before the first impact, to two orders (paper, Eq. 34).
+    """Compute the angular velocity just before the first impact, to two orders (paper, Eq. 34).
 
     Parameters
     ----------
@@ -218,6 +227,10 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
         phi'_0(tau_1) = (16 sqrt(2)/(3 omega)) eps^(3/2) + (4 sqrt(2)/omega) [1 - 32 (omega^2 - 1)/(15 omega^2)]
         eps^(5/2), with eps = a - 1, of the broadcast shape.
 
+    See Also
+    --------
+    first_interval : Compute the time of the first impact.
+
     Examples
     --------
     >>> round(float(first_impact_speed(1.01, 2.0)), 6)
@@ -228,7 +241,7 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
 
 
 def _first_arc(a: ArrayLike, omega: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Eps (NaN below uplift), omega, and the bracket of Eqs 32 and 34."""
+    """Return eps (NaN below uplift), omega, and the bracket of Eqs 32 and 34."""
     shape, (amplitudes, frequencies) = broadcast(checked_amplitude(a), checked_frequency(omega))
     eps = np.where(amplitudes >= 1.0, amplitudes - 1.0, math.nan).reshape(shape)
     frequency = frequencies.reshape(shape)
@@ -237,24 +250,24 @@ def _first_arc(a: ArrayLike, omega: ArrayLike) -> tuple[Floats, Floats, Floats]:
 
 
 def series_times(a: Floats, omega: Floats, eta: Floats, order: int) -> Floats:
-    """Sum of the first terms of the consistent expansion."""
+    """Sum the first terms of the consistent expansion."""
     coefficients = _coefficients(omega, eta, order)
     return _summed(coefficients, _excess(a, coefficients))[()]
 
 
 def _excess(a: Floats, coefficients: Floats) -> Floats:
-    """Eps of the broadcast shape; NaN below uplift."""
+    """Return eps in the broadcast shape, NaN below uplift."""
     shape, _ = broadcast(a, coefficients[..., 0])
     return np.broadcast_to(np.where(a >= 1.0, a - 1.0, math.nan), shape)
 
 
 def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> Floats:
-    """Coefficients of tau_ch = sqrt(eps) (C1 + C3 eps + C5 eps^2 + ...), eps = a - 1.
+    """Compute the coefficients of tau_ch = sqrt(eps) (C1 + C3 eps + C5 eps^2 + ...), with eps = a - 1.
 
     Parameters
     ----------
     omega, eta : array_like
-        Forcing frequency over p, and coefficient of restitution; infinity is returned for 1.
+        Forcing frequency, divided by p, and coefficient of restitution (infinity is returned for 1).
     order : int
         Number of coefficients, 1 to 40.
 
@@ -266,13 +279,17 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
     Raises
     ------
     InvalidOption
-        If a parameter is NaN, infinite or out of range, or a coefficient exceeds the range of a double (slow forcing or
-        eta close to 1 with a high order).
+        If a parameter is out of range, infinite or NaN, or a coefficient exceeds the range of a double (slow forcing,
+        or high order with eta close to 1).
+
+    See Also
+    --------
+    chattering_time : Compute the chattering time by several methods.
 
     Notes
     -----
-    The exact impact map acts on truncated power series, and the infinite sum of its intervals is extrapolated
-    coefficient by coefficient. The paper's Eq. 65 has the same C1 and part of C3.
+    The exact impact map acts on truncated power series, and the infinite sum of intervals is extrapolated per
+    coefficient. Eq. 65 of the paper has the same C1 and part of C3.
 
     Examples
     --------
@@ -285,7 +302,7 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
 
 @_BEYOND_RANGE
 def _summed(coefficients: Floats, eps: Floats) -> Floats:
-    """Horner's scheme; exactly zero at eps = 0."""
+    """Sum the series by Horner's scheme; exactly zero at eps = 0."""
     total = np.zeros(eps.shape)
     for k in reversed(range(coefficients.shape[-1])):
         total = total * eps + coefficients[..., k]
@@ -293,7 +310,7 @@ def _summed(coefficients: Floats, eps: Floats) -> Floats:
 
 
 def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
-    """Coefficients of the broadcast parameters, formed once for each pair of different values."""
+    """Compute the coefficients once per distinct pair of parameters."""
     shape, parameters = broadcast(omega, eta)
     pairs, where = np.unique(np.stack(parameters), axis=1, return_inverse=True)
     coefficients = np.full((pairs.shape[1], order), math.inf)

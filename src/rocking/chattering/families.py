@@ -1,9 +1,8 @@
-"""Families of cases with two parameters, ready for `chattering_map`.
+"""Families of simulations with two parameters, for `chattering_map`.
 
-Each function takes a block or a motion and the numbers that are the same all over a map, and returns a callable that
-makes a `SimulationInput` from the two that vary, the first of them the amplitude ``a``: the
-motion's peak acceleration over the smallest that lifts the block (g tan(alpha), in the linear model g alpha).
-Frequencies ``omega`` are 2 pi f over the block's p (the smaller one of a two-sided block).
+Each function accepts a block or a motion and the constants of a map, and returns a function of the two parameters. The
+first is the amplitude ``a``: the peak acceleration, divided by the uplift acceleration (g tan(alpha), in the linear
+model g alpha). Frequencies ``omega`` are 2 pi f divided by p of the block (the smaller p of a two-sided block).
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from rocking.records.named import one_motion
 
 
 class SimulationInput(NamedTuple):
-    """What one point of a map simulates.
+    """Input of the simulation at one point of a map.
 
     Attributes
     ----------
     block : Block
-        What rocks.
+        Rocking block.
     motion : Motion
-        What shakes it.
+        Ground motion.
     model : {"nonlinear", "linear"}
         Equation of motion.
     """
@@ -43,12 +42,12 @@ Family = Callable[[float, float], SimulationInput]
 
 
 def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Family:
-    """Sines: (a, omega).
+    """Create sines with parameters (a, omega).
 
     Parameters
     ----------
     block : Block
-        What rocks.
+        Rocking block.
     cycles : float
         Number of periods.
     model : {"nonlinear", "linear"}
@@ -57,7 +56,11 @@ def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Fa
     Returns
     -------
     callable
-        Makes a `SimulationInput` of a and omega.
+        Function (a, omega) that returns a `SimulationInput`.
+
+    See Also
+    --------
+    rocking.chattering.chattering_map : Compute a map of chattering over a family.
 
     Examples
     --------
@@ -72,20 +75,20 @@ def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Fa
 
 
 def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> Family:
-    """Half cycles of a sine with unequal amplitudes: (a, ratio).
+    """Create sine half cycles with unequal amplitudes, with parameters (a, ratio).
 
-    The first lobe has the amplitude a, each other one `ratio` times that of the lobe before it: the shaking grows
-    (ratio above 1) or fades. Here a is the first lobe's, not the largest.
+    The first lobe has the amplitude a, not the largest, and each later amplitude is `ratio` times the previous one: the
+    motion grows (ratio above 1) or decays.
 
     Parameters
     ----------
     block, omega, count, model : Block, float, int, str
-        As for `sine`, with the frequency of the lobes and their number.
+        As in `sine`, with the frequency and the number of the lobes.
 
     Returns
     -------
     callable
-        Makes a `SimulationInput` of a and the ratio.
+        Function (a, ratio) that returns a `SimulationInput`.
 
     Examples
     --------
@@ -108,17 +111,17 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
 def ricker(
     block: Block, *, kind: Literal["symmetric", "antisymmetric"] = "symmetric", model: Model = "nonlinear"
 ) -> Family:
-    """Ricker pulses: (a, omega).
+    """Create Ricker pulses with parameters (a, omega).
 
     Parameters
     ----------
     block, kind, model : Block, {"symmetric", "antisymmetric"}, str
-        As for `sine` and `rocking.pulses.ricker`.
+        As in `sine` and `rocking.pulses.ricker`.
 
     Returns
     -------
     callable
-        Makes a `SimulationInput` of a and omega.
+        Function (a, omega) that returns a `SimulationInput`.
 
     Examples
     --------
@@ -133,17 +136,17 @@ def ricker(
 def mavroeidis_papageorgiou(
     block: Block, *, phase: float = 0.0, gamma: float = 3.0, model: Model = "nonlinear"
 ) -> Family:
-    """Near-fault pulses of Mavroeidis and Papageorgiou: (a, omega).
+    """Create near-fault pulses of Mavroeidis and Papageorgiou with parameters (a, omega).
 
     Parameters
     ----------
     block, phase, gamma, model : Block, float, float, str
-        As for `sine` and `rocking.pulses.mavroeidis_papageorgiou`.
+        As in `sine` and `rocking.pulses.mavroeidis_papageorgiou`.
 
     Returns
     -------
     callable
-        Makes a `SimulationInput` of a and omega.
+        Function (a, omega) that returns a `SimulationInput`.
 
     Examples
     --------
@@ -163,21 +166,21 @@ def mavroeidis_papageorgiou(
 def record(
     motion: Motion, alpha: float, restitution: float | None = None, *, model: Model = "nonlinear"
 ) -> Callable[[float, float], SimulationInput]:
-    """One motion, scaled, under blocks of one shape and any size: (a, p), p in rad/s.
+    """Create scaled copies of one motion, and blocks of one shape, with parameters (a, p), p in rad/s.
 
-    By dimensional analysis a smaller p is also the same block under a faster motion.
+    By dimensional analysis a smaller p is equivalent to the same block under a faster motion.
 
     Parameters
     ----------
     motion : Motion
-        What is scaled.
+        Motion to scale.
     alpha, restitution, model : float, float, str
-        Slenderness of the blocks, rad, their restitution (by default Housner's), and the model as for `sine`.
+        Slenderness of the blocks, rad, their restitution (by default after Housner), and the model as in `sine`.
 
     Returns
     -------
     callable
-        Makes a `SimulationInput` of a and p.
+        Function (a, p) that returns a `SimulationInput`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Where chattering is complete, by certified simulation: maps over two parameters, and episodes in one response."""
+"""Chattering by certified simulation: maps over two parameters, and episodes in one response."""
 
 from __future__ import annotations
 
@@ -34,24 +34,28 @@ if TYPE_CHECKING:
 
 
 class Outcome(IntEnum):
-    """What becomes of the first uplift.
+    """Outcome of the first uplift.
 
     Attributes
     ----------
     NO_UPLIFT
-        The motion never passes a threshold, or by no more than rounding.
+        The motion does not exceed a threshold, or only by rounding error.
     COMPLETE
-        Complete chattering: the block is proven to rest before the motion passes a threshold again. Under a sine this
-        is the paper's definition, rest within half a period, a < a_cr.
+        Complete chattering: proven rest before the motion exceeds a threshold again. Under a sine this is the
+        definition of the paper, rest within half a period, a < a_cr.
     RESTS_LATER
-        The motion passes a threshold again while the block rocks; it comes to rest later, before the last time.
+        The motion exceeds a threshold again while the block rocks. Rest follows before the last exceedance.
     RESTS_AT_LAST
-        It comes to rest only after the motion has passed a threshold for the last time.
+        Rest follows only after the last exceedance.
     OVERTURNS
-        It overturns without ever coming to rest.
+        The block overturns without coming to rest.
     UNPROVEN
-        Its first rest is not proven: double precision does not resolve the impacts, as where the motion first passes a
-        threshold by hardly more than rounding, or they are more than a simulation's budget of steps.
+        The first rest is not proven, because double precision does not resolve the impacts (for example, after a first
+        exceedance by hardly more than rounding error), or they exceed the step budget of a simulation.
+
+    See Also
+    --------
+    chattering_map : Compute a map of outcomes.
     """
 
     NO_UPLIFT = 0
@@ -74,7 +78,7 @@ _EPISODE: Final = np.dtype(
 
 
 class _Point(NamedTuple):
-    """One point of a map; times that do not exist are NaN."""
+    """Results at one point of a map; missing times are NaN."""
 
     outcome: int
     uplift: float = math.nan
@@ -103,17 +107,18 @@ def chattering_map(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> ChatteringMap:
-    """Simulate a family of inputs over a grid, and tell where chattering after the first uplift is complete.
+    """Simulate a family of inputs on a grid, and determine where chattering after the first uplift is complete.
 
     Parameters
     ----------
     family : callable
-        Makes a `SimulationInput` (block, motion, model) from two numbers: one of `rocking.chattering.families`, or your
-        own.
+        Function of two numbers that returns a `SimulationInput` (block, motion, model), for example from
+        `rocking.chattering.families`.
     parameters : mapping
-        Names and values of the two parameters, given to the family in this order; the first is upwards in the figure.
+        Names and values of the two parameters, in the order of the arguments of the family. The first is the vertical
+        axis of the figure.
     threads, progress : int or bool, optional
-        As for `rocking.simulate_many`.
+        As in `rocking.simulate_many`.
 
     Returns
     -------
@@ -123,14 +128,19 @@ def chattering_map(
     Raises
     ------
     InvalidOption
-        If there are not two parameters, or their values are not one-dimensional, finite and in increasing order, or the
-        family is no function that returns a `SimulationInput`.
+        If there are not two parameters, their values are not one-dimensional, finite and increasing, or the family does
+        not return a `SimulationInput`.
     RockingError
-        What the family itself raises for a pair of numbers.
+        Errors raised by the family.
+
+    See Also
+    --------
+    chattering_episodes : List the episodes of complete chattering in a response.
+    critical_amplitude : Compute the critical amplitude under a sine.
 
     Notes
     -----
-    Each rest is proven by certificate. The paper has no criteria but for the sine (end of its section 5.2).
+    Each rest is proven by a certificate. The paper has criteria only for the sine (end of its section 5.2).
 
     Examples
     --------
@@ -189,14 +199,18 @@ def _is_swapped(family: Family, first: str, second: str) -> bool:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ChatteringMap(DatasetResult):
-    """Where chattering after the first uplift is complete, over two parameters; from `chattering_map`.
+    """Map of the outcomes of the first uplift over two parameters, created by `chattering_map`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over the two parameters: outcome (see `Outcome`), complete (whether it is COMPLETE), uplift and rest (times of
-        the first uplift and the first rest, s), lower and upper (the bracket proven on that rest, s), rests (how many
-        in all), overturned (sooner or later).
+        With the two parameters as dimensions: outcome (see `Outcome`), complete (whether it is COMPLETE), uplift and
+        rest (times of the first uplift and the first rest, s), lower and upper (proven bounds of that rest, s), rests
+        (total number), overturned (at any time).
+
+    See Also
+    --------
+    chattering_map : Compute the map.
     """
 
     TABLES = MappingProxyType(
@@ -231,10 +245,10 @@ class ChatteringMap(DatasetResult):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Draw the outcomes, the first parameter upwards, the second to the right.
+        """Draw the outcomes, with the first parameter on the vertical axis.
 
-        They are of the first rocking; where the block overturns in a later one, it is hatched.
-        `labels` replace the names of the parameters at the axes.
+        Colours show the outcomes of the first rocking, and hatching marks later overturning. `labels` replace the names
+        of the parameters on the axes.
         """
         from rocking.plot.maps import outcome_figure
 
@@ -255,8 +269,8 @@ class ChatteringMap(DatasetResult):
 
 
 def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: float) -> float | None:
-    """Time, s, at which a motion last passes the thresholds of the two sides (m/s^2); None if it hardly passes one."""
-    # By four ulp a peak that was meant to be the threshold may exceed it.
+    """Return the time (s) of the last exceedance of the thresholds (m/s^2) by a motion; None if hardly exceeded."""
+    # Four ulp, because a peak that was meant to equal the threshold may exceed it.
     plus, minus = (threshold * (1.0 + 2.0**-50) for threshold in thresholds)
     lifts = motion.vertical is None and motion.pga > min(plus, minus)
     if not (lifts or len(exceedances(motion, (plus, minus), gravity))):
@@ -266,10 +280,10 @@ def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: fl
 
 
 def outcomes_of(ends: NDArray[np.void], last: float | None) -> Integers:
-    """Return the `Outcome` of each block, from what the engine keeps of its certified simulation.
+    """Return the `Outcome` of each block from the results of its certified simulation.
 
-    The last exceedance is that of their motion, as `last_exceedance` gives it. Of a block that rests several times
-    UNPROVEN says that one of the rests is not proven.
+    ``last`` is the last exceedance of the motion from `last_exceedance`. For a block that rests several times UNPROVEN
+    means that one of the rests is not proven.
     """
     if last is None:
         return np.full(len(ends), Outcome.NO_UPLIFT, dtype=np.int64)
@@ -283,7 +297,7 @@ def outcomes_of(ends: NDArray[np.void], last: float | None) -> Integers:
 
 
 def _in_common(one: SimulationInput, other: SimulationInput) -> str:
-    """Say what two inputs have in common: the motion's name, the proportions and the size of the block, the model."""
+    """Describe the common properties of two inputs: name of the motion, proportions and size of the block, model."""
 
     def described(given: SimulationInput) -> list[str]:
         alpha, restitution = (
@@ -296,7 +310,7 @@ def _in_common(one: SimulationInput, other: SimulationInput) -> str:
 
 
 def _simulated(given: SimulationInput) -> _Point:
-    """Simulate one point and keep all that a response knows: the engine's outcomes hold no bracket on a rest."""
+    """Simulate one point from a full response, because outcomes of the engine do not contain a bracket of the rest."""
     response = simulate(given.block, given.motion, model=given.model)
     last = last_exceedance(given.motion, given.block.uplift_thresholds(given.model), given.block.gravity)
     if not len(response.events) or last is None:
@@ -308,7 +322,7 @@ def _simulated(given: SimulationInput) -> _Point:
     if rests:
         first = response.chattering[0]
         times = {"rest": float(first["end"]), "lower": float(first["lower"]), "upper": float(first["upper"])}
-        # What the motion must not pass a threshold before is the upper bound on the rest.
+        # The motion must not exceed a threshold before the upper bound of the rest.
         ends["first_rest"], ends["stalled"] = times["upper"], math.isnan(times["upper"])
         if not math.isnan(times["upper"]):
             states, trail = state.new_states(1, 0), response.solution.trail
@@ -319,20 +333,23 @@ def _simulated(given: SimulationInput) -> _Point:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ChatteringEpisodes(Result):
-    """The episodes of a response, from `chattering_episodes`; ``print`` it for a table.
+    """Episodes of complete chattering in a response, created by `chattering_episodes`; ``print`` shows a table.
 
     Attributes
     ----------
     episodes : structured array
-        One row for each stretch of rocking that complete chattering ends: uplift (s; 0 where the block was already
-        moving); proven (time of the impact from which chattering is proven to be complete, s); rest, and lower and
-        upper bound on it (s); duration from uplift to rest (s); impacts resolved in it; ground (acceleration at the
-        rest, m/s^2).
+        One row per interval of rocking that ends with complete chattering: uplift (s; 0 if already moving); proven
+        (time of the impact from which completeness is proven, s); rest, lower and upper (time of rest and its bounds,
+        s); duration from uplift to rest (s); impacts resolved; ground (acceleration at the rest, m/s^2).
     shaking : tuple of float
-        Bracketed duration: when the motion first passes a threshold of the block, and when it falls below one for the
-        last time or the block has overturned, s; NaN where it never does before the simulation ends.
+        Bracketed duration: times at which the motion first exceeds a threshold of the block, and last falls below one
+        or the block overturns, s; NaN if not before the end of the simulation.
     at_rest : float
         Time at rest within the bracketed duration, s.
+
+    See Also
+    --------
+    chattering_episodes : List the episodes of a response.
     """
 
     episodes: NDArray[np.void]
@@ -344,13 +361,13 @@ class ChatteringEpisodes(Result):
 
     @property
     def share_at_rest(self) -> float:
-        """Share of the bracketed duration during which the block is at rest; NaN where there is none."""
+        """Fraction of the bracketed duration during which the block is at rest; NaN without a bracketed duration."""
         start, end = self.shaking
         return self.at_rest / (end - start) if end > start else math.nan
 
     @property
     def amid_shaking(self) -> NDArray[np.bool_]:
-        """Whether each episode ends before the motion passes a threshold for the last time."""
+        """Whether each episode ends before the motion exceeds a threshold for the last time."""
         return np.asarray(self.episodes["upper"] < self.shaking[1])
 
     def __str__(self) -> str:
@@ -392,19 +409,23 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     Parameters
     ----------
     response : Response
-        From `rocking.simulate` with certified chattering. Rests that are not proven are no episodes.
+        Response from `rocking.simulate` with certified chattering. Unproven rests are not episodes.
 
     Returns
     -------
     ChatteringEpisodes
-        The episodes with duration and bracket, and the share of the shaking during which the block is at rest. The
-        shaking is the bracketed duration for this block: from the first to the last time that the motion is beyond one
-        of the block's own thresholds.
+        Episodes with duration and bracket, and the fraction of the shaking spent at rest. The shaking is the bracketed
+        duration for this block, from the first to the last exceedance of its thresholds.
 
     Raises
     ------
     InvalidOption
-        If it is given anything but the `Response` of a block without restraints.
+        If the argument is not the `Response` of a block without restraints.
+
+    See Also
+    --------
+    rocking.simulate : Simulate the response of a block.
+    chattering_map : Compute a map of outcomes.
 
     Examples
     --------
@@ -438,6 +459,6 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     if not len(beyond) or beyond[0, 0] >= response.duration:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)
-    # The shaking starts with an uplift, to rounding.
+    # The shaking starts with an uplift, within rounding error.
     at_rest = without_dust(np.diff(np.clip(response.rest_intervals, start, end)), end).sum()
     return ChatteringEpisodes(episodes, (start, end), float(at_rest))

@@ -1,4 +1,4 @@
-"""One sequence, or one critical amplitude, by every method: in words and a table, or in plain values."""
+"""Reports on one chattering sequence or one critical amplitude, computed by every method."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77"}
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ChatteringReport(Result):
-    """What becomes of one chattering sequence of a slender block under a sine; from `chattering_report`.
+    """Report on one chattering sequence of a slender block under a sine, created by `chattering_report`.
 
-    Its tables are "impacts", those that are resolved, and "cycles", the paper's iterative procedure. Its figure has the
-    intervals between the impacts, and the ratios that tend to eta^2 where chattering is complete.
+    The tables are "impacts" (resolved) and "cycles" (iterative procedure of the paper). The figure shows the intervals
+    between impacts, and their ratios, which tend to eta^2 for complete chattering.
 
     Attributes
     ----------
@@ -44,9 +44,13 @@ class ChatteringReport(Result):
     impacts : structured array
         As in `ChatteringSequence`.
     cycles : structured array or None
-        The paper's iterative procedure, as `asymptotic_table` gives it; None without loss at impacts.
+        As in `asymptotic_table`; None without energy loss at impacts.
     p : float or None
-        The block's frequency parameter, rad/s, by which times are given in seconds, too.
+        Frequency parameter of the block, rad/s, for times in seconds.
+
+    See Also
+    --------
+    chattering_report : Create the report.
     """
 
     TABLES = ("impacts", "cycles")
@@ -84,9 +88,9 @@ class ChatteringReport(Result):
         return "\n".join(f"{name:<30}{text}" for name, text in lines) + f"\n\n{units}"
 
     def table(self) -> str:
-        """Return cycles of the paper's iterative procedure, a row for each of at most a dozen.
+        """Return at most a dozen cycles of the iterative procedure of the paper, one per row.
 
-        `InvalidOption` without loss at impacts, when there is no such procedure.
+        Raise `InvalidOption` without energy loss at impacts.
         """
         header = ["n", "sign", "term", "interval, p t", "time, p t", "phase, rad", "speed before", "speed after"]
         rows = [
@@ -147,21 +151,26 @@ class ChatteringReport(Result):
 def chattering_report(
     a: float, omega: float, eta: float, *, order: int = 4, resolved: int | None = None, p: float | None = None
 ) -> ChatteringReport:
-    """Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.
+    """Report the chattering time of a slender block under a sine by every method, and its completeness.
 
     Parameters
     ----------
     a, omega, eta : float
-        As in `chattering_time`, each one number.
+        As in `chattering_time`, as scalars.
     order, resolved : int
         As in `chattering_time`.
     p : float, optional
-        The block's frequency parameter, rad/s: times are then given in seconds as well.
+        Frequency parameter of the block, rad/s. If given, times are also reported in seconds.
 
     Returns
     -------
     ChatteringReport
-        Time of rest by every method, critical amplitude, first impact.
+        Time of rest by every method, critical amplitude, and first impact.
+
+    See Also
+    --------
+    chattering_time : Compute the chattering time by one method.
+    critical_report : Report the critical amplitude by every method.
 
     Examples
     --------
@@ -176,7 +185,7 @@ def chattering_report(
     interval, speed = exact.impacts[["interval", "speed_before"]][0] if exact.impacts.size else (no_arc, no_arc)
     checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER)
     series = math.nan
-    with suppress(InvalidOption):  # double precision does not resolve so many terms
+    with suppress(InvalidOption):  # double precision does not resolve this many terms
         series = float(chattering_time(a, omega, eta, method="series", order=order))
     times = {
         method: float(chattering_time(a, omega, eta, method=method, resolved=resolved))
@@ -205,14 +214,18 @@ def chattering_report(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalReport(Result):
-    """The critical amplitude under a sine, by every method; from `critical_report`.
+    """Report on the critical amplitude under a sine by every method, created by `critical_report`.
 
     Attributes
     ----------
     omega, eta : float
-        Forcing frequency over p, and coefficient of restitution.
+        Forcing frequency, divided by p, and coefficient of restitution.
     amplitudes : dict
-        By method; None where one does not hold.
+        Amplitudes by method; None for a method outside its range.
+
+    See Also
+    --------
+    critical_report : Create the report.
     """
 
     omega: float
@@ -238,17 +251,22 @@ class CriticalReport(Result):
 
 
 def critical_report(omega: float, eta: float) -> CriticalReport:
-    """Give the amplitude up to which chattering under a sine is complete, by every method.
+    """Report the amplitude up to which chattering under a sine is complete, by every method.
 
     Parameters
     ----------
     omega, eta : float
-        As in `critical_amplitude`, each one number.
+        As in `critical_amplitude`, as scalars.
 
     Returns
     -------
     CriticalReport
         Amplitude by every method.
+
+    See Also
+    --------
+    critical_amplitude : Compute the critical amplitude by one method.
+    chattering_report : Report the chattering time by every method.
 
     Examples
     --------
@@ -259,7 +277,7 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
     amplitudes["exact"] = float(critical_amplitude(omega, eta))
     with warnings.catch_warnings():
         warnings.simplefilter("error", OutsideFit)
-        for method in [*_AMPLITUDES][1:]:  # an approximation that does not hold has none
+        for method in [*_AMPLITUDES][1:]:  # outside its range an approximation has no value
             with suppress(InvalidOption, OutsideFit):
                 amplitudes[method] = float(critical_amplitude(omega, eta, method=method))
     return CriticalReport(omega, eta, amplitudes)

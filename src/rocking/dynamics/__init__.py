@@ -1,6 +1,6 @@
-"""Nonlinear dynamics of impact: further bodies of the same engine, and what becomes of any body under periodic motion.
+"""Nonlinear dynamics with impacts: bodies between stops, and long-term behaviour under periodic motion.
 
-Positions are relative to the table or the support, m; the motion is its acceleration, m/s^2.
+Positions (m) are relative to the table or the support, whose acceleration (m/s^2) is the motion.
 """
 
 import lazy_loader

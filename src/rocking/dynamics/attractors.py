@@ -1,7 +1,7 @@
-"""Periodic attractors of a map, and a neighbourhood of each of their points that no state leaves.
+"""Periodic attractors of a map, with an invariant neighbourhood of each of their points.
 
-A neighbourhood is an ellipse in a norm in which the derivative contracts. Its size is checked: at samples of twice its
-size the derivative contracts in that norm and the impacts are as many as on the attractor, so that none grazes.
+A neighbourhood is an ellipse in a norm in which the derivative contracts. This is checked at samples of twice its size,
+together with the number of impacts, so that no impact grazes.
 """
 
 from __future__ import annotations
@@ -21,28 +21,27 @@ from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP, iterate
 from rocking.kernels.state import Records, new_scratch
 
-#: Longest period of an attractor, in periods of the motion, and how near a state must come back to be on one, over the
-#: size of the states.
+#: Longest period of an attractor, in periods of the motion, and largest relative distance of a recurrent state.
 LONGEST: Final = 64
 RETURN: Final = 1e-6
 
-#: Where it is checked: on so many rings, at so many angles.
+#: Number of rings and angles of the samples.
 _RINGS: Final = 4
 _ANGLES: Final = 24
 
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
-    """A periodic orbit that attracts what is near it.
+    """Stable periodic orbit.
 
     Attributes
     ----------
     states : ndarray, shape (period, 2)
         Coordinate and velocity at the starts of the periods of the motion.
     multipliers : ndarray of complex, shape (2,)
-        Eigenvalues of the map's derivative over the orbit's period; zero where it holds a rest.
+        Eigenvalues of the derivative of the map over the period of the orbit; zero if the orbit contains a rest.
     impacts, rests : int, bool
-        Impacts in one of its periods, those that were resolved; whether the body comes to rest on it.
+        Number of resolved impacts in one period, and whether the body comes to rest.
     """
 
     states: Floats
@@ -52,19 +51,19 @@ class Attractor:
 
     @property
     def period(self) -> int:
-        """Its period, in periods of the motion."""
+        """Period of the orbit, in periods of the motion."""
         return len(self.states)
 
     @property
     def name(self) -> str:
-        """What it is, in words."""
+        """Description in words."""
         if self.impacts == 0 and np.all(self.states[:, 1] == 0.0):
             return "rest"
         return f"period {self.period}, {'rest' if self.rests else counted(self.impacts, 'impact')}"
 
 
 def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:
-    """Periodic attractor on which a state has settled; None where it does not come back, or the orbit is not stable."""
+    """Return the periodic attractor on which a state has settled; None without a stable orbit."""
     orbit = strobe.orbit(state, 2 * LONGEST)
     back = (np.abs(orbit[-1 - LONGEST : -1][::-1] - orbit[-1]) / size).max(axis=1)
     returns = np.flatnonzero(back < RETURN)
@@ -78,7 +77,7 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
     if fixed is None:
         return None
     at, change = fixed
-    for shorter in range(1, period):  # a slow approach may come near twice in a period only
+    for shorter in range(1, period):  # a slow approach may come close only twice in a period
         if period % shorter == 0 and np.abs((strobe(at, shorter) - at) / size).max() < 1e-3 * RETURN:
             return None
     multipliers = multipliers_at(strobe, change)
@@ -89,7 +88,7 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
 
 
 def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats) -> tuple[Floats, Floats] | None:
-    """Find the fixed point of some periods near a state by Newton's method, with the derivative there."""
+    """Find the fixed point of a number of periods near a state by Newton's method, with the derivative there."""
     start = at
     for _ in range(12):
         after, change = strobe.derivative(at, period)
@@ -105,9 +104,9 @@ def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats)
 
 
 def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats) -> Floats | None:
-    """Neighbourhood of a point of an attractor that no state leaves, as a row for `kernels.periodic.iterate`."""
+    """Return an invariant neighbourhood of a point of an attractor, as a row for `kernels.periodic.iterate`."""
     side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
-    if side < 0:  # at rest, wherever it came from
+    if side < 0:  # at rest, whatever the previous state
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
     _, change = strobe.derivative(point, attractor.period)
     shape, rate = _contracting_norm(change, size)
@@ -115,7 +114,7 @@ def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: 
         return None
 
     def stays(offsets: Floats) -> bool:
-        """Whether states off the point come nearer to it, on the same side and as it does itself."""
+        """Whether states around the point approach it, on the same side and with the same number of impacts."""
         here = offsets[u + offsets[:, 0] > 0.0]
         if np.any(u + offsets[:, 0] >= strobe._records["overturn_angle"][0]) or len(here) == 0:
             return False
@@ -133,11 +132,11 @@ def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: 
     angles = 2.0 * np.pi * np.arange(_ANGLES) / _ANGLES
     rings = np.arange(1, _RINGS + 1)[:, None, None] / _RINGS
     disc = (rings * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).reshape(-1, 2) @ np.linalg.inv(shape).T
-    radius = 0.25  # over the size of the states
+    radius = 0.25  # relative to the size of the states
     while radius > 1e-7:
-        # What is checked is twice as large.
+        # The checked neighbourhood is twice as large.
         offsets = 2.0 * radius * disc
-        # At few angles of the outermost ring first.
+        # First at a few angles of the outermost ring.
         if stays(offsets[-_ANGLES :: _ANGLES // 4]) and stays(offsets):
             form = shape.T @ shape / radius**2
             return np.array([side, u, v, form[0, 0], form[0, 1], form[1, 1]])
@@ -146,9 +145,9 @@ def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: 
 
 
 def _contracting_norm(change: Floats, size: Floats) -> tuple[Floats, float]:
-    """Matrix L and rate such that |L M x| <= rate |L x|: L x is at least as large as x over the size of the states.
+    """Return a matrix L and a rate such that |L M x| <= rate |L x|, where |L x| is at least |x| relative to the sizes.
 
-    L is not a number where the derivative is so far from its eigenvalues that rounding hides these.
+    L is NaN if rounding error hides the eigenvalues of the derivative.
     """
     scale = np.diag(1.0 / size)
     M = scale @ change @ np.diag(size)
@@ -166,19 +165,19 @@ def _contracting_norm(change: Floats, size: Floats) -> tuple[Floats, float]:
 
 
 class KnownAttractors:
-    """Attractors that are known so far, and their traps.
+    """Attractors found so far, and their traps.
 
     Attributes
     ----------
     attractors : list of Attractor
-        In the order in which they were found.
+        Attractors in the order of their discovery.
     traps : ndarray, shape (n, 6)
-        Their neighbourhoods, for the kernel.
+        Their neighbourhoods, in the form that the kernel accepts.
     owner : ndarray, shape (n,)
-        Which attractor each belongs to.
+        Index of the attractor of each trap.
     """
 
-    #: States from which attractors are sought in one go, those that lead to a known one not counted.
+    #: Maximum number of states per search, without those that lead to known attractors.
     MOST_TRIES: Final = 12
 
     def __init__(self, strobe: StroboscopicMap, size: Floats) -> None:
@@ -187,28 +186,28 @@ class KnownAttractors:
         self.traps, self.owner = np.empty((0, TRAP)), np.empty(0, dtype=np.int64)
 
     def owners(self, states: Floats) -> Integers:
-        """Attractor of each of some states, -1 where it is in no trap."""
+        """Return the attractor of each state, -1 for a state outside all traps."""
         return self._owner_of(self.strobe._states(states)[1])
 
     def settle(self, states: Floats) -> Integers:
-        """Attractor of each of some states, -1 where it is in no trap; new attractors are sought on the way."""
+        """Return the attractor of each state, -1 for a state outside all traps, and search for new attractors."""
         _, made = self.strobe._states(states)
         found = self._owner_of(made)
         tries = self.MOST_TRIES
         while tries and (unsettled := np.flatnonzero(found == -1)).size:
             first, known = unsettled[0], len(self.attractors)
             owner = self._add(attractor_from(self.strobe, states[first], self.size))
-            if owner == known:  # a new one
+            if owner == known:
                 passing = self.settled(made[unsettled], self.attractors[owner].period, threads=1)[0]
                 found[unsettled] = np.append(self.owner, -1)[passing]
-            if owner < 0 or owner == known:  # what is known already is no try
+            if owner < 0 or owner == known:  # known attractors do not count as tries
                 tries -= 1
             found[first] = owner if owner >= 0 else -2
         found[found == -2] = -1
         return found
 
     def settled(self, made: Records, periods: int, threads: int) -> tuple[Integers, Integers]:
-        """Trap in which each of some states, which are moved on, comes within so many periods, or -1; and how many."""
+        """Advance states, and return the trap that each reaches within these periods, or -1, and how many it takes."""
         setting, traps, orbits = self.strobe._setting(), self.traps, np.empty((len(made), 0, 3))
         found, taken = np.empty(len(made), dtype=np.int64), np.empty(len(made), dtype=np.int64)
 
@@ -228,7 +227,7 @@ class KnownAttractors:
         return found
 
     def _add(self, attractor: Attractor | None) -> int:
-        """Make an attractor known; returns its number, that of the same one where it is known, or -1 without traps."""
+        """Add an attractor if it is new, and return its number, or -1 without traps."""
         if attractor is None:
             return -1
         for number, known in enumerate(self.attractors):
@@ -236,7 +235,7 @@ class KnownAttractors:
                 near = np.abs((known.states - attractor.states[0]) / self.size).max(axis=1)
                 if near.min() < RETURN:
                     return number
-        points = attractor.states[evenly(attractor.period, 8)]  # of a long orbit some have a neighbourhood
+        points = attractor.states[evenly(attractor.period, 8)]  # some points of a long orbit have a neighbourhood
         pairs = zip(points, self.strobe._states(points)[1], strict=True)
         traps = [row for pair in pairs if (row := _trap(self.strobe, attractor, *pair, self.size)) is not None]
         if not traps:

@@ -1,4 +1,4 @@
-"""Basins of attraction of a body under periodic motion, where overturning to either side is an attractor as well."""
+"""Basins of attraction of a body under periodic motion, with overturning to either side as attractors."""
 
 from __future__ import annotations
 
@@ -29,28 +29,32 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: What a cell is, before attractors are sorted: 3 + k belongs to attractor k.
+#: Codes of cells before attractors are sorted: 3 + k is attractor k.
 _TO_PLUS, _TO_MINUS, _UNSETTLED, _FIRST = 0, 1, 2, 3
 _NAMES: Final = ("overturns to side +", "overturns to side -", "not settled")
 
-#: Cells before the first look for attractors, and between two later ones.
+#: Cells before the first search for attractors, and between later searches.
 _BEFORE, _BETWEEN = 400, 16_384
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Basins(DatasetResult):
-    """Basins of attraction; from `basins`.
+    """Basins of attraction, created by `basins`.
 
-    Its figure has the basins in shades, and a mark at each point of the attractors.
+    The figure shows the basins in shades, and a mark at each point of the attractors.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (velocity, coordinate): outcome, the number of the attractor; periods, how many it took until that was
-        known. Over (attractor): share of the cells (the basin's stability) with its
-        standard_error as that of as many random states, period and impacts of its orbit (0 and -1 of what is none),
-        rests, and multiplier, the largest in size. Over (attractor, phase): orbit_coordinate and orbit_velocity. What
-        overturns and what has not settled on a periodic orbit count among the attractors.
+        With dimensions (velocity, coordinate): outcome, the number of the attractor, and periods until it was known.
+        With dimension (attractor): share of the cells (the basin stability) with its standard_error, as of an equal
+        number of random states; period and impacts of the orbit (0 and -1 without an orbit); rests; multiplier, the
+        largest in absolute value. With dimensions (attractor, phase): orbit_coordinate and orbit_velocity. Overturning
+        and unsettled states count as attractors.
+
+    See Also
+    --------
+    basins : Compute the basins.
     """
 
     TABLES = MappingProxyType(
@@ -132,34 +136,39 @@ def basins(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Basins:
-    """Find what becomes of a body under periodic motion, for every initial state of a grid.
+    """Compute the basins of attraction of a body under periodic motion on a grid of initial states.
 
     Parameters
     ----------
     body, motion : Body, Motion
-        As for `stroboscopic_map`.
+        As in `stroboscopic_map`.
     positions : array_like, shape (n,)
-        Increasing coordinates at the start of a period: rotations of a block (rad), positions of other bodies (m).
+        Increasing rotations of a block (rad) or positions of other bodies (m) at the start of a period.
     velocities : array_like, shape (m,)
         Increasing velocities, rad/s or m/s.
     periods : int
-        Most periods that a state is followed for.
+        Maximum number of periods per state.
     model, chattering : str, optional
-        As for `stroboscopic_map`.
+        As in `stroboscopic_map`.
     threads, progress : int or bool, optional
-        As for `rocking.simulate_many`.
+        As in `rocking.simulate_many`.
 
     Returns
     -------
     Basins
         Attractors, basins and their measures.
 
+    See Also
+    --------
+    periodic_orbits : Find stable and unstable periodic orbits.
+    stroboscopic_map : Create the map of a body under periodic motion.
+
     Notes
     -----
-    A state is followed until it overturns, or is in a neighbourhood of a stable periodic orbit in which the map
-    contracts, on whose size the map was checked; else for all periods. What has not settled then may be chaotic, or
-    slow. Orbits of up to 64 periods are looked for among the states that have not settled. Of a chaotic attractor no
-    neighbourhood is known, so that its basin takes as long as all periods do.
+    A state is followed until it overturns or enters a neighbourhood of a stable periodic orbit in which the map
+    contracts (as checked on samples), otherwise for all periods. Unsettled states may be chaotic or slow. Orbits of up
+    to 64 periods are searched for among them. A chaotic attractor has no known neighbourhood, so that its states are
+    followed for all periods.
 
     References
     ----------
@@ -191,22 +200,22 @@ def basins(
 
 
 class _Grid:
-    """Cells of a grid, with the attractors that are known so far."""
+    """Cells of a grid, and the attractors found so far."""
 
     def __init__(self, strobe: StroboscopicMap, x: Floats, v: Floats, periods: int, threads: int) -> None:
         self.strobe, self.x, self.v, self.periods, self.threads = strobe, x, v, periods, threads
-        # What becomes of a small grid's states is as large as that of others: to compare them more closely than by
-        # rounding would find no attractor.
+        # Later states of a small grid are as large as others. Comparison within their rounding error would find no
+        # attractor.
         size = np.maximum([float(np.ptp(each) or abs(each[0]) or 1.0) for each in (x, v)], scale_of(strobe))
         self.states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
         self.outcome = np.full(len(self.states), _UNSETTLED, dtype=np.int16)
         self.taken = np.zeros(len(self.states), dtype=np.int32)
         self.known = KnownAttractors(strobe, size)
-        # A start behind a stop, or into one, is refused at once.
+        # Raises an error for a start behind or into a stop.
         strobe._states(self.states[[0, -1]], "positions", "velocities")
 
     def run(self, progress: bool | None) -> None:
-        """Follow all cells, in a mixed order."""
+        """Follow all cells in a mixed order."""
         count = len(self.outcome)
         cells = np.random.default_rng(0).permutation(count)
         later = range(_BEFORE, count, _BETWEEN)
@@ -228,7 +237,7 @@ class _Grid:
         self.taken[cells], self.outcome[cells] = taken, outcome
 
     def dataset(self) -> xr.Dataset:
-        """Everything that was found, attractors in the order of their shares, then what is none."""
+        """Create the dataset, with attractors in the order of their shares, then the outcomes without an attractor."""
         import xarray as xr
 
         found, counts = np.unique(self.outcome, return_counts=True)
@@ -282,7 +291,7 @@ class _Grid:
 
 
 def _distinct(names: list[str]) -> list[str]:
-    """Return names of which no two are equal: a letter behind each of those that were."""
+    """Append a letter to names that are equal."""
     seen: dict[str, int] = {}
     found = []
     for name in names:

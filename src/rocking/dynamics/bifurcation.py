@@ -1,4 +1,4 @@
-"""What a body under periodic motion does in the long run: bifurcation diagrams and Lyapunov exponents."""
+"""Long-term behaviour of a body under periodic motion: bifurcation diagrams and Lyapunov exponents."""
 
 from __future__ import annotations
 
@@ -32,40 +32,44 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Ways to go through the values of the parameter.
+#: Orders of the values of the parameter.
 Direction = Literal["up", "down", "both", "afresh"]
 
-#: What stands for a period where the body overturned, and where it took too many steps to be followed.
+#: Values of the period if the body overturned, and if it took too many steps.
 OVERTURNED: Final = -1
 NOT_FOLLOWED: Final = -2
 
-#: Values of the parameter that are done between two looks at the progress bar.
+#: Number of values per update of the progress bar.
 _CHUNK: Final = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BifurcationDiagram(DatasetResult):
-    """Where orbits settle, against a parameter; from `bifurcation_diagram`.
+    """Long-term states of orbits against a parameter, created by `bifurcation_diagram`.
 
-    Its figure has every kept state, of each direction in its own colour.
+    The figure shows every kept state, with one colour per direction.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (direction, value, start, iterate): coordinate and velocity at the starts of periods after the transient,
-        NaN where the body has overturned or could not be followed. Over (direction, value, start): period, in periods
-        of the motion, 0 where the orbit does not come back among the kept states, -1 where the body overturned, -2
-        where it took too many steps to be followed; impacts in one such period, infinity with complete chattering, or
-        -1 where there is no period.
+        With dimensions (direction, value, start, iterate): coordinate and velocity at the starts of periods after the
+        transient, NaN after overturning or too many steps. With dimensions (direction, value, start): period, in
+        periods of the motion (0 if the kept states do not repeat, -1 after overturning, -2 after too many steps), and
+        impacts in this period (infinity with complete chattering, -1 without a period).
+
+    See Also
+    --------
+    bifurcation_diagram : Compute the diagram.
     """
 
     TABLES = MappingProxyType({"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")})
 
     def changes(self, direction: str | None = None, start: int = 0) -> list[tuple[float, float, int, int]]:
-        """List where the period changes: the values before and after, and the periods there, in the order gone through.
+        """List the changes of the period in the order of the computation.
 
-        The direction is by default the first; `start` is the number of the initial state. A period that is none is 0,
-        -1 or -2, as in ``data``. `InvalidOption` if there is no such direction or start.
+        Each entry contains the values before and after, and the periods there.
+        The direction is by default the first; `start` is the number of the initial state. The codes 0, -1 and -2 stand
+        for missing periods, as in ``data``. Raise `InvalidOption` if there is no such direction or start.
         """
         ways = self.data.direction.values.tolist()
         way = ways.index(checks.one_of(ways[0] if direction is None else direction, "direction", InvalidOption, ways))
@@ -148,28 +152,28 @@ def bifurcation_diagram(
     chattering: str | Treatment = "certified",
     progress: bool | None = None,
 ) -> BifurcationDiagram:
-    """Follow orbits of a body under periodic motion as a parameter changes, and keep where they settle.
+    """Compute the long-term states of orbits of a body under periodic motion against a parameter.
 
     Parameters
     ----------
     case : callable
-        Takes a value of the parameter and returns the body and one period of the motion.
+        Function of the parameter that returns the body and one period of the motion.
     values : array_like, shape (n,)
         Increasing values of the parameter.
     starts : array_like, shape (2,) or (k, 2)
-        Coordinate and velocity, of one initial state or of several.
+        Coordinate and velocity of one or several initial states.
     direction : {"up", "down", "both", "afresh"}
-        Up or down: at each value an orbit starts where it was at the value before, and where that is not known, as
-        after overturning, again at its initial state. Afresh: at each value from the initial states.
+        Order of the values. Up or down: orbits continue from the last state at the previous value, or from the initial
+        state if this is unknown (for example after overturning). Afresh: every value starts from the initial states.
     transient, kept : int
-        Periods at each value before states are kept, and periods whose states are kept. Near a bifurcation orbits
-        settle slowly: a short transient may find no period there, or that of the orbit before.
+        Numbers of discarded and of kept periods at each value. Near a bifurcation orbits settle slowly. After a short
+        transient, no period may be found, or the previous one.
     parameter : str
-        What the parameter is, with its unit, for tables and figures.
+        Name of the parameter with its unit, for tables and figures.
     model, chattering : str, optional
-        As for `stroboscopic_map`.
+        As in `stroboscopic_map`.
     progress : bool, optional
-        As for `rocking.simulate_many`.
+        As in `rocking.simulate_many`.
 
     Returns
     -------
@@ -179,7 +183,12 @@ def bifurcation_diagram(
     Raises
     ------
     InvalidMotion, InvalidBlock
-        If the function returns something else than a body and a motion.
+        If the function does not return a body and a motion.
+
+    See Also
+    --------
+    continue_orbit : Follow stable and unstable orbits as a parameter changes.
+    lyapunov_exponents : Compute the Lyapunov exponents of an orbit.
 
     Examples
     --------
@@ -211,7 +220,7 @@ def bifurcation_diagram(
     states, period, impacts = np.full((*shape, count, 2), np.nan), np.full(shape, OVERTURNED), np.full(shape, -1.0)
 
     def follow(item: tuple[int, Sequence[int]]) -> int:
-        """Follow the orbits of one direction through some values; returns how many."""
+        """Follow the orbits of one direction through some values, and return their number."""
         w, some = item
         for k in some:
             strobe, last = _map_of(case(float(levels[k])), model, chattering), k - order[w].step
@@ -228,7 +237,7 @@ def bifurcation_diagram(
 
     ends = [_map_of(case(float(each)), model, chattering) for each in levels[[0, -1]]]
     for strobe in ends:
-        strobe.checked_starts(first, "starts")  # a start behind a stop is refused
+        strobe.checked_starts(first, "starts")  # raises an error for a start behind a stop
     with Progress("bifurcation diagram", len(ways) * levels.size, show=progress) as bar:
         for start in range(0, levels.size, _CHUNK):
             chunks = [(w, each[start : start + _CHUNK]) for w, each in order.items()]
@@ -270,7 +279,7 @@ def _map_of(pair: Any, model: Model | None, chattering: str | Treatment) -> Stro
 
 
 def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
-    """States put back to the stop where a parameter has moved it past them."""
+    """Move states that a change of the parameter has put behind a stop back to the stop."""
     low, high = strobe.body.stops
     if not isinstance(strobe.body, LinearBody):
         return states
@@ -280,7 +289,7 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
 
 
 def states_after(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> tuple[Floats, Integers]:
-    """States at the starts of some periods after others, shape (n, kept, 2), and what became of each: a `Fate`."""
+    """Return states at the starts of periods after a transient, shape (n, kept, 2), and the `Fate` of each orbit."""
     states, now, fates = np.full((len(at), kept, 2), np.nan), at, np.full(len(at), Fate.MOVES.value)
     if transient:
         now, fates, _ = strobe.followed(at, transient)
@@ -294,14 +303,16 @@ def states_after(strobe: StroboscopicMap, at: Floats, transient: int, kept: int)
 
 
 def period_of(states: Floats, scale: Scale | None = None) -> int:
-    """Period of an orbit from its kept states; 0 where none comes back for half of them, or it is still settling.
+    """Return the period of an orbit from its kept states.
 
-    States are compared by their own size, for an orbit may be small, but by no less than a share of ``scale``, which is
-    natural to them: what is zero but for rounding would have that rounding as its size.
+    The period is 0 if the orbit does not repeat within half of the states, or is still settling.
+
+    Differences are relative to the size of the orbit, but at least to a small share of the natural ``scale``, because
+    the size of a state at zero is only its rounding error.
     """
     size = np.abs(states).max(axis=0) + np.finfo(float).tiny
     if scale is not None:
-        # `RETURN` of this size is some thousand times rounding.
+        # With this size `RETURN` is about a thousand times the rounding error.
         size = np.maximum(size, 1e-6 * np.array(scale))
 
     def apart(period: int) -> Floats:
@@ -310,7 +321,7 @@ def period_of(states: Floats, scale: Scale | None = None) -> int:
 
     for period in range(1, len(states) // 2 + 1):
         if apart(period).max() <= RETURN:
-            # An orbit that comes nearer to a shorter one from both sides in turn looks like one of twice its period.
+            # Alternating approach to a shorter orbit resembles twice its period.
             for shorter in (each for each in range(1, period) if period % each == 0):
                 gaps = apart(shorter)
                 if gaps[-period:].max() < 0.99 * gaps[:period].max():
@@ -320,7 +331,7 @@ def period_of(states: Floats, scale: Scale | None = None) -> int:
 
 
 def _common(texts: Sequence[str]) -> str:
-    """Return the parts, between commas, that two texts share."""
+    """Return the comma-separated parts that all texts share."""
     first, last = (text.split(", ") for text in texts)
     return ", ".join(part for part in first if part in last)
 
@@ -329,32 +340,36 @@ def _in_words(period: int) -> str:
     return {0: "none found", OVERTURNED: "overturned", NOT_FOLLOWED: "not followed"}.get(period, str(period))
 
 
-#: Parts of an orbit whose means give the standard error.
+#: Number of parts of an orbit whose means determine the standard error.
 _BATCHES: Final = 20
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LyapunovExponents(Result):
-    """Lyapunov exponents of one orbit; from `lyapunov_exponents`.
+    """Lyapunov exponents of one orbit, created by `lyapunov_exponents`.
 
     Attributes
     ----------
     largest, smallest : float
-        Weighted mean of the logarithm, per period, of the stretch along the direction that grows fastest and of that
-        across it: minus infinity where the body comes to rest in some of the periods, NaN where it overturns. Where
-        impacts lose nothing, a period at rest counts as zero: what is near it never rests.
+        Weighted means, per period, of the logarithms of the stretch in the direction of fastest growth and across it.
+        Minus infinity after a rest in any period, NaN after overturning. Without energy loss a period at rest counts as
+        zero, because neighbouring states never rest.
     standard_error : float
-        Of both, from the means of 20 consecutive parts of the orbit.
+        Standard error of both, from the means of 20 consecutive parts of the orbit.
     period, periods : float, int
-        Period of the motion, s, and how many were averaged over.
+        Period of the motion, s, and number of averaged periods.
     impacts : float
-        Impacts per period.
+        Number of impacts per period.
     resting : float
-        Share of the periods in which the body comes to rest or is at rest, of those that are known; NaN where none is.
+        Fraction of the known periods in which the body comes to rest or is at rest; NaN if no period is known.
     fate : Fate
-        What the state is in the end.
+        Final condition of the body.
     stretches : ndarray, shape (periods, 2)
-        Logarithms of the stretches of each period.
+        Logarithms of the stretches in each period.
+
+    See Also
+    --------
+    lyapunov_exponents : Compute the exponents.
     """
 
     largest: float
@@ -402,31 +417,37 @@ def lyapunov_exponents(
     model: Model | None = None,
     chattering: str | Treatment = "certified",
 ) -> LyapunovExponents:
-    """Lyapunov exponents of a body under periodic motion, both of them, from one orbit.
+    """Compute both Lyapunov exponents of a body under periodic motion from one orbit.
 
     Parameters
     ----------
     body, motion : Body, Motion
-        As for `stroboscopic_map`.
+        As in `stroboscopic_map`.
     state : array_like, shape (2,)
         Coordinate and velocity at the start of a period.
     periods : int
-        Number of periods that are averaged over.
+        Number of averaged periods.
     transient : int
-        Number of periods before these, in which the direction turns to the one that grows fastest.
+        Number of preceding periods, in which the direction aligns with the fastest growth.
     model, chattering : str, optional
-        As for `stroboscopic_map`.
+        As in `stroboscopic_map`.
 
     Returns
     -------
     LyapunovExponents
-        Per period, with a standard error.
+        Exponents per period, with a standard error.
+
+    See Also
+    --------
+    bifurcation_diagram : Compute long-term states against a parameter.
+    periodic_orbits : Find periodic orbits with their multipliers.
 
     Notes
     -----
-    On a stable periodic orbit they are the logarithms of the sizes of its multipliers over its period. Their sum is the
-    mean logarithm of the contraction of areas: twice ln(restitution) for each impact, less damping times the period.
-    After a rest nothing is left of a small difference, so that both are minus infinity however rarely one comes.
+    On a stable periodic orbit the exponents are the logarithms of the absolute multipliers, divided by the period.
+    Their sum is the mean logarithm of the contraction of areas: 2 ln(restitution) per impact, minus the damping times
+    the period. A rest removes every small difference. Therefore both exponents are minus infinity however rare rests
+    are.
 
     References
     ----------
@@ -461,17 +482,17 @@ def lyapunov_exponents(
     if fate == Fate.RESTS_FOR_EVER:
         logs[np.isnan(logs)] = -np.inf
     rests = np.isneginf(logs[:, 0])
-    if strobe._loses_nothing:  # what is near a rest never comes to one, and goes neither nearer nor away
+    if strobe._loses_nothing:  # neighbouring states never come to rest, and neither approach nor separate
         logs[rests] = 0.0
-    # Weights of a mean over so many periods, all of whose derivatives vanish at both ends (Das and others 2016).
+    # Weights of a mean over periods that vanish with all derivatives at both ends (Das and others 2016).
     at = (np.arange(count) + 0.5) / count
     bump = np.exp(-1.0 / (at * (1.0 - at)))
     weights: Floats = bump / bump.sum()
     known = ~np.isnan(logs).any(axis=1)
     mean, error = np.full(2, np.nan), float("nan")
-    if known.all():  # else nothing is known of what would follow, whatever rests came before
+    if known.all():  # otherwise the later periods are unknown, despite earlier rests
         mean[:] = [-np.inf if np.isneginf(each).any() else weights @ each for each in logs.T]
-    if np.isfinite(logs[:, 0]).all():  # the error of a plain mean, from those of consecutive parts
+    if np.isfinite(logs[:, 0]).all():  # standard error of an unweighted mean, from consecutive parts
         means = [part.mean() for part in np.array_split(logs[:, 0], _BATCHES)]
         error = float(np.std(means, ddof=1) / np.sqrt(_BATCHES))
     return LyapunovExponents(

@@ -1,7 +1,7 @@
-"""Bodies on a line between stops: a ball, an oscillator and a pendulum.
+"""Bodies on a line between stops: a bouncing ball, an impact oscillator and an inverted pendulum.
 
-They share x'' = stiffness x - damping x' - pull - a(t): position and motion are those of the table or the support, and
-at a stop the velocity changes its sign and drops by the restitution.
+All satisfy x'' = stiffness x - damping x' - pull - a(t), with x relative to a table or support of acceleration a(t). At
+a stop the velocity is reversed and multiplied by the restitution.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from rocking.simulation.simulate import response_to
 
 
 class Law(NamedTuple):
-    """Equation of motion of a body: stiffness (1/s^2), damping (1/s), pull (m/s^2), stops (m), the last one or inf."""
+    """Equation of motion: stiffness (1/s^2), damping (1/s), pull (m/s^2) and stops (m; the second may be infinite)."""
 
     stiffness: float
     damping: float
@@ -41,7 +41,7 @@ class Law(NamedTuple):
 
 @dataclass(frozen=True)
 class LinearBody(ABC):
-    """What the kinds share: what `rocking.Body` asks of them."""
+    """Base class of the bodies, which implements the protocol `rocking.Body`."""
 
     coordinate: ClassVar[Coordinate] = Coordinate("position", "velocity", "acceleration", "m")
     balance: ClassVar[tuple[float, float]] = (math.inf, math.inf)
@@ -61,34 +61,34 @@ class LinearBody(ABC):
 
     @property
     def description(self) -> str:
-        """What it is, in words."""
+        """Description in words."""
         return self.kind.replace("-", " ")
 
     @property
     def sides(self) -> Sequence[object]:
-        """Its parameters, as text."""
+        """Parameters as text."""
         values = ((entry.name, getattr(self, entry.name)) for entry in fields(self))
         texts = (f"{k.replace('_', ' ')} = {v:.5g} {self.units[k]}".rstrip() for k, v in values if v is not None)
         return (", ".join(texts),)
 
     @property
     def stops(self) -> tuple[float, float]:
-        """Positions of its stops, m; without a second one the first twice."""
+        """Positions of the stops, m; with a single stop, its position twice."""
         low, high = self.law.low, self.law.high
         return low, (high if math.isfinite(high) else low)
 
     def uplift_thresholds(self, model: Model = "linear") -> tuple[float, float]:
-        """Accelerations (m/s^2) that take it off its stops: the first when -a passes it, the other when a; or inf."""
+        """Accelerations (m/s^2) that lift the body off its stops: -a for the first, a for the second; or inf."""
         _check_model(model)
         stiffness, _, pull, low, high = self.law
         return pull - stiffness * low, stiffness * high - pull if math.isfinite(high) else math.inf
 
     def alone(self) -> LinearBodies:
-        """Bodies of which it is the only one."""
+        """Return a `LinearBodies` that contains only this body."""
         return LinearBodies((self,))
 
     def _check(self, *positive: str) -> None:
-        """Check the restitution, and that these are positive; numbers are kept as floats."""
+        """Check the restitution and that the named parameters are positive, and convert numbers to floats."""
         for name in positive:
             object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, self.units[name]))
         restitution = checks.finite(self.restitution, "restitution", InvalidBlock)  # type: ignore[attr-defined]
@@ -99,17 +99,21 @@ class LinearBody(ABC):
 
 @dataclass(frozen=True, eq=False)
 class LinearBodies:
-    """Any number n of bodies of one of these kinds.
+    """Collection of n bodies of one kind.
 
     Parameters
     ----------
     members : sequence
-        Bodies of one kind under one gravity.
+        Bodies of one kind, with the same gravity.
 
     Raises
     ------
     InvalidBlock
-        If there is none, or they are of several kinds.
+        If the sequence is empty or contains bodies of several kinds.
+
+    See Also
+    --------
+    simulate : Simulate a single body.
 
     Examples
     --------
@@ -140,7 +144,7 @@ class LinearBodies:
 
     @property
     def restitution(self) -> Floats:
-        """Factors on the speed at a stop, shape (n, 2)."""
+        """Coefficients of restitution at the stops, shape (n, 2)."""
         return self._pairs("restitution")
 
     @property
@@ -150,7 +154,7 @@ class LinearBodies:
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether all hang or stand between two stops that are equally far away, without a pull."""
+        """Whether every body is between two stops at equal distances, without a pull."""
         return all(law.pull == 0.0 and law.low == -law.high for law in (each.law for each in self.members))
 
     def __len__(self) -> int:
@@ -170,7 +174,7 @@ class LinearBodies:
         return {name: (self._pairs(name), self.members[0].units[name] or "1") for name in names}
 
     def speed_limits(self, share: float) -> Floats:
-        return np.full((len(self), 2), share)  # these bodies have no speed that is natural to them
+        return np.full((len(self), 2), share)  # these bodies have no natural speed
 
     def kernel_records(self, model: Model, limits: Floats) -> state.Records:
         _check_model(model)
@@ -202,19 +206,25 @@ def _check_model(model: Model) -> None:
 
 @dataclass(frozen=True)
 class BouncingBall(LinearBody):
-    """A ball that bounces on a table: x'' = -g - a(t), x >= 0.
+    """Ball that bounces on a table: x'' = -g - a(t), x >= 0.
 
-    The motion is that of the table, positive up. The ball rests on the table until that goes down faster than g.
+    The motion is the acceleration of the table, positive upwards. The ball rests until the downward acceleration
+    exceeds g.
 
     Parameters
     ----------
     restitution, gravity : float
-        Speed after an impact over that before, relative to the table, and acceleration of gravity, m/s^2.
+        Coefficient of restitution (of velocities relative to the table) and acceleration of gravity, m/s^2.
 
     Raises
     ------
     InvalidBlock
-        If the restitution is not between 0 and 1, or the gravity not positive.
+        If the restitution is not between 0 and 1, or the gravity is not positive.
+
+    See Also
+    --------
+    simulate : Simulate the response.
+    ImpactOscillator : Mass on a spring with one or two stops.
 
     References
     ----------
@@ -240,29 +250,34 @@ class BouncingBall(LinearBody):
 
     @property
     def law(self) -> Law:
-        """Equation of motion: nothing but gravity."""
+        """Equation of motion: gravity alone."""
         return Law(0.0, 0.0, self.gravity, 0.0, math.inf)
 
 
 @dataclass(frozen=True)
 class ImpactOscillator(LinearBody):
-    """A mass on a spring that hits one stop or two: x'' + 2 zeta w x' + w^2 x = -a(t), x >= -stop.
+    """Mass on a spring with one or two stops: x'' + 2 zeta w x' + w^2 x = -a(t), x >= -stop.
 
-    The motion is that of the support, to which spring, damper and stops are fixed.
+    The motion is the acceleration of the support of spring, damper and stops.
 
     Parameters
     ----------
     frequency : float
         Natural frequency w/(2 pi), Hz.
     restitution : float
-        Speed after an impact over that before.
+        Coefficient of restitution.
     damping_ratio : float
-        Zeta; 0 without damping, below 1.
+        Damping ratio zeta, at least 0 and below 1.
     stop : float
-        Distance from the position without force in the spring to the stop, m; negative where the spring presses the
-        mass against it.
+        Distance from the position of zero spring force to the stop, m; negative if the spring presses the mass against
+        the stop.
     second_stop : float, optional
         Position of a stop on the other side, m: x <= second_stop.
+
+    See Also
+    --------
+    simulate : Simulate the response.
+    InvertedPendulum : Inverted pendulum between two walls.
 
     References
     ----------
@@ -313,18 +328,23 @@ class ImpactOscillator(LinearBody):
 
 @dataclass(frozen=True)
 class InvertedPendulum(LinearBody):
-    """An inverted pendulum between two walls, for small angles: x'' = p^2 x - a(t), -gap <= x <= gap.
+    """Inverted pendulum between two walls, for small angles: x'' = p^2 x - a(t), -gap <= x <= gap.
 
-    The motion is that of the support, horizontally. It rests against a wall until the support pulls it off.
+    The motion is the horizontal acceleration of the support, which can lift the pendulum off a wall.
 
     Parameters
     ----------
     p : float
-        Rate at which it falls, rad/s: sqrt(g/l) of a pendulum of length l.
+        Rate of falling, rad/s: sqrt(g/l) for a pendulum of length l.
     gap : float
         Distance from the upright position to each wall, m.
     restitution : float
-        Speed after an impact over that before.
+        Coefficient of restitution.
+
+    See Also
+    --------
+    simulate : Simulate the response.
+    ImpactOscillator : Mass on a spring with one or two stops.
 
     References
     ----------
@@ -352,12 +372,12 @@ class InvertedPendulum(LinearBody):
 
     @property
     def law(self) -> Law:
-        """Equation of motion: it falls away from the upright position."""
+        """Equation of motion: the pendulum falls away from the upright position."""
         return Law(self.p * self.p, 0.0, 0.0, -self.gap, self.gap)
 
 
 class _MakerOfKind(NamedTuple):
-    """Makes bodies of a kind of what `LinearBodies.parameters` returned, and gathers single ones."""
+    """Functions that create bodies of a kind from `LinearBodies.parameters`, and collect single bodies."""
 
     made: type[LinearBody]
 
@@ -376,15 +396,19 @@ KINDS.update({made.kind: _MakerOfKind(made) for made in (BouncingBall, ImpactOsc
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Response(rocking.response.Response):
-    """Response of a body between stops, made by `rocking.dynamics.simulate`: a `rocking.Response` in positions.
+    """Response of a body between stops, created by `rocking.dynamics.simulate`.
 
-    Positions are relative to the table or the support. Of events and impacts ``side`` is +1 at the lower stop and -1 at
-    the upper one.
+    A `rocking.Response` in positions relative to the table or the support. In events and impacts, ``side`` is +1 at the
+    lower and -1 at the upper stop.
+
+    See Also
+    --------
+    simulate : Simulate the response of a body between stops.
     """
 
     @property
     def peak_position(self) -> float:
-        """Highest position, m: that of the second stop, exactly, once the body has been there."""
+        """Highest position, m; exactly the position of the second stop once the body has reached it."""
         return self.peak_rotation
 
     def position(self, time: ArrayLike) -> Floats:
@@ -392,12 +416,12 @@ class Response(rocking.response.Response):
         return as_asked(self.states(time)[..., 0])
 
     def velocity(self, time: ArrayLike) -> Floats:
-        """Return the rate of `position`, m/s; just after an impact at one."""
+        """Return the derivative of `position`, m/s; at an impact, the velocity just after it."""
         return as_asked(self.states(time)[..., 1])
 
 
 def in_positions(response: rocking.response.Response) -> Response:
-    """Return the response of a body between stops as one in positions."""
+    """Convert the response of a body between stops to positions."""
     return Response(**{entry.name: getattr(response, entry.name) for entry in fields(response)})
 
 
@@ -410,21 +434,20 @@ def simulate(
     initial_position: float | None = None,
     initial_velocity: float = 0.0,
 ) -> Response:
-    """Response of a body between stops to a motion of its table or support, with chattering resolved by proof.
+    """Simulate the response of a body between stops to a motion of its table or support.
 
     Parameters
     ----------
     body : BouncingBall, ImpactOscillator or InvertedPendulum
-        What moves.
+        Body to simulate.
     motion : Motion or None
-        Acceleration of the table (positive up) or the support; None for free motion.
+        Acceleration of the table (positive upwards) or the support; None for free motion.
     chattering : str or treatment
-        As for `rocking.simulate`; thresholds on velocities are in m/s.
+        As in `rocking.simulate`, with velocity thresholds in m/s. By default rest is proven.
     duration : float, optional
-        Time to stop at, s. By default to the end of the motion, and on until rest; a body that need not come to rest
-        stops with the motion.
+        End time, s. By default rest after the motion, or the end of the motion if the body need not come to rest.
     initial_position : float, optional
-        Position at time 0, m; by default 0, or the stop where that is behind it.
+        Position at time 0, m; by default 0, or the stop if this is behind it.
     initial_velocity : float
         Velocity at time 0, m/s.
 
@@ -436,10 +459,15 @@ def simulate(
     Raises
     ------
     InvalidBlock, InvalidMotion
-        If the body is none of these, or the motion none, or one with a vertical component beside it.
+        If the body is none of these, or the motion is not a `Motion` or has a vertical component.
     InvalidOption
-        If an argument is out of its range, the body starts behind a stop, or it never comes to rest and there is
-        neither motion nor duration.
+        If an argument is out of range, the body starts behind a stop, or it never rests and has neither motion nor
+        duration.
+
+    See Also
+    --------
+    stroboscopic_map : Map of a body under periodic motion.
+    rocking.simulate : Simulate the response of a block.
 
     Examples
     --------
@@ -464,13 +492,13 @@ def _one_body(body: object) -> LinearBody:
 
 
 def _is_pressed(body: LinearBody) -> bool:
-    """Whether something presses the body against one of its stops where nothing moves."""
+    """Whether the body, while nothing moves, is pressed against one of its stops."""
     low, high = body.uplift_thresholds()
     return low > 0.0 or 0.0 < high < np.inf
 
 
 def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
-    """Return the duration: as it is given, else until rest, or of a body that need not rest that of the motion."""
+    """Return the duration: the given one, otherwise until rest, or of the motion if the body need not come to rest."""
     if duration is not None:
         return duration
     if not _is_pressed(body):

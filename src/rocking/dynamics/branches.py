@@ -1,4 +1,4 @@
-"""Branches of periodic orbits along a parameter: points and bifurcations, in words, as tables and as a figure."""
+"""Branches of periodic orbits along a parameter, with their bifurcations."""
 
 from __future__ import annotations
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Names of bifurcations.
 FOLD: Final = "fold"
 FLIP: Final = "flip"
 SYMMETRY: Final = "symmetry breaking"
@@ -37,7 +36,7 @@ REST: Final = "start of rest"
 UPLIFT: Final = "uplift"
 OVERTURNING: Final = "overturning"
 
-#: How a branch may end without one.
+#: Ends of a branch without a bifurcation.
 LIMIT: Final = "limit of the parameter"
 CLOSED: Final = "where it began"
 SHORT: Final = "too many points"
@@ -45,21 +44,25 @@ LOST: Final = "lost"
 
 
 class Bifurcation(NamedTuple):
-    """Where a branch of periodic orbits changes.
+    """Bifurcation of a branch of periodic orbits.
 
     Attributes
     ----------
     kind : str
-        "fold", "flip", "symmetry breaking", "branch point" (where another branch crosses), "grazing", "loss of complete
-        chattering", "uplift", "overturning", or "start of rest" (by a treatment that imposes one: complete chattering
-        begins on no branch, whose orbits have finitely many impacts).
+        "fold", "flip", "symmetry breaking", "branch point" (crossing of another branch), "grazing", "loss of complete
+        chattering", "uplift", "overturning", or "start of rest" (only if the treatment imposes rest, because complete
+        chattering does not begin on a branch, whose orbits have finitely many impacts).
     value : float
-        The parameter there.
+        Value of the parameter.
     bracket : (float, float)
-        Values of the parameter between which it lies: of a branch point those of the points before and after it; where
-        the speed of an impact vanishes, the lowest and highest of three extrapolations.
+        Bounds of the value: at a branch point the neighbouring points, and for a vanishing impact speed the lowest and
+        highest of three extrapolations.
     orbit : PeriodicOrbit
-        The orbit there: the last one on the branch where that ends.
+        Orbit at the bifurcation; the last one on the branch if the branch ends there.
+
+    See Also
+    --------
+    Branch : Branch of periodic orbits.
     """
 
     kind: str
@@ -70,33 +73,37 @@ class Bifurcation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch(Result):
-    """Periodic orbits along a parameter, made by `continue_orbit`.
+    """Branch of periodic orbits along a parameter, created by `continue_orbit`.
 
     Attributes
     ----------
     family : callable
-        Makes body and motion of the parameter.
+        Function of the parameter that returns body and motion.
     name, unit : str
-        What the parameter is.
+        Name and unit of the parameter.
     limits : (float, float)
-        Range of the parameter in which it was followed.
+        Range of the parameter.
     period : int
         Period of the orbits, in periods of the motion.
     values : ndarray, shape (n,)
-        The parameter, in the order along the branch.
+        Values of the parameter, in the order along the branch.
     states : ndarray, shape (n, 2)
         Coordinate and velocity at the start of a period.
     multipliers : ndarray of complex, shape (n, 2)
         Floquet multipliers, the largest first.
     impacts : float
-        Impacts in the period of the orbits, which are as many all along the branch; infinity with complete chattering.
+        Number of impacts in one period, constant along the branch; infinity with complete chattering.
     peaks : ndarray, shape (n,)
-        Greatest size of the coordinate.
+        Largest absolute coordinates.
     bifurcations : tuple of Bifurcation
-        In the order along the branch.
+        Bifurcations in the order along the branch.
     ends : (str, str)
-        Why the branch ends where it does: a kind of bifurcation, "limit of the parameter", "where it began", "too many
-        points", or "lost".
+        Reasons of the ends: a kind of bifurcation, "limit of the parameter", "where it began", "too many points", or
+        "lost".
+
+    See Also
+    --------
+    continue_orbit : Follow a periodic orbit as a parameter changes.
     """
 
     TABLES: ClassVar[tuple[str, ...]] = ("points", "bifurcations")
@@ -125,7 +132,7 @@ class Branch(Result):
         return len(self.values)
 
     def orbit(self, index: int) -> PeriodicOrbit:
-        """Return the orbit at a point of the branch, with its multipliers and its course."""
+        """Return the orbit at a point of the branch, with its multipliers."""
         index = checks.whole(index, "index", InvalidOption, least=-len(self), most=len(self) - 1)
         body, motion = self.family(float(self.values[index]))
         return orbit_at(StroboscopicMap(body, motion, self.model, self.treatment), self.states[index], self.period)
@@ -194,18 +201,18 @@ class Branch(Result):
         figsize: tuple[float, float] | None = None,
         others: Sequence[Branch] = (),
     ) -> Figure:
-        """Draw the greatest size of the coordinate against the parameter; arguments as of `Result.plot`.
+        """Draw the largest absolute coordinate against the parameter, with the arguments of `Result.plot`.
 
-        Where that is the same all along, as between two stops, the coordinate at the start of a period is drawn. Stable
-        orbits are a full line, unstable ones dashed, and a mark stands at each bifurcation. `others` are branches along
-        the same parameter that are drawn with it, for example of twice the period.
+        If this is constant, as between two stops, the coordinate at the start of a period is drawn. Stable orbits are
+        solid lines, unstable orbits dashed, and bifurcations are marked. `others` are further branches along the same
+        parameter, for example of twice the period.
         """
         from rocking.plot.orbits import branch_figure
 
         body, _ = self.family(float(self.values[0]))
         coordinate, branches = body.coordinate, [self, *others]
         unit = "" if self.unit == "1" else f" ({self.unit.replace('^2', '²')})"
-        # Between two stops that are both hit the greatest size is always that of a stop, and tells nothing.
+        # Between two stops that are hit, this is always a stop.
         peaks = np.concatenate([each.peaks for each in branches])
         places = [at for each in branches for at in each.bifurcations]
         flat = float(np.ptp(peaks)) <= 1e-9 * float(np.max(peaks))
@@ -228,7 +235,7 @@ class Branch(Result):
 
 
 def _apart(lines: Sequence[NDArray[Any]]) -> Floats:
-    """Join lines, with a NaN between one and the next, where a plotted one breaks off."""
+    """Join lines with a NaN between them, at which a plotted line is interrupted."""
     return np.concatenate([np.append(np.asarray(line, dtype=np.float64), np.nan) for line in lines])[:-1]
 
 

@@ -1,6 +1,6 @@
-"""Continuation: a periodic orbit followed as a parameter changes, through folds, to where orbits of its kind end.
+"""Continuation of a periodic orbit as a parameter changes, through folds, until orbits of its kind end.
 
-Bifurcations on the way are roots of test functions between two points.
+Bifurcations are located as roots of test functions between two points.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from rocking.dynamics.orbits import PeriodicOrbit
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 
-#: Least cosine between one tangent and the next, and how far a point may be from where the tangent leads, over the step
-#: (a bend of that cosine makes it half as much).
+#: Smallest cosine between tangents, and largest distance from the tangent, relative to the step (twice that of such a
+#: bend).
 _COSINE: Final = 0.97
 _ASIDE: Final = 0.25
 
-#: Step along a branch below which it has come to its end, and steps beyond it at which the kind of orbits is looked at.
+#: Step below which the branch ends, and steps beyond the end at which the kind of orbits is examined.
 _LEAST_STEP: Final = 1e-13
 _BEYOND: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
 
-#: Shares of the range of the parameter within which the orbits are sought from which a branch bifurcates.
+#: Fractions of the parameter range that are searched for the orbits from which a branch bifurcates.
 _WIDER: Final = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 
@@ -46,47 +46,50 @@ def continue_orbit(
     step: float = 0.05,
     most: int = 1000,
 ) -> Branch:
-    """Follow a periodic orbit as a parameter changes, through folds, and say where it bifurcates.
+    """Follow a periodic orbit as a parameter changes, through folds, and locate its bifurcations.
 
     Parameters
     ----------
     orbit : PeriodicOrbit
-        Where to begin.
+        First orbit of the branch.
     family : callable
-        Makes (body, motion) of the parameter.
+        Function of the parameter that returns (body, motion).
     value : float
-        The parameter of the orbit.
+        Value of the parameter at the orbit.
     limits : (float, float)
         Range of the parameter; beyond it the family may raise a `RockingError`.
     name, unit : str
-        What the parameter is, for tables and figures.
+        Name and unit of the parameter, for tables and figures.
     step : float
-        Longest step along the branch, over the range of the parameter and the natural size of states.
+        Longest step, relative to the range of the parameter and the natural size of states.
     most : int
-        Most points in either direction.
+        Maximum number of points in either direction.
 
     Returns
     -------
     Branch
-        Followed from the orbit in both directions, until the limits, or until orbits of this kind end: at a grazing
-        impact, where chattering is no longer complete, or where a body at rest lifts off.
+        Branch in both directions, up to the limits or the end of orbits of this kind: at a grazing impact, where
+        chattering becomes incomplete, or where a body at rest lifts off.
 
     Raises
     ------
     InvalidOption
-        If the value is not within the limits, the orbit is none of the family's at this value, or a number is out of
-        its range.
+        If the value is beyond the limits, the orbit does not belong to the family there, or a number is out of range.
+
+    See Also
+    --------
+    periodic_orbits : Find orbits at one value of the parameter.
+    bifurcation_diagram : Compute long-term states against a parameter.
 
     Notes
     -----
-    Pseudo-arclength continuation in state and parameter. Folds and flips are roots of the determinant of the
-    derivative less or plus one. Where the symmetry of an orbit breaks, the equations are singular, and the parameter is
-    interpolated. Ends are located by halving the step. Of two multipliers whose product is less than
-    one, none leaves the unit circle but through 1 or -1: there is no Neimark-Sacker bifurcation with restitution below
-    1.
+    The method is pseudo-arclength continuation in state and parameter. Folds and flips are roots of the determinant of
+    the derivative minus or plus one. Where symmetry breaks, the equations are singular and the parameter is
+    interpolated. Ends are located by halving the step. Two multipliers whose product is less than one leave the unit
+    circle only through 1 or -1. Therefore no Neimark-Sacker bifurcation occurs with restitution below 1.
 
-    The motion must be given over its least period: over two of them, orbits of twice the period and those from which
-    they bifurcate are of one kind, and a long step may lead from the ones to the others.
+    The motion must be specified over its least period. Over two periods, orbits of twice the period and those from
+    which they bifurcate are of one kind, and a long step may jump between them.
 
     References
     ----------
@@ -123,7 +126,7 @@ def continue_orbit(
     crossing = ends.SYMMETRY if odd and not orbit.rests else ends.BRANCHES
     backward, forward = (_Walk(equations, z, direction, longest, crossing) for direction in (-1.0, 1.0))
     backward.run(count)
-    if backward.end == ends.CLOSED:  # what has come back to where it began is all there is
+    if backward.end == ends.CLOSED:  # a closed branch is complete
         forward.end = ends.CLOSED
     else:
         forward.run(count)
@@ -136,7 +139,7 @@ def continue_orbit(
 
 
 class _Walk:
-    """A branch that is followed in one direction of the parameter: its points, where it is now, and the next step."""
+    """Continuation of a branch in one direction of the parameter: points, current position and next step."""
 
     def __init__(self, equations: OrbitEquations, z: Floats, direction: float, longest: float, crossing: str) -> None:
         self.equations, self.z, self.crossing = equations, z, crossing
@@ -145,15 +148,15 @@ class _Walk:
         self.points = [equations.point(z, self.response)]
         self.bifurcations: list[Bifurcation] = []
         self.end = ends.SHORT
-        #: How far ahead there is no point of this kind, as far as is known, and successful steps since that was found.
+        #: Distance ahead at which there is no known point of this kind, and number of successful steps since.
         self.ahead, self.successes = math.inf, 0
-        #: Whether the last step failed only as it led too far from the tangent.
+        #: Whether the last step failed only because of its distance from the tangent.
         self.turned = False
-        #: Speed of the slowest impact and parameter, over its size, at all points so far.
+        #: Speed of the slowest impact, and scaled parameter, at all points so far.
         self.slowest: list[tuple[float, float]] = []
 
     def run(self, most: int) -> None:
-        """Follow the branch over so many points, or until it ends."""
+        """Follow the branch over a number of points, or to its end."""
         if self.points[0][0] == self.equations.limits[0 if self.direction < 0.0 else 1]:
             self.end = ends.LIMIT
             return
@@ -165,7 +168,7 @@ class _Walk:
         self.written = self.z
         self.move_start()
         for _ in range(4 * most):  # some steps fail
-            # Near the end of a branch few of the differences by the parameter reach across it.
+            # Keeps most differences by the parameter within the branch.
             self.equations.difference = min(max(1e-3 * self.step, 1e-13), DIFFERENCE)
             if len(self.points) >= most:
                 break
@@ -174,12 +177,12 @@ class _Walk:
                 break
 
     def go_to(self, found: Solved, like: Floats) -> None:
-        """Go to a point, with its tangent in the direction of another."""
+        """Move to a point, with its tangent in the direction of another."""
         self.z, self.tangent = found.z, tangent_of(found.jacobian, like)
         self.tests = found.tests(self.tangent)
 
     def advance(self) -> str:
-        """Take a step along the branch, or find that it is too long; returns why the branch ends, if it does."""
+        """Take a step along the branch or shorten it, and return the reason if the branch ends."""
         equations = self.equations
         if self.ahead < _LEAST_STEP:
             reason = self.reason_of_end()
@@ -197,7 +200,7 @@ class _Walk:
             return self.bifurcations[-1].kind
         self.pass_bifurcations(new, tests)
         self.response = equations.response(new)
-        # A point so near takes the place of the one before.
+        # A point this close replaces the previous one.
         if len(self.points) > 1 and np.max(np.abs(new - self.written)) < 1e-5:
             self.points.pop()
         else:
@@ -221,8 +224,8 @@ class _Walk:
         return ""
 
     def shorten(self) -> None:
-        """Try half the step that failed; there is no point of this kind at its end, unless the branch bends."""
-        # In a longer step it bends, or the point is one of another branch.
+        """Halve a step that failed; no point of this kind is at its end, unless the branch bends."""
+        # With a longer step the branch bends, or the point belongs to another branch.
         if not (self.turned and self.step > 1e-3):
             self.ahead, self.successes = self.step, 0
         self.step *= 0.5
@@ -231,11 +234,11 @@ class _Walk:
             self.tangent = tangent_of(jacobian, self.tangent)
 
     def next(self) -> tuple[Solved, bool] | None:
-        """Return the next point where a step leads to one of the same kind, and whether at a limit."""
+        """Return the next point, if a step leads to one of the same kind, and whether the point is at a limit."""
         equations, z, tangent, self.turned = self.equations, self.z, self.tangent, False
         guess = z + self.step * tangent
         found = equations.solved(guess, tangent)
-        new = guess if found is None else found.z  # beyond a limit there may be no body or motion
+        new = guess if found is None else found.z  # beyond a limit the body or the motion may not exist
         low, high = (each / equations.sizes[2] for each in equations.limits)
         at_limit = not low <= new[2] <= high
         if at_limit:
@@ -246,27 +249,27 @@ class _Walk:
         if found is None:
             return None
         onwards = tangent_of(found.jacobian, tangent)
-        # Far from the prediction it is another branch.
+        # A point far from the prediction belongs to another branch.
         self.turned = bool(np.linalg.norm(found.z - guess) > _ASIDE * self.step or onwards @ tangent < _COSINE)
         if self.turned:
             return None
         before, after = self.tests, found.tests(onwards)
         if before.at_one * after.at_one < 0.0 and before.at_minus_one * after.at_minus_one < 0.0:
-            return None  # A multiplier passes 1 and -1, or changes its sign through infinity, where an impact grazes.
+            return None  # A multiplier passes 1 and -1, or changes sign through infinity at a grazing impact.
         if self.turns(after) and max(abs(before.at_one), abs(after.at_one)) > 0.05:
-            return None  # Too far from the turn, or there is none: the difference by the parameter reaches past an end.
+            return None  # Too far from a turn, or the difference by the parameter extends past an end.
         return (found, at_limit) if equations.kind_at(found.z) == equations.kind else None
 
     def turns(self, after: Tests) -> bool:
-        """Whether the parameter turns on the way to a point, but no multiplier passes 1.
+        """Whether the parameter turns before a point although no multiplier passes 1.
 
-        There the branch bifurcates from orbits of half the period, or symmetric ones: beyond it are the same orbits
-        again, shifted or mirrored.
+        There the branch meets orbits of half the period, or symmetric ones. The same orbits follow, shifted or
+        mirrored.
         """
         return self.tests.onwards * after.onwards < 0.0 < self.tests.at_one * after.at_one
 
     def pass_bifurcations(self, new: Floats, tests: Tests) -> None:
-        """Add the bifurcations between this point and the next one at which the branch goes on."""
+        """Add the bifurcations between this point and the next at which the branch continues."""
         turns, length = self.tests.onwards * tests.onwards < 0.0, float(self.tangent @ (new - self.z))
         for k, kind in enumerate((ends.FOLD if turns else self.crossing, ends.FLIP)):
             if self.tests[k] * tests[k] < 0.0:
@@ -274,7 +277,7 @@ class _Walk:
                 self.bifurcations += [] if there is None else [there]
 
     def joined(self, new: Floats) -> Bifurcation:
-        """Bifurcation at which the branch meets, between two points, orbits of half the period, or symmetric ones."""
+        """Locate, between two points, where the branch meets orbits of half the period, or symmetric orbits."""
         equations, middle = self.equations, 0.5 * (self.z + new)
         half = replace(equations, period=equations.period // 2)
         for share in () if equations.period % 2 else _WIDER:
@@ -285,7 +288,7 @@ class _Walk:
         return turn or equations.bifurcation(self.crossing, middle, [self.z[2], new[2]])
 
     def vanishing(self) -> Bifurcation | None:
-        """Grazing, where the speed of the slowest impact vanishes: extrapolated, as equations are singular there."""
+        """Extrapolate to the grazing at zero speed of the slowest impact, where the equations are singular."""
         speed, equations = float(np.min(self.response.impacts["speed_before"], initial=math.inf)), self.equations
         self.slowest.append((speed, self.z[2]))
         if equations.kind.rests or speed >= 2e-3 * equations.sizes[1]:
@@ -306,7 +309,7 @@ class _Walk:
         return found._replace(value=float(estimates[-1] * equations.sizes[2]))
 
     def has_returned(self) -> bool:
-        """Whether the branch has come back to its first point, in the direction in which it left it."""
+        """Whether the branch has returned to its first point in its initial direction."""
         first, second, before, last = (
             np.append(self.points[k][1], self.points[k][0]) / self.equations.sizes for k in (0, 1, -2, -1)
         )
@@ -314,7 +317,7 @@ class _Walk:
         return bool(near and (last - before) @ (second - first) > 0.0)
 
     def move_start(self) -> None:
-        """Move the start of the period to another breakpoint of the motion where an impact is near it."""
+        """Move the start of the period to another breakpoint of the motion if an impact is close to it."""
         equations = self.equations
         _, motion = equations.family(equations.physical(self.z)[1])
         starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
@@ -328,7 +331,7 @@ class _Walk:
         if nearest[equations.shift] > 0.03 * period or nearest[best] <= nearest[equations.shift]:
             return
         moved = replace(equations, shift=best)
-        # At a fold the parameter does not say where the branch leads: the course a little ahead does.
+        # At a fold not the parameter but the response slightly ahead determines the direction.
         z, ahead = (
             np.append(equations.state(each, best), equations.physical(each)[1]) / equations.sizes
             for each in (self.z, self.z + 1e-6 * self.tangent)
@@ -339,7 +342,7 @@ class _Walk:
             self.go_to(found, onwards)
 
     def reason_of_end(self) -> str:
-        """Name what ends the branch just beyond its last point."""
+        """Return the reason why the branch ends just beyond its last point."""
         kind, beyond = self.equations.kind, self.z + 8.0 * _LEAST_STEP * self.tangent
         on_other_courses = False
         for step in _BEYOND:
@@ -358,5 +361,5 @@ class _Walk:
             if found != kind:
                 return ends.GRAZING
             on_other_courses = kind.rests and not kind.for_ever
-        # A body that lifts and rests as before, but not in the same way, has touched or missed something in between.
+        # A body that lifts and rests as before, but in another way, has touched or missed a stop in between.
         return ends.GRAZING if on_other_courses else ends.LOST

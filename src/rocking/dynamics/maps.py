@@ -1,4 +1,4 @@
-"""A body under a motion that repeats for ever, and its map from period to period, with its derivative."""
+"""Stroboscopic map of a body under periodic motion, with its derivative."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.records.named import one_motion
 
-#: Ground acceleration, g, that lifts any body: it stands behind the second period.
+#: Ground acceleration, g, that lifts any body; it follows the second period.
 _BEYOND_ALL: Final = 1e12
 
-#: States that a thread takes at once, so that an interrupt is seen soon.
+#: States per call of a kernel, few for quick interrupts.
 TOGETHER: Final = 256
 
-#: A share of one that is less by no more than rounding.
+#: Share that equals one within rounding error.
 _ALMOST: Final = 1.0 - 2.0**-40
 
 
 class PeriodicForcing:
-    """A body under a motion that repeats for ever, as kernels take both."""
+    """Body under periodic motion, in the form that kernels accept."""
 
     def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | Treatment) -> None:
         given = one_motion(motion)
@@ -83,23 +83,23 @@ class PeriodicForcing:
         return Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
 
     def _marching(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
-        """Return what kernels of derivatives need beside the states: the problem, and space to work in."""
+        """Return the arguments of the derivative kernels besides the states: the problem and workspace."""
         trail = Trail(self._ground, self._records[0], self._rules(record=True), NO_NODES)
         return trail, state.new_scratch(), state.record(state.VARIATION), state.new_table(512)
 
     def checked_starts(self, given: ArrayLike, name: str) -> Floats:
-        """Return states to start from, shape (n, 2): finite numbers, in front of the stops."""
+        """Return initial states, shape (n, 2): finite numbers, in front of the stops."""
         states = checks.numbers(given, name, InvalidOption)
         self._states(states, name)
         sensible(states, name)
         return states.reshape(-1, 2)
 
     def _states(self, states: ArrayLike, name: str = "states", velocities: str = "") -> tuple[Floats, state.Records]:
-        """States as given, flat, and as records; ``name`` is what a caller calls them, or their positions."""
+        """Return states, flattened and as records; errors call them, or their positions, ``name``."""
         given = self._pairs(states, name, self.body.coordinate.name)
         flat = given.reshape(-1, 2)
         (at, speed), record, (low, high) = flat.T, self._records[0], self.body.stops
-        if record["next_side"][0] == 0:  # a stop, no ground on its other side
+        if record["next_side"][0] == 0:  # a stop: there is no ground on its other side
             into = (at == low) & (speed < 0.0) | (bool(record["two_stops"]) & (at == high) & (speed > 0.0))
             if np.any(into):
                 x, v = float(at[into][0]), float(speed[into][0])
@@ -114,12 +114,12 @@ class PeriodicForcing:
 
     @property
     def _no_peak(self) -> float:
-        """A highest rotation that asks for none: below the one at which a body has fallen by no more than rounding."""
+        """Initial peak that disables the search for peaks: the rotation of a fallen body, less rounding error."""
         fallen = float(self._records["overturn_angle"][0])
         return fallen if np.isinf(fallen) else fallen * _ALMOST
 
     def _pairs(self, values: ArrayLike, name: str, first: str) -> Floats:
-        """Pairs of numbers, shape (..., 2)."""
+        """Return pairs of numbers, shape (..., 2)."""
         given = checks.numbers(values, name, InvalidOption)
         if given.ndim == 0 or given.shape[-1] != 2:
             raise InvalidOption(
@@ -128,7 +128,7 @@ class PeriodicForcing:
         return given
 
     def _coordinates(self, u: Floats, v: Floats, side: Integers) -> Floats:
-        """Coordinates and velocities of states given in the frames of their sides."""
+        """Convert states in the frames of their sides to coordinates and velocities."""
         at = np.where(side < 0, -1 - side, side)
         sign = 1.0 - 2.0 * at
         stops = np.array(self.body.stops)[at]
@@ -137,32 +137,32 @@ class PeriodicForcing:
         return found + 0.0
 
     def _known(self, made: state.Records) -> Floats:
-        """Coordinates and velocities of states; NaN of those that are not known."""
+        """Return coordinates and velocities of states, NaN where they are unknown."""
         found = self._coordinates(made["u"], made["v"], made["side"])
         found[np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))] = np.nan
         return found
 
     @property
     def _is_two_sided(self) -> bool:
-        """Whether the coordinate passes zero, or there is a second stop."""
+        """Whether the coordinate changes its sign, or there is a second stop."""
         record = self._records[0]
         return bool(record["two_stops"] or record["next_side"][0] == 1)
 
     @property
     def _loses_nothing(self) -> bool:
-        """Whether no speed is lost from one impact to the next but one, so that nothing near a rest comes to rest."""
+        """Whether two successive impacts lose no speed, so that nothing near a rest comes to rest."""
         return bool(np.prod(self._records[0]["restitution"]) >= 1.0)
 
 
 class Scale(NamedTuple):
-    """Sizes of a coordinate and a velocity by which states are compared."""
+    """Scales of coordinate and velocity for the comparison of states."""
 
     coordinate: float
     velocity: float
 
 
 def scale_of(strobe: PeriodicForcing) -> Scale:
-    """Sizes of coordinate and velocity that are natural to a body under a motion."""
+    """Compute the natural scales of coordinate and velocity of a body under a motion."""
     record, period = strobe._records[0], strobe.period
     if not isinstance(strobe.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
@@ -177,79 +177,85 @@ def scale_of(strobe: PeriodicForcing) -> Scale:
 
 
 def mean_size(motion: Motion) -> float:
-    """Mean size of an acceleration, roughly."""
+    """Estimate the mean absolute acceleration."""
     times = np.linspace(motion.breakpoints[0], motion.breakpoints[-1], 257)
     return float(np.mean(np.abs(motion.acceleration(times))))
 
 
 def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
-    """Ground of a motion that repeats for ever, with this sign: twice, and behind that what lifts any body."""
+    """Create the ground of two periods of a motion, followed by an acceleration that lifts any body."""
     breaks = motion.breakpoints - motion.breakpoints[0]
     period, columns = breaks[-1], motion.coefficients.shape[1]
     beyond = np.zeros((2, columns))
     beyond[:, 0] = _BEYOND_ALL * gravity, -_BEYOND_ALL * gravity
     breakpoints = np.concatenate([breaks, period + breaks[1:], [3.0 * period, 4.0 * period]])
     coefficients = np.concatenate([motion.coefficients, sign * motion.coefficients, beyond])
-    breakpoints.flags.writeable = coefficients.flags.writeable = False  # as a motion's: a kernel is compiled for these
+    breakpoints.flags.writeable = coefficients.flags.writeable = False  # as in a motion: kernels are compiled for these
     return ground_of(breakpoints, coefficients, 1.0 / gravity, motion.error)
 
 
 def parts_of(count: int, periods: int) -> Sequence[slice]:
-    """Ranges of states for one call of a kernel each, over so many periods."""
-    # Half a second of periods.
+    """Divide states into ranges, one per call of a kernel, over a number of periods."""
+    # About half a second.
     return [*ranges(count, min(TOGETHER, max(1, 100_000 // periods)))]
 
 
 def sensible(values: Floats, name: str) -> None:
-    """Refuse coordinates or velocities that are not finite, or beyond all sense."""
+    """Raise an error for coordinates or velocities that are not finite or absurdly large."""
     if not values.size or not np.all(np.abs(values) <= FASTEST):
         raise InvalidOption(f"{{}} must be finite numbers of at most {FASTEST:g} in size", name)
 
 
 def described(what: Body | Motion) -> str:
-    """Return what moves, or what shakes it, with its parameters in one line."""
+    """Describe a body or a motion with its parameters in one line."""
     if isinstance(what, Motion):
         return ", ".join(part for part in (what.label, what.description.numbers) if part)
     return f"{what.description}, {in_line(what.sides)}"
 
 
 class StroboscopicMap(PeriodicForcing):
-    """Map of a state (coordinate, velocity) to that one period later, made by `stroboscopic_map`.
+    """Map of a state (coordinate, velocity) over one period, created by `stroboscopic_map`.
 
     Attributes
     ----------
     body, motion, model, treatment
-        What is mapped, and how.
+        Body, one period of the motion, model, and treatment of chattering.
     period : float
         Period of the motion, s.
+
+    See Also
+    --------
+    stroboscopic_map : Create the map of a body under periodic motion.
+    periodic_orbits : Find the periodic orbits of the map.
     """
 
     def __call__(self, states: ArrayLike, periods: int = 1) -> Floats:
-        """Return states after some periods.
+        """Return states after a number of periods.
 
         Parameters
         ----------
         states : array_like, shape (..., 2)
-            Coordinate and velocity at the start of a period: rad and rad/s of a block, m and m/s of other bodies.
+            Coordinate and velocity at the start of a period, in rad and rad/s for a block, in m and m/s for other
+            bodies.
         periods : int
             Number of periods.
 
         Returns
         -------
         ndarray, shape (..., 2)
-            States at the end. At rest the velocity is exactly zero and the body at its stop. NaN where the body has
-            overturned, or more steps were needed than any sensible motion takes.
+            Final states. At rest the velocity is exactly zero and the body is at its stop. NaN after overturning or too
+            many steps.
 
         Raises
         ------
         InvalidOption
-            If the states have another shape, or one is behind a stop.
+            If the states have another shape, or a state is behind a stop.
         """
         found, _, _ = self.followed(states, periods)
         return found
 
     def orbit(self, states: ArrayLike, periods: int) -> Floats:
-        """Return states after 0, 1, ... periods, shape (..., periods + 1, 2); otherwise as the map."""
+        """Return states after 0, 1, ... periods, shape (..., periods + 1, 2), as the map does."""
         given, made = self._states(states)
         count = checks.whole(periods, "periods", InvalidOption, least=1)
         rows = np.full((len(made), count, 3), np.nan)
@@ -260,18 +266,18 @@ class StroboscopicMap(PeriodicForcing):
         return whole.reshape(*given.shape[:-1], count + 1, 2)
 
     def followed(self, states: ArrayLike, periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
-        """Return states after some periods as the map does, the `Fate` of each, and the numbers of impacts resolved."""
+        """Return states after a number of periods, the `Fate` of each, and the numbers of resolved impacts."""
         given, made = self._states(states)
         self._iterate(made, checks.whole(periods, "periods", InvalidOption, least=1))
         fates, impacts = (np.array(made[name]).reshape(given.shape[:-1]) for name in ("ending", "impacts"))
         return self._known(made).reshape(given.shape), fates, impacts
 
     def derivative(self, states: ArrayLike, periods: int = 1) -> tuple[Floats, Floats]:
-        """Return states after some periods as the map does, and their derivatives by the states before, (..., 2, 2).
+        """Return states after a number of periods and their derivatives by the initial states, shape (..., 2, 2).
 
-        Derivatives are exactly zero where the body comes to rest on the way, or is held at rest at the start. On a stop
-        that does not hold it, they are those of the states in front of the stop. NaN where it overturns; infinite at a
-        grazing impact. An arc contributes the solution of its variational equation, an impact its saltation matrix.
+        Derivatives are exactly zero if the body comes to rest on the way or is held at rest at the start, NaN after
+        overturning, and infinite at a grazing impact. On a stop that does not hold the body, they apply to states in
+        front of the stop. Arcs contribute solutions of the variational equation, impacts saltation matrices.
         """
         given, made = self._states(states)
         total = np.broadcast_to(np.eye(2), (len(made), 2, 2)).copy()
@@ -289,9 +295,10 @@ class StroboscopicMap(PeriodicForcing):
     def from_impacts(self, impacts: ArrayLike) -> Floats:
         """Return the states at the end of the period in which bodies leave impacts, shape (..., 2).
 
-        An impact is its time since the start of the period, s, and the velocity after it: of a block its sign is the
-        side that is entered; between two stops it leads away from the stop that was hit. NaN where the body overturns
-        before. `InvalidOption` if the impacts have another shape, or a velocity does not lead away from its stop.
+        An impact is a pair: time since the start of the period, s, and velocity after the impact. The sign of the
+        velocity is the side that a block enters. Between two stops the velocity points away from the stop. NaN if the
+        body overturns earlier. Raise `InvalidOption` if the impacts have another shape, or a velocity does not point
+        away from its stop.
         """
         given = self._pairs(impacts, "impacts", "phase in s")
         flat = given.reshape(-1, 2)
@@ -328,30 +335,35 @@ def _signs(side: NDArray[np.int64]) -> Floats:
 def stroboscopic_map(
     body: Body, motion: Motion, *, model: Model | None = None, chattering: str | Treatment = "certified"
 ) -> StroboscopicMap:
-    """Map of a body under periodic motion from the start of one period to that of the next, exact and vectorised.
+    """Create the map of a body under periodic motion from one period to the next.
 
     Parameters
     ----------
     body : Block, or a body of `rocking.dynamics`
-        What moves.
+        Body under the motion.
     motion : Motion
-        One period, which repeats for ever: as ``pulses.sine(a, f, cycles=1)``.
+        One period of the motion, for example ``pulses.sine(a, f, cycles=1)``.
     model : {"nonlinear", "linear"}, optional
-        Equation of motion; by default nonlinear of a body that rocks.
+        Equation of motion; by default nonlinear for a rocking body.
     chattering : str or treatment
-        As for `rocking.simulate`.
+        As in `rocking.simulate`.
 
     Returns
     -------
     StroboscopicMap
-        A function of states.
+        Callable that maps arrays of states.
 
     Raises
     ------
     InvalidMotion
-        If the motion is none, or has no length.
+        If the motion is not a `Motion`, or has zero length.
     InvalidOption
-        If the model is not one of the body's.
+        If the body does not support the model.
+
+    See Also
+    --------
+    periodic_orbits : Find the periodic orbits of the map.
+    bifurcation_diagram : Compute long-term states against a parameter.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Equations that a family of periodic orbits solves, and Newton's method on them.
+"""Equations of a family of periodic orbits, and their solution by Newton's method.
 
-Numbers z are coordinate, velocity and parameter over their sizes.
+The unknowns z are coordinate, velocity and parameter, each divided by its size.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 from rocking.response import Response
 
-#: Points from which the crossing of two branches is interpolated.
+#: Number of points that interpolate a crossing of branches.
 _CROSSING: Final = 4
 
-#: Residual of a point of a branch, over the scale and the size of the derivative; and the largest one.
+#: Residual of a point, relative to the scale and the size of the derivative, and its maximum.
 _RESIDUAL: Final = 1e-12
 _LARGEST_RESIDUAL: Final = 1e-6
 
-#: Greatest step of differences by the parameter, over its range.
+#: Largest step of differences by the parameter, relative to its range.
 DIFFERENCE: Final = 1e-6
 
-#: The plane of one parameter, by its normal.
+#: Normal of the plane of constant parameter.
 AT_VALUE: Final = np.array([0.0, 0.0, 1.0])
 
 
 class Kind(NamedTuple):
-    """What does not change along a branch: whether a body rests (for ever), its impacts, and whether it overturns.
+    """Constants of a branch: whether the body rests (for ever), its number of impacts, and whether it overturns.
 
-    It is unknown of a body that took too many steps to be followed.
+    Unknown for a body that took too many steps.
     """
 
     rests: bool
@@ -54,7 +54,7 @@ class Kind(NamedTuple):
 
 
 class Tests(NamedTuple):
-    """Functions that change their signs at bifurcations: det(R' - 1), det(R' + 1), and the tangent's parameter."""
+    """Test functions that change sign at bifurcations: det(R' - 1), det(R' + 1), and the parameter of the tangent."""
 
     at_one: float
     at_minus_one: float
@@ -62,7 +62,7 @@ class Tests(NamedTuple):
 
 
 class Solved(NamedTuple):
-    """A point of a branch, the derivative of its equations and that of the map, and the Newton steps to it."""
+    """Point of a branch, derivatives of its equations and of the map, and number of Newton steps."""
 
     z: Floats
     jacobian: Floats
@@ -70,14 +70,14 @@ class Solved(NamedTuple):
     steps: int
 
     def tests(self, tangent: Floats) -> Tests:
-        """Return the test functions."""
+        """Compute the test functions."""
         less, plus = (float(np.linalg.det(self.change + sign * np.eye(2))) for sign in (-1.0, 1.0))
         return Tests(less, plus, float(tangent[2]))
 
 
 @dataclass(eq=False)
 class OrbitEquations:
-    """Equations of the orbits of a family that are of the kind of a given one."""
+    """Equations of the orbits of a family that are of the same kind as a given orbit."""
 
     family: Callable[[float], tuple[Body, Motion]]
     model: Model
@@ -85,9 +85,9 @@ class OrbitEquations:
     period: int
     sizes: Floats
     kind: Kind
-    #: Range of the parameter: the family need not be made beyond.
+    #: Range of the parameter, beyond which the family need not be defined.
     limits: tuple[float, float]
-    #: Breakpoint of the motion at which a period starts: where an impact falls on it, the equations are not smooth.
+    #: Breakpoint at which a period starts; an impact on it makes the equations non-smooth.
     shift: int = 0
     difference: float = DIFFERENCE
 
@@ -98,7 +98,7 @@ class OrbitEquations:
     def of(
         cls, orbit: PeriodicOrbit, family: Callable[[float], object], value: float, limits: tuple[float, float]
     ) -> OrbitEquations:
-        """Return the equations that an orbit solves at a value of the parameter."""
+        """Create the equations of an orbit at a value of the parameter."""
         pair = family(value) if callable(family) else None
         if not isinstance(pair, tuple) or len(pair) != 2:
             raise InvalidOption(
@@ -122,20 +122,20 @@ class OrbitEquations:
         return StroboscopicMap(body, motion, self.model, self.treatment)
 
     def physical(self, z: Floats) -> tuple[Floats, float]:
-        """State and parameter of numbers z; exactly a limit where it differs from that by rounding."""
+        """Convert z to state and parameter, exactly a limit within rounding error."""
         value = float(z[2] * self.sizes[2])
         at_limit = (each for each in self.limits if math.isclose(value, each, rel_tol=2.0**-50))
         return z[:2] * self.sizes[:2], next(at_limit, value)
 
     def returned(self, state: Floats, value: float) -> tuple[Floats, Floats]:
-        """State after the period, and the derivative; NaN where there is none."""
+        """Return the state after the period and the derivative; NaN if they do not exist."""
         try:
             return self.strobe(value).derivative(state, self.period)
-        except RockingError:  # behind a stop, or a parameter that makes no body or motion
+        except RockingError:  # behind a stop, or no body or motion for the parameter
             return np.full(2, np.nan), np.full((2, 2), np.nan)
 
     def at(self, z: Floats) -> tuple[Floats, Floats]:
-        """Residual, and its derivative by z."""
+        """Compute the residual and its derivative by z."""
         state, value = self.physical(z)
         after, change = self.returned(state, value)
         h, (low, high) = self.difference * self.sizes[2], self.limits
@@ -147,7 +147,7 @@ class OrbitEquations:
         return (after - state) / self.sizes[:2], np.column_stack([scaled - np.eye(2), by_value])
 
     def solved(self, guess: Floats, normal: Floats) -> Solved | None:
-        """Return the point of the branch in the plane through a guess; None where Newton's method finds none."""
+        """Return the point in the plane through a guess; None if Newton's method does not converge."""
         z = guess.copy()
         for count in range(10):
             residual, jacobian = self.at(z)
@@ -160,22 +160,22 @@ class OrbitEquations:
             except np.linalg.LinAlgError:
                 return None
             z = z + step
-            if sharp:  # The derivative is that of the point itself: the one before may be beyond a grazing impact.
+            if sharp:  # The derivative at the previous point may be from beyond a grazing impact.
                 return Solved(z, jacobian, self.returned(*self.physical(z))[1], count)
         return None
 
     def kind_at(self, z: Floats) -> Kind:
-        """Kind of the course from a state."""
+        """Return the kind of the response from a state."""
         state, value = self.physical(z)
         return kind_of(self.strobe(value), state, self.period)
 
     def response(self, z: Floats) -> Response:
-        """Course over a period from the start that is used here."""
+        """Simulate one period from the start in use."""
         state, value = self.physical(z)
         return response_of(self.strobe(value), state, self.period)
 
     def state(self, z: Floats, shift: int = 0) -> Floats:
-        """State of the same course at another breakpoint of the motion as it was given."""
+        """Return the state of the same response at another breakpoint of the original motion."""
         state, value = self.physical(z)
         if shift == self.shift:
             return state
@@ -184,14 +184,14 @@ class OrbitEquations:
         return self.response(z).states(time)[:2]
 
     def point(self, z: Floats, response: Response) -> tuple[float, Floats, NDArray[np.complex128], float]:
-        """Parameter, state, multipliers and greatest size of the coordinate at a point."""
+        """Return parameter, state, multipliers and largest absolute coordinate at a point."""
         state, value = self.physical(z)
         strobe = self.strobe(value)
         multipliers = multipliers_at(strobe, strobe.derivative(state, self.period)[1])
         return value, self.state(z), multipliers, peak_of(response)
 
     def is_shorter(self, z: Floats) -> bool:
-        """Whether a point is of orbits of half the period, from which this branch bifurcates."""
+        """Whether a point belongs to orbits of half the period, from which this branch bifurcates."""
         if self.period % 2 or self.kind.rests:
             return False
         state, value = self.physical(z)
@@ -199,14 +199,14 @@ class OrbitEquations:
         return bool(np.max(np.abs(after - state) / self.sizes[:2]) < SAME)
 
     def bifurcation(self, kind: str, z: Floats, values: Sequence[float]) -> Bifurcation:
-        """Bifurcation near a point, between values of the parameter over its size."""
+        """Create the bifurcation near a point, between scaled values of the parameter."""
         bracket = sorted(float(each * self.sizes[2]) for each in values)
         value = self.physical(z)[1]
         strobe = StroboscopicMap(*self.family(value), self.model, self.treatment)
         return Bifurcation(kind, value, (bracket[0], bracket[-1]), orbit_at(strobe, self.state(z), self.period))
 
     def located(self, kind: str, z: Floats, tangent: Floats, length: float, number: int) -> Bifurcation | None:
-        """Root of one of the test functions along a line from a point; None where there is none."""
+        """Find a root of a test function along a line from a point; None if there is none."""
         from scipy.optimize import brentq
 
         found: dict[float, tuple[Solved, float]] = {}
@@ -225,7 +225,8 @@ class OrbitEquations:
         except _Missed:
             if len({test > 0.0 for _, test in found.values()}) < 2:
                 return None
-            # Where branches cross the equations are singular; where symmetry breaks, nearer points tell more.
+            # The equations are singular where branches cross. Where symmetry breaks, closer points are more
+            # informative.
             for aside in length * np.array([0.1, 0.01, 1e-3] if kind == SYMMETRY else []):
                 near = sorted((abs(test), test, at) for at, (_, test) in found.items())[:_CROSSING]
                 middle = at_zero([test for _, test, _ in near], [at for *_, at in near])
@@ -241,11 +242,11 @@ class OrbitEquations:
 
 
 class _Missed(Exception):
-    """There is no point of the branch where one was looked for."""
+    """Absence of an expected point of the branch."""
 
 
 def tangent_of(jacobian: Floats, like: Floats) -> Floats:
-    """Return the unit tangent of a branch, in the direction of another."""
+    """Return the unit tangent of a branch, oriented like another tangent."""
     along = np.cross(jacobian[0], jacobian[1])
     size = float(np.linalg.norm(along))
     if size == 0.0:
@@ -255,7 +256,7 @@ def tangent_of(jacobian: Floats, like: Floats) -> Floats:
 
 
 def kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
-    """Kind of the course of a body over so many periods."""
+    """Return the kind of the response of a body over a number of periods."""
     _, fate, impacts = strobe.followed(state, period)
     _, change = strobe.derivative(state, period)
     rests, for_ever = not np.any(change), bool(fate == Fate.RESTS_FOR_EVER and not impacts)
@@ -264,6 +265,6 @@ def kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
 
 
 def at_zero(x: Sequence[float], y: Sequence[float]) -> float:
-    """Value at zero of the polynomial through points."""
+    """Interpolate the polynomial through points at zero."""
     weights = [math.prod(b / (b - a) for b in x if b != a) for a in x]
     return float(np.dot(weights, y))

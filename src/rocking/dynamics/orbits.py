@@ -1,4 +1,4 @@
-"""Periodic orbits of a body under periodic motion: found by Newton's method, in words, as tables and as a figure."""
+"""Find periodic orbits of a body under periodic motion by Newton's method."""
 
 from __future__ import annotations
 
@@ -28,41 +28,45 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Distance, over the scale of the states, within which two orbits are the same.
+#: Largest scaled distance between two states of the same orbit.
 SAME: Final = 1e-7
 
-#: Difference from 1 that rounding may have made in a multiplier, in the product of two, and in two whose product is 1,
-#: which may be equal: then it is a root of rounding.
+#: Rounding error of a multiplier near 1 or of the product of two, and of two possibly equal ones (its square root).
 _NEUTRAL: Final = 1e-9
 _NEUTRAL_PAIR: Final = 1e-6
 
-#: Periods after which every so many-th start of a search is given once more: it is then near what attracts it.
+#: Number of periods after which every `_EVERY`-th start is added again, now close to an attractor.
 _LATER, _EVERY = 60, 8
 
-#: Speeds of starts: least and greatest gain over the impulse of a period, and what a block that overturns has at most.
+#: Start speeds: smallest and largest gain relative to the impulse of a period, and largest speed of an overturning
+#: block.
 _LEAST_GAIN, _MOST_GAIN, _BLOCK_SPEED = 0.5, 20.0, 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PeriodicOrbit(Result):
-    """A motion of a body that repeats after some periods of what shakes it, made by `periodic_orbits`.
+    """Periodic orbit of a body under periodic motion, created by `periodic_orbits`.
 
     Attributes
     ----------
     body, motion, model, treatment
-        What moves: the motion is one period.
+        Body, one period of the motion, model, and treatment of chattering.
     state : ndarray, shape (2,)
         Coordinate and velocity at the start of a period of the motion.
     period : int
-        Its period, in periods of the motion; the least one.
+        Least period of the orbit, in periods of the motion.
     impacts : float
-        Impacts in its period: a whole number, or infinity with complete chattering.
+        Number of impacts in one period: an integer, or infinity with complete chattering.
     multipliers : ndarray of complex, shape (2,)
-        Floquet multipliers, the largest first: eigenvalues of the derivative of the state after a period of the orbit
-        by that before. Exactly zero with a proven rest; one at rest where impacts lose nothing, for what is near it
-        never rests.
+        Floquet multipliers, the largest first (eigenvalues of the derivative of the map over the period). They are
+        exactly zero with a proven rest, and one at rest without energy loss, because neighbouring states never rest.
     symmetric, rests : bool
-        Whether it is its own mirror image half a period later; whether the body comes to rest in every period of it.
+        Whether the orbit equals its mirror image half a period later, and whether every period contains a rest.
+
+    See Also
+    --------
+    periodic_orbits : Find the periodic orbits of a body.
+    continue_orbit : Follow a periodic orbit as a parameter changes.
     """
 
     TABLES: ClassVar[tuple[str, ...]] = ("states", "impacts", "histories")
@@ -80,12 +84,12 @@ class PeriodicOrbit(Result):
 
     @property
     def is_stable(self) -> bool:
-        """Whether what is near it comes nearer: all multipliers are within the unit circle, by more than rounding."""
+        """Whether all multipliers are within the unit circle, by more than rounding error."""
         return bool(np.all(sizes_of(self.multipliers) < 1.0))
 
     @property
     def duration(self) -> float:
-        """Its period, s."""
+        """Period of the orbit, s."""
         return self.period * self._map.period
 
     @cached_property
@@ -95,7 +99,7 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def response(self) -> Response:
-        """One period of the orbit as a simulation, with its impacts, rests, and the state at any time."""
+        """Return the simulation of one period of the orbit, with its impacts and rests."""
         return response_of(self._map, self.state, self.period)
 
     @cached_property
@@ -116,7 +120,7 @@ class PeriodicOrbit(Result):
 
     @property
     def _multipliers(self) -> str:
-        """Multipliers as text, to three digits."""
+        """Format the multipliers with three digits."""
         signs = ("-" if each.imag < 0.0 else "+" for each in self.multipliers)
         return ", ".join(
             f"{each.real:.3g}" + (f" {sign} {abs(each.imag):.3g}i" if each.imag else "")
@@ -170,7 +174,7 @@ class PeriodicOrbit(Result):
         ]
 
     def _times(self) -> Floats:
-        """Return times of a figure: even, with the last before and the first after every impact."""
+        """Return evenly spaced times for a figure, with the last before and the first after every impact."""
         even = np.linspace(0.0, self.response.duration, 400 * self.period + 1)
         at = self.response.impacts["time"]
         found: Floats = np.unique(np.concatenate([even, at, np.nextafter(at, 0.0)]))
@@ -195,9 +199,9 @@ class PeriodicOrbit(Result):
 
 
 def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Response:
-    """Course of a body from a state on, over so many periods."""
+    """Simulate a body from a state over a number of periods."""
     motion, duration = strobe.motion, periods * strobe.period
-    # One period more: what comes after the end decides how long a chattering sequence lasts.
+    # The motion after the end determines how long a chattering sequence lasts.
     starts = strobe.period * np.arange(periods + 1)
     breakpoints = np.append((starts[:, None] + motion.breakpoints[:-1]).ravel(), strobe.period * (periods + 1))
     many = Motion(
@@ -209,17 +213,17 @@ def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Respons
 
 
 def peak_of(response: Response) -> float:
-    """Greatest size of the coordinate of a response, on 64 points of a period of the motion at least."""
+    """Compute the largest absolute coordinate of a response, from at least 64 points per period of the motion."""
     times = np.linspace(0.0, response.duration, 64 * max(1, len(response.impacts)) + 1)
     at = np.concatenate([times, response.impacts["time"]])
     return max(response.peak_rotation, float(np.max(np.abs(response.states(at)[:, 0]))))
 
 
 def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrbit:
-    """Periodic orbit of a state that comes back after so many periods."""
+    """Create the periodic orbit of a state that recurs after a number of periods."""
     _, change = strobe.derivative(state, period)
     symmetric = False
-    if period % 2 and strobe.bodies.is_symmetric:  # its own mirror image half a period later
+    if period % 2 and strobe.bodies.is_symmetric:  # mirror image of itself half a period later
         half = 0.5 * period * strobe.period
         states = response_of(strobe, state, period).states(half * np.linspace(0.0, 1.0, 9)[:-1, None] + [0.0, half])
         symmetric = bool(np.all(np.abs(states.sum(axis=1)[:, :2]) < 1e-9 * np.array(scale_of(strobe))))
@@ -230,29 +234,29 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
 
 
 def impacts_of(strobe: StroboscopicMap, state: Floats, period: int, change: Floats) -> float:
-    """Impacts in so many periods from a state of this derivative: infinity with complete chattering."""
+    """Count the impacts over a number of periods; infinity with complete chattering."""
     impacts = float(strobe.followed(state, period)[2])
     chatters = impacts > 0.0 and strobe.treatment.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
     return math.inf if chatters and not np.any(change) else impacts
 
 
 def multipliers_at(strobe: StroboscopicMap, change: Floats) -> NDArray[np.complex128]:
-    """Floquet multipliers of an orbit with this derivative of the map, the largest first.
+    """Compute the Floquet multipliers of an orbit from the derivative of the map, the largest first.
 
-    What is near the rest of a body whose impacts lose nothing bounces for ever, so that they are one there, not zero.
+    If impacts lose no energy, the multipliers at rest are one, because neighbouring states bounce for ever.
     """
     record = strobe._records[0]
     if strobe._loses_nothing and not np.any(change):
         return np.ones(2, dtype=np.complex128)
     if strobe._loses_nothing and not (record["variable_restitution"] or np.any(record["damping"])):
-        # By the rounding of many impacts the product of both would differ from 1, as if the orbit attracted.
+        # Otherwise rounding errors of many impacts suggest that the orbit attracts.
         change = change / np.sqrt(np.abs(np.linalg.det(change)))
     found = np.linalg.eigvals(change).astype(np.complex128)
     return found[np.lexsort((-found.imag, -np.abs(found)))] + 0.0
 
 
 def sizes_of(multipliers: NDArray[np.complex128]) -> Floats:
-    """Sizes of multipliers, pairs along the last axis: exactly 1 where they differ from that by rounding."""
+    """Compute absolute multipliers (pairs along the last axis), exactly 1 within rounding error."""
     sizes = np.abs(multipliers)
     is_pair = np.abs(np.prod(sizes, axis=-1, keepdims=True) - 1.0) < _NEUTRAL
     return np.where(np.abs(sizes - 1.0) < np.where(is_pair, _NEUTRAL_PAIR, _NEUTRAL), 1.0, sizes)
@@ -267,30 +271,35 @@ def periodic_orbits(
     chattering: str | Treatment = "certified",
     starts: ArrayLike | int | None = None,
 ) -> list[PeriodicOrbit]:
-    """Periodic orbits of a body under periodic motion, stable and unstable ones.
+    """Find stable and unstable periodic orbits of a body under periodic motion.
 
     Parameters
     ----------
     body, motion : Body, Motion
-        As for `stroboscopic_map`.
+        As in `stroboscopic_map`.
     period : int
-        Periods of the motion after which orbits repeat. Those of a shorter period that divides it are found as well.
+        Number of periods of the motion after which orbits repeat. Orbits of a shorter period that divides it are
+        included.
     model, chattering : str, optional
-        As for `stroboscopic_map`.
+        As in `stroboscopic_map`.
     starts : int or array_like, shape (..., 2), optional
-        Number of states from which orbits are looked for, or these states; by default about a thousand: impacts at all
-        phases and speeds, states between them, rests, and what becomes of some of these.
+        Number of initial states, or the states themselves. By default about a thousand: impacts at all phases and
+        speeds, states between impacts, rests, and later states of some of these.
 
     Returns
     -------
     list of PeriodicOrbit
-        Each once, those with the shortest period first, then those with the fewest impacts. There may be others, which
-        no start led to.
+        Distinct orbits by period, then by number of impacts. Orbits that no initial state leads to are missing.
+
+    See Also
+    --------
+    continue_orbit : Follow a periodic orbit as a parameter changes.
+    basins : Compute the basins of attraction.
 
     Notes
     -----
-    Newton's method solves P^n(x) = x for all starts at once, with the derivative of the stroboscopic map P. Where that
-    is exactly zero, after a proven rest, a step of it is the map itself.
+    Newton's method solves P^n(x) = x for all initial states at once, with the derivative of the stroboscopic map P.
+    After a proven rest this derivative is exactly zero, and the step is the map itself.
 
     References
     ----------
@@ -322,14 +331,14 @@ def periodic_orbits(
 
 
 class _Search:
-    """Looks for states that come back after some periods."""
+    """Search for states that recur after a number of periods."""
 
     def __init__(self, strobe: StroboscopicMap, count: int) -> None:
         self.strobe, self.count = strobe, count
         self.scale = scale_of(strobe)
 
     def starts(self, given: ArrayLike | int | None) -> Floats:
-        """States to start from: those given, or about as many as are wanted."""
+        """Return the given initial states, or about as many as requested."""
         if given is not None and np.ndim(given) > 0:
             return self.strobe.checked_starts(given, "starts")
         wanted = 1024 if given is None else checks.whole(given, "starts", InvalidOption, least=1)
@@ -353,7 +362,7 @@ class _Search:
         return np.concatenate([states, later[self._possible(later)]])
 
     def _fastest(self) -> float:
-        """Return a speed that impacts of an orbit of so many periods hardly exceed."""
+        """Return a speed that impacts of an orbit of this period hardly exceed."""
         strobe = self.strobe
         restitution = float(np.max(strobe.bodies.restitution))
         gain = restitution / max(1.0 - restitution, 1e-300)
@@ -362,13 +371,13 @@ class _Search:
         record = strobe._records[0]
         if not math.isinf(min(strobe.body.balance)):
             return min(speed, _BLOCK_SPEED * self.scale.velocity + push)
-        if float(record["stiffness"][0]) == 0.0:  # A ball flies for as long as its speed lets it.
+        if float(record["stiffness"][0]) == 0.0:  # The flight time of a ball is proportional to its speed.
             pull = float(record["threshold_slope"][0] * record["threshold"][0])
             return min(speed, 0.5 * self.count * strobe.period * pull + push)
         return speed
 
     def _possible(self, states: Floats) -> Flags:
-        """Which states a body may have."""
+        """Whether each state is admissible."""
         record, (low, high) = self.strobe._records[0], self.strobe.body.stops
         x, v = states.T
         fine: Flags = np.all(np.isfinite(states), axis=-1)
@@ -379,49 +388,49 @@ class _Search:
         return np.asarray(fine & (x >= low) & ~((x == low) & (v < 0.0)))
 
     def mapped(self, states: Floats, count: int) -> Floats:
-        """Rows of states, states after periods and derivatives, shape (n, 8); NaN for states that no body may have."""
+        """Return rows of states, mapped states and derivatives, shape (n, 8); NaN for inadmissible states."""
         rows, fine = np.full((len(states), 8), np.nan), self._possible(states)
         after, change = self.strobe.derivative(states[fine], count)
         rows[:, :2], rows[fine, 2:4], rows[fine, 4:] = states, after, change.reshape(-1, 4)
         return rows
 
     def residuals(self, rows: Floats) -> tuple[Floats, Flags]:
-        """How far states are from where they come to, over the scale, and whether that is only rounding."""
+        """Return scaled distances between states and mapped states, and whether they are only rounding errors."""
         size = self.size(rows[:, 2:4] - rows[:, :2])
         allowed = 1e-11 * np.maximum(1.0, np.max(np.abs(rows[:, 4:]), axis=1))
-        # What comes back no nearer is called no orbit, however large the derivative.
+        # Larger residuals are not accepted as orbits, however large the derivative.
         return size, size < np.minimum(allowed, 1e-6)
 
     def converged(self, states: Floats, count: int) -> Floats:
-        """States that come back after so many periods, to which Newton's method leads from others."""
+        """Return the recurrent states to which Newton's method converges."""
         rows, done = self.mapped(states, count), np.zeros(len(states), dtype=bool)
         for _ in range(40):
             residual, sharp = self.residuals(rows)
             open_ = np.flatnonzero(~(done & sharp) & np.isfinite(residual))
             if not len(open_):
                 break
-            done |= sharp  # One more step after the first that is sharp.
+            done |= sharp  # One more step after the first that is accurate to rounding.
             new, step, better = rows[open_], _newton_step(rows[open_]), np.zeros(len(open_), dtype=bool)
-            # A step that does not bring a state nearer is halved.
+            # A step that does not reduce the residual is halved.
             for halving in range(5):
                 left = np.flatnonzero(~better)
                 tried = self.mapped(rows[open_[left], :2] + 0.5**halving * step[left], count)
-                # A step that is sharp already need not come nearer: it only rounds in another way.
+                # A step that is already accurate to rounding need not reduce the residual.
                 better[left] = near = self.residuals(tried)[0] < residual[open_[left]]
                 new[left[near]] = tried[near]
             stuck = ~better & ~sharp[open_]
-            if np.any(stuck):  # The map itself leads to what attracts.
+            if np.any(stuck):  # The map itself leads to an attractor.
                 new[stuck] = self.mapped(new[stuck, 2:4], count)
             rows[open_] = new
         return rows[self.residuals(rows)[1], :2]
 
     def size(self, differences: Floats) -> Floats:
-        """Sizes of differences between states, over the scale."""
+        """Compute the scaled sizes of differences between states."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(np.max(np.abs(differences) / self.scale, axis=-1))
 
     def orbit(self, state: Floats) -> PeriodicOrbit:
-        """Orbit of a state, with its least period."""
+        """Create the orbit of a state, with its least period."""
         for count in range(1, self.count):
             if self.count % count == 0:
                 after = self.strobe(state, count)
@@ -433,7 +442,7 @@ class _Search:
 
 
 def _newton_step(rows: Floats) -> Floats:
-    """Newton's steps towards fixed points; where that is none, a step of the map."""
+    """Compute Newton steps towards fixed points, or steps of the map where Newton's step does not exist."""
     jacobian, residual = rows[:, 4:].reshape(-1, 2, 2) - np.eye(2), rows[:, 2:4] - rows[:, :2]
     with np.errstate(all="ignore"):
         (a, b), (c, d) = jacobian.transpose(1, 2, 0)

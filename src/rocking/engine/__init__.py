@@ -1,1 +1,1 @@
-"""Arrays for kernels, treatments of chattering, and many simulations as tasks in threads."""
+"""Arrays for kernels, treatments of chattering, and parallel simulations."""

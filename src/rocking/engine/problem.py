@@ -1,4 +1,4 @@
-"""Bodies, a motion and the settings of a simulation, as the records and arrays that kernels take."""
+"""Conversion of bodies, a motion and the settings of a simulation to the records and arrays that kernels accept."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ from rocking.kernels.ground import Ground
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 
-#: Fastest initial velocity, rad/s or m/s: beyond all sense, and squares and fourth powers of it are far from overflow.
+#: Largest initial velocity, rad/s or m/s, with squares and fourth powers far from overflow.
 FASTEST = 1e6
 
-#: What is needed where any body will do.
+#: Requirement for an argument that may be any body.
 _NEEDED = "a Block or another body"
 
 
 @functools.lru_cache(maxsize=8)
 def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Ground:
-    """Ground of a motion times a factor, a negative one for the horizontal component alone; without a motion no piece.
+    """Create the ground of a motion multiplied by a factor, without pieces if there is no motion.
 
-    The last few are kept: laying out a record takes as long as a block's march through it.
+    A negative factor applies to the horizontal component only. The last few results are cached, because their creation
+    takes as long as the simulation of a block.
     """
     if motion is None:
         return ground.ground_of(_NO_BREAKPOINTS, _NO_COEFFICIENTS, 1.0, 0.0)
@@ -47,7 +48,7 @@ def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Gro
 
 
 def step_of(motion: Motion) -> float | None:
-    """Length of the pieces of `ground_of` if they are equally long and straight lines in all components, else None."""
+    """Return the length of the pieces of `ground_of` if equally long and linear in all components, else None."""
     if motion.vertical is None:
         return motion.step
     steps = [piecewise.even_step(pieces) for pieces in _joined(motion)]
@@ -55,7 +56,7 @@ def step_of(motion: Motion) -> float | None:
 
 
 def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
-    """Return bodies as they are, and single ones of one kind as `Bodies` of that kind."""
+    """Return bodies unchanged, and convert single ones of one kind to `Bodies` of that kind."""
     if isinstance(given, Bodies) and not isinstance(given, type):
         return given
     several = isinstance(given, Iterable) and not isinstance(given, (str, Body))
@@ -66,7 +67,7 @@ def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
 
 
 def slenderness_of(bodies: Bodies) -> Floats:
-    """Slenderness of each body as it stands, rad, the smaller one of two sides: in these, rotations are counted."""
+    """Return the slenderness of each body as it stands, rad, the smaller of two sides, which normalises rotations."""
     found = bodies.parameters().get("alpha")
     if found is None:
         raise InvalidOption(f"this is known of blocks alone, which have a slenderness, not of {bodies.kind}")
@@ -74,15 +75,15 @@ def slenderness_of(bodies: Bodies) -> Floats:
 
 
 def thresholds_of(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
-    """Ground accelerations that lift each body to each side, and what its own weight makes of them, m/s^2, (n, 2)."""
+    """Return uplift accelerations of each body and side, and the parts due to its own weight, m/s^2, shape (n, 2)."""
     made = bodies.kernel_records(model, np.zeros((len(bodies), 2)))
     own = bodies.gravity * made["threshold"]
     return own + bodies.gravity * made["restraint_threshold"], own
 
 
 def one_body(body: Body) -> Body:
-    """Return the body, or say that it is none."""
-    if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # a protocol is slow to ask
+    """Return the body, or raise an error if the argument is not a body."""
+    if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # protocols are slow
         return body
     return one_block(body, _NEEDED)
 
@@ -95,15 +96,15 @@ def set_start(
     rate: float | Floats,
     name: str | None = None,
 ) -> None:
-    """Set the states of bodies at time zero, which are at rest, to coordinates and their rates.
+    """Set the states of bodies at rest at time zero to coordinates and their rates.
 
-    There is one body for each state, or one for all. Without a coordinate it is zero, or the stop where zero is behind
-    it. ``name`` is what a caller calls the coordinate, by default as "initial_rotation".
+    There is one body per state, or one for all. By default the coordinate is zero, or the stop if zero is behind it.
+    ``name`` is the coordinate in errors, by default as in "initial_rotation".
 
     Raises
     ------
     InvalidOption
-        If a body cannot be there, or a number is not finite or beyond all sense.
+        If a state is inadmissible, or a number is not finite or absurdly large.
     """
     stops = bodies.stops
     still = not isinstance(rate, np.ndarray) and rate == 0.0 and (coordinate is None or coordinate == 0.0)
@@ -112,7 +113,7 @@ def set_start(
     facing, one_sided = records["two_stops"], records["next_side"][:, 0] == 0
     if coordinate is None:
         coordinate = np.clip(0.0, stops[:, 0], np.where(facing, stops[:, 1], np.inf))
-    if not isinstance(rate, np.ndarray):  # arrays have been checked; in them a body may have fallen
+    if not isinstance(rate, np.ndarray):  # arrays are already checked, and a body in them may have overturned
         _check_start(coordinate, rate, records, bodies, name)
     at, speed = np.asarray(coordinate, dtype=float), np.asarray(rate, dtype=float)
     from_plus = at - stops[:, 0]
@@ -140,7 +141,7 @@ def set_start(
 
 
 def highest(states: state.Records, records: state.Records, stops: Floats) -> Floats:
-    """Peaks of coordinates, from those in the frame of side +: at a second stop exactly its own."""
+    """Return peaks of coordinates from the peaks in the frame of side +, exactly the stop at a second stop."""
     peaks: Floats = states["peak"] + stops[..., 0]
     if not records["two_stops"].any():
         return peaks
@@ -150,7 +151,7 @@ def highest(states: state.Records, records: state.Records, stops: Floats) -> Flo
 def _check_start(
     coordinate: float | Floats, rate: float, records: state.Records, bodies: Bodies, name: str | None
 ) -> None:
-    """Check the coordinate and the rate of one body, or of all; numbers of Python's own are the quickest to check."""
+    """Check the coordinate and the rate of one body or of all, fastest for Python numbers."""
     plain = type(coordinate) is float and type(rate) is float and math.isfinite(coordinate) and abs(rate) <= FASTEST
     fallen = np.where(records["two_stops"], np.inf, records["overturn_angle"]).min()
     if plain and abs(coordinate) < fallen:
@@ -172,7 +173,7 @@ def _check_start(
 
 
 def never_rests(bodies: Bodies) -> bool:
-    """Say whether one of the bodies loses no speed at all from one impact to the next but one."""
+    """Whether two successive impacts of one of the bodies lose no speed at all."""
     e = bodies.restitution
     return bool(np.count_nonzero(e[:, 0] * e[:, 1] == 1.0))
 
@@ -180,7 +181,7 @@ def never_rests(bodies: Bodies) -> bool:
 def settings_of(
     bodies: Bodies, model: Model, treatment: Treatment, duration: float | None, *, record: bool
 ) -> state.Record:
-    """Return the settings of a simulation, checked; its end must be given where nothing comes to rest."""
+    """Check and return the settings of a simulation; a duration is required if nothing comes to rest."""
     checks.one_of(model, "model", InvalidOption, MODELS)
     if duration is None:
         if never_rests(bodies):
@@ -196,7 +197,7 @@ def settings_of(
 
 @functools.lru_cache(maxsize=8)
 def _joined(motion: Motion) -> tuple[piecewise.Pieces, piecewise.Pieces]:
-    """Both components of a motion on the same pieces."""
+    """Return both components of a motion on the same pieces."""
     assert motion.vertical is not None
     breakpoints, (pushes, lifts) = piecewise.together(motion, motion.vertical)
     return piecewise.Pieces(breakpoints, pushes), piecewise.Pieces(breakpoints, lifts)

@@ -1,4 +1,4 @@
-"""The one engine for many simulations: any tasks of bodies under a scaled motion, in threads."""
+"""Engine for many simulations: tasks of bodies under a scaled motion, in threads."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
 
-#: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
-#: it while the body moved or the motion went on. All else is then as far as it came. ``leans``: restraints hold it
-#: leaning for ever. ``residual_rotation``: where it stays, NaN where that is not known. ``complete_chattering``: it
-#: rested after its first uplift before the motion passed a threshold again. ``stalled`` counts the rests that were not
-#: proven. Times of what never happened are 0.
+#: Fields of an outcome. ``unfinished``: the step budget was exceeded. ``stopped``: the duration ended while the body
+#: moved or the motion continued. In both cases all other fields are incomplete. ``leans``: restraints hold the body in
+#: a leaning position for ever. ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
+#: rested after its first uplift before the motion exceeded a threshold again. ``stalled``: number of unproven rests.
+#: Times of events that did not occur are 0.
 OUTCOME = np.dtype(
     [
         ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("peak_rotation", "f8"),
@@ -42,32 +42,32 @@ OUTCOME = np.dtype(
     ]
 )  # fmt: skip
 
-#: Steps that a simulation may take, besides a few for every piece of its motion.
+#: Step budget of a simulation, besides a few steps for every piece of its motion.
 BUDGET: Final = 3_000_000
 _BUDGET_OF_A_PIECE: Final = 4
 
-#: Steps of one call of a kernel, for one body and for each of many: some milliseconds until an interrupt is seen.
+#: Steps per call of a kernel, for one body and for each of many: milliseconds until an interrupt.
 SLICE: Final = 50_000
 _FIRST_SLICE: Final = 5_000
 
-#: Bodies that go through a motion together: as many as the fastest cache holds, and fewer where the motion is so long
-#: that one call of a kernel would take more than half a second for all of its pieces.
+#: Number of bodies simulated together: the capacity of the fastest cache, or fewer for a long motion, so that one call
+#: of a kernel takes at most half a second.
 _TOGETHER: Final = 16 * WIDTH
 _PIECES: Final = 20_000_000
 
-#: Steps of all bodies of one task: enough to pay for the call, few enough to stop soon when interrupted.
+#: Steps of all bodies in one task: enough to amortise the call, few enough to stop soon after an interrupt.
 _TASK: Final = 8_000_000
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What all simulations share: n bodies, and how to compute, as for `rocking.simulate`."""
+    """Common properties of all simulations: n bodies, and the options of `rocking.simulate`."""
 
     bodies: Bodies
     model: Model
     treatment: Treatment
     duration: float | None = None
-    #: Coordinate of all bodies at time 0, and its rate; None is zero, or the stop where zero is behind it.
+    #: Coordinate of all bodies at time 0 and its rate; None means zero, or the stop if zero is behind the stop.
     start: tuple[float | None, float] = (None, 0.0)
 
     def run(
@@ -79,7 +79,7 @@ class Setup:
         ground: Ground | None = None,
         name: str | None = None,
     ) -> Run:
-        """Return all that kernels need for the bodies under a motion times a factor; all arguments are checked."""
+        """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments."""
         bodies = self.bodies
         check_components(bodies, motion)
         settings = settings_of(bodies, self.model, self.treatment, self.duration, record=record)
@@ -92,7 +92,7 @@ class Setup:
 
 
 class Run(NamedTuple):
-    """Bodies under a motion as kernels take them: the ground, a record and a state of each body, and the settings."""
+    """Bodies under a motion, as kernels accept them: the ground, a record and a state per body, and the settings."""
 
     ground: Ground
     records: Records
@@ -102,21 +102,21 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Some of the bodies under one motion times a factor."""
+    """Some of the bodies under one scaled motion."""
 
     bodies: slice | Integers
     motion: Motion
     factor: float = 1.0
-    key: tuple[int, ...] = ()  # where the outcomes belong, for the caller
+    key: tuple[int, ...] = ()  # index of the outcomes for the caller
 
 
 def simulate_tasks(
     setup: Setup, tasks: Iterable[Task], *, threads: int | None = None
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Outcomes of every task, in their order: structured arrays (`OUTCOME`), one row a body.
+    """Simulate tasks, and yield their outcomes in order: structured arrays (`OUTCOME`), one row per body.
 
-    Tasks are taken as they are needed, some ahead of the results. What becomes of a body depends on the body and its
-    motion alone, bit for bit, whatever shares its task. An interrupt leaves the rest undone.
+    Tasks are consumed as needed, slightly ahead of the results. The outcome of a body depends only on the body and its
+    motion, bit for bit, not on its task. An interrupt cancels the remaining tasks.
     """
     cancelled = threading.Event()
 
@@ -127,7 +127,7 @@ def simulate_tasks(
 
 
 def parts_of(count: int, motion: Motion) -> Iterator[slice]:
-    """Ranges of ``count`` bodies, each as large as a task should be."""
+    """Divide ``count`` bodies into ranges of the size of a task."""
     size = _TOGETHER * max(1, _TASK // (_TOGETHER * len(motion.coefficients)))
     yield from ranges(count, size)
 
@@ -135,7 +135,7 @@ def parts_of(count: int, motion: Motion) -> Iterator[slice]:
 def simulate_each(
     setup: Setup, motion: Motion, factors: Floats, *, threads: int | None = None
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Outcomes for body k under the motion times factor k; those that share a factor are simulated together."""
+    """Yield outcomes of body k under the motion times factor k; bodies with equal factors are simulated together."""
     order = np.argsort(factors, kind="stable")
     starts = np.flatnonzero(np.diff(factors[order], prepend=np.nan) != 0.0)
     groups = np.split(order, starts[1:])
@@ -146,7 +146,7 @@ def simulate_each(
 
 
 def require_finished(unfinished: bool) -> None:
-    """Check that a simulation without which there is no answer was not given up."""
+    """Raise an error if a required simulation was abandoned."""
     if unfinished:
         raise Unfinished(
             f"a simulation was given up after more than {BUDGET:,} steps, so that its outcome is not known; "
@@ -155,13 +155,13 @@ def require_finished(unfinished: bool) -> None:
 
 
 def missing_text(missing: Flags | int) -> str:
-    """Sentence on the simulations that were given up, whose outcomes are missing; empty where there are none."""
+    """Return a sentence on the abandoned simulations, whose outcomes are missing; empty if there are none."""
     count = int(np.sum(missing))
     return f"{counted(count, 'simulation')} given up after too many steps: outcomes missing" * (count > 0)
 
 
 def check_components(bodies: Bodies, motion: Motion | None) -> None:
-    """Check that a motion has no vertical component where bodies move along a line and not over the ground."""
+    """Raise an error if a motion has a vertical component although the bodies move along a line."""
     if motion is not None and motion.vertical is not None and bodies[0].coordinate.unit != ROTATION.unit:
         raise InvalidMotion(
             f"this {bodies[0].description} moves along one line; give a motion without a vertical component"
@@ -169,7 +169,7 @@ def check_components(bodies: Bodies, motion: Motion | None) -> None:
 
 
 def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = None) -> NDArray[np.void]:
-    """Outcomes of one task; where it is ``cancelled`` on the way, of no use."""
+    """Compute the outcomes of one task; they are invalid if it is ``cancelled`` on the way."""
     bodies = setup.bodies.select(task.bodies)
     ground, records, settings, states = replace(setup, bodies=bodies).run(task.motion, task.factor)
     states["budget"] = _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces)
@@ -189,7 +189,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
 
 
 def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> Iterator[tuple[Integers, int]]:
-    """Bodies that go together, with the substeps that they need; -1 for those that march alone."""
+    """Yield bodies that are simulated together, with their number of substeps; -1 for bodies simulated alone."""
     substeps, step = np.full(len(records), -1), step_of(motion)
     if step is not None:
         width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * greatest_weight(ground))
@@ -205,7 +205,7 @@ def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> I
 
 
 def _substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
-    """Count the substeps of a sample in lanes, for each sqrt(|lam W|) h; 0 where one formula spans it."""
+    """Compute the substeps per sample in lanes, for each sqrt(|lam W|) h; 0 if one formula covers the sample."""
     if model == "nonlinear":
         return np.ceil(width / lanes.LONGEST_SUBSTEP)
     return np.ceil(width / lanes.LONGEST_WEIGHTED_SUBSTEP) if with_vertical else np.zeros(len(width))
@@ -219,7 +219,7 @@ def _march_together(
     step: float | None,
     substeps: int,
 ) -> None:
-    """Take some of the bodies through the motion in lanes, or one after the other where they cannot."""
+    """Simulate some of the bodies in lanes, or one after the other if lanes do not support them."""
     records, states = whole
     pieces = len(ground.pieces) - 1
     finer = max(substeps, 0) if settings["nonlinear"] else 0
@@ -234,7 +234,7 @@ def _march_together(
 def _march_on(
     ground: Ground, settings: Record, records: Records, states: Records, cancelled: threading.Event | None
 ) -> None:
-    """Take those on that have used up their first slice of steps, until their budget is spent."""
+    """Continue simulations that have used up their first slice of steps, up to their budget."""
     nothing, scratch = state.new_table(0), state.new_scratch()
     for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
         one = states[k]
@@ -251,12 +251,12 @@ def _march_on(
 
 
 def slices(ground: Ground) -> int:
-    """Count the slices in the budget of a simulation."""
+    """Return the number of slices in the budget of a simulation."""
     return math.ceil((BUDGET + _BUDGET_OF_A_PIECE * len(ground.pieces)) / SLICE)
 
 
 def complete_chattering(ground: Ground, records: Records, states: Records) -> Flags:
-    """Whether the chattering after the first uplift was complete, by the times of that uplift and the first rest."""
+    """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
     note_complete(ground, records, states, state.new_scratch(), complete)
     return complete
@@ -268,7 +268,7 @@ def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     outcomes["leans"] = states["ending"] == state.Ending.LEANS
     early = (states["side"] >= 0) | (states["end"] < motion_end)
-    # A body that balances for ever has no verdict either.
+    # A body that balances for ever has no outcome either.
     undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))
     outcomes["stopped"] = undecided & early
     for name, field in (

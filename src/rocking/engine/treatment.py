@@ -1,4 +1,4 @@
-"""How a sequence of impacts is brought to rest: by proof, or by one of the thresholds in use."""
+"""Treatments of chattering: rest by proof, or by one of the common thresholds."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from rocking.motion.motion import Motion
 
 Critical = Literal["eq76", "eq77", "exact"]
 
-#: Frequencies and restitutions to which the paper fitted Eqs 76 and 77.
+#: Ranges of frequency and restitution in which the paper fitted Eqs 76 and 77.
 FITTED_FREQUENCIES: Final = (0.5, 8.0)
 FITTED_RESTITUTIONS: Final = (0.5, 0.97)
 
-#: Critical amplitudes that one call of a kernel computes, in a third of a second.
+#: Number of critical amplitudes per call of a kernel, which takes about a third of a second.
 _CRITICAL_TOGETHER: Final = 512
 
 _BY_NAME: dict[str, type[Treatment]] = {}
@@ -33,16 +33,23 @@ _BY_NAME: dict[str, type[Treatment]] = {}
 
 @dataclass(frozen=True)
 class Treatment(ABC):
-    """How a sequence of impacts ends. A class of its own is found by its `name` as soon as it is imported.
+    """Treatment of chattering: the rule by which a sequence of impacts ends.
 
-    What is compared with its limits at an impact is one of the measures that kernels know (`rocking.kernels.state`).
+    A user-defined subclass is available by its `name` as soon as it is imported. At an impact, one of the measures of
+    the kernels (`rocking.kernels.state`) is compared with its limits.
+
+    See Also
+    --------
+    Certified : Rest proven by a certificate (default).
+    VelocityThreshold : Rest below a threshold of speed.
+    IntervalThreshold : Rest below a threshold of the interval between impacts.
     """
 
     #: Name in ``chattering=`` and on the command line.
     name: ClassVar[str]
-    #: What the kernels compare with the limits, a code of `rocking.kernels.state`.
+    #: Measure that the kernels compare with the limits, a code of `rocking.kernels.state`.
     code: ClassVar[int]
-    #: Unit of its parameter in tables; "speed" is the body's own unit of speed, and "" is of a word.
+    #: Unit of its parameter in tables: "speed" is the unit of the body, "" stands for a word.
     unit: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
@@ -62,25 +69,25 @@ class Treatment(ABC):
 
     @property
     def bracket(self) -> float:
-        """Width, s, of the bracket on the time of rest that is asked for; 0 where nothing is proven."""
+        """Required width of the bracket of the time of rest, s; 0 without a proof."""
         return 0.0
 
     @abstractmethod
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Return the limits of both sides of every body, with which its impacts are compared, shape (n, 2).
+        """Return the limits for the impacts of both sides of every body, shape (n, 2).
 
-        The unit is that of the measure that `code` names. Without a motion the rocking is free; `factor` multiplies the
-        motion. `InvalidOption` if the treatment does not support such bodies or motions.
+        The unit is the unit of the measure `code`. Without a motion the rocking is free; `factor` multiplies the
+        motion. Raise `InvalidOption` if the treatment does not support such bodies or motions.
         """
 
     def __str__(self) -> str:
-        """Write the treatment so that `treatment` reads it back."""
+        """Format the treatment as text that `treatment` accepts."""
         values = [str(getattr(self, parameter.name)) for parameter in fields(self)]
         return "=".join([self.name, *values])
 
     @classmethod
     def from_text(cls, value: str) -> Treatment:
-        """Create the treatment from the text after "NAME="; `InvalidOption` if that is not a parameter of the class."""
+        """Create the treatment from the text after "NAME=", or raise `InvalidOption`."""
         if not fields(cls):
             raise InvalidOption(f"the chattering treatment {cls.name} takes no parameter, not {value!r}")
         try:
@@ -93,14 +100,14 @@ class Treatment(ABC):
 class AsymptoticTime(Treatment):
     """Rest once the asymptotic chattering time (paper, Eq. 65) has passed since uplift (paper, Fig. 8a).
 
-    For sinusoidal motions and symmetric blocks only. Above the critical amplitude the block never rests; where Eq. 65
-    exceeds the true time, it rests once time no longer advances between impacts, which a response counts as `stalled`.
+    Only sinusoidal motions and symmetric blocks are supported. Above the critical amplitude the block never rests. If
+    Eq. 65 exceeds the true time, the block rests once time no longer advances between impacts (counted as `stalled`).
 
     Parameters
     ----------
     critical : {"eq76", "eq77", "exact"}
-        Critical amplitude that the scheme trusts: the paper's fits, or the exact one. Between a fit and the exact one
-        the scheme rests falsely, or not at all.
+        Critical amplitude of the scheme: a fit of the paper, or exact. For amplitudes between the two the scheme rests
+        falsely, or not at all.
 
     Raises
     ------
@@ -110,12 +117,16 @@ class AsymptoticTime(Treatment):
     Warns
     -----
     OutsideFit
-        Where a fit is asked beyond the frequencies (0.5 to 8, over p) and restitutions (0.5 to 0.97) it was made for.
+        If a fit is used outside its range of frequencies (0.5 to 8, divided by p) and restitutions (0.5 to 0.97).
+
+    See Also
+    --------
+    Certified : Rest proven by a certificate (default).
 
     Notes
     -----
-    Amplitudes count in the acceleration that lifts the block: g alpha in the linear model, as in the paper, and
-    g tan(alpha) in the nonlinear one.
+    Amplitudes are normalised by the uplift acceleration: g alpha in the linear model, as in the paper, and g tan(alpha)
+    in the nonlinear model.
     """
 
     name: ClassVar[str] = "time"
@@ -134,11 +145,11 @@ class AsymptoticTime(Treatment):
 
     @classmethod
     def from_text(cls, value: str) -> Treatment:
-        """Make the treatment from the name of a critical amplitude."""
+        """Create the treatment from the name of a critical amplitude."""
         return cls(value)  # type: ignore[arg-type]
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Chattering time of every side, s; infinite where chattering is not complete."""
+        """Return the chattering time of every side, s; infinite for incomplete chattering."""
         from rocking.kernels.sine.series import eq65_sums
 
         is_sine = motion is not None and motion.description.family == "sine" and motion.vertical is None
@@ -164,12 +175,16 @@ class AsymptoticTime(Treatment):
 
 @dataclass(frozen=True)
 class Certified(Treatment):
-    """Rest where, and only where, the certificate proves complete chattering; the default.
+    """Rest if and only if the certificate proves complete chattering (default).
 
     Parameters
     ----------
     tolerance : float
-        Impacts are resolved until the bracket on the time of rest is narrower than this, s.
+        Width of the bracket of the time of rest, s, below which no further impacts are resolved.
+
+    See Also
+    --------
+    VelocityThreshold : Rest below a threshold of speed.
 
     Examples
     --------
@@ -189,18 +204,23 @@ class Certified(Treatment):
         return self.tolerance
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Nothing to compare with: zeros."""
+        """Return zeros, because there is no limit."""
         return np.zeros((len(bodies), 2))
 
 
 @dataclass(frozen=True)
 class VelocityThreshold(Treatment):
-    """Rest as soon as an impact leaves less than a threshold of angular speed (paper, Fig. 8b).
+    """Rest as soon as the angular speed after an impact is below a threshold (paper, Fig. 8b).
 
     Parameters
     ----------
     threshold : float
-        VelTol/(p alpha), the threshold over the side's p and alpha, dimensionless.
+        VelTol/(p alpha), the threshold divided by p and alpha of the side, dimensionless.
+
+    See Also
+    --------
+    GeometricBypass : Rest at the end of the remaining geometric sequence.
+    Certified : Rest proven by a certificate (default).
     """
 
     name: ClassVar[str] = "velocity"
@@ -210,22 +230,26 @@ class VelocityThreshold(Treatment):
     threshold: float = 5e-10
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Threshold of every side, of a block in rad/s."""
+        """Return the threshold of every side, in rad/s for a block."""
         return bodies.speed_limits(self.threshold)
 
 
 @dataclass(frozen=True)
 class GeometricBypass(VelocityThreshold):
-    """Rest when the impacts would be over that an impact of less than a threshold of speed leaves.
+    """Rest at the estimated end of the impacts that follow one with a speed below a threshold.
 
-    The accelerations on both sides are taken to stay what they are at that impact. The rest of the sequence is then
-    geometric, and lasts 2 v (1/g + e/g')/(1 - e e') on sides with the restitutions e and e' and the accelerations g and
-    g' towards the ground. Where one of these is not positive, arcs are resolved on.
+    The accelerations are assumed to remain constant after that impact. The sequence is then geometric, and lasts 2 v
+    (1/g + e/g')/(1 - e e') on sides with restitutions e and e' and accelerations g and g' towards the ground. If an
+    acceleration is not positive, arcs continue to be resolved.
 
     Parameters
     ----------
     threshold : float
-        As for `VelocityThreshold`, over the side's p and alpha.
+        Threshold divided by p and alpha of the side, as in `VelocityThreshold`.
+
+    See Also
+    --------
+    VelocityThreshold : Rest as soon as the speed is below the threshold.
 
     Notes
     -----
@@ -241,12 +265,16 @@ class GeometricBypass(VelocityThreshold):
 
 @dataclass(frozen=True)
 class IntervalThreshold(Treatment):
-    """Rest as soon as two impacts follow each other within a threshold of time.
+    """Rest as soon as the interval between two impacts is below a threshold.
 
     Parameters
     ----------
     threshold : float
-        Shortest interval between impacts that is resolved, s.
+        Shortest resolved interval between impacts, s.
+
+    See Also
+    --------
+    Certified : Rest proven by a certificate (default).
     """
 
     name: ClassVar[str] = "interval"
@@ -256,12 +284,12 @@ class IntervalThreshold(Treatment):
     threshold: float = 1e-9
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Threshold of every side, s."""
+        """Return the threshold of every side, s."""
         return np.full((len(bodies), 2), self.threshold)
 
 
 def treatment(chattering: str | Treatment) -> Treatment:
-    """Treatment of a name, or of a name and its parameter, or the treatment itself.
+    """Return the treatment with a name, or with a name and a parameter, or the given treatment itself.
 
     Examples
     --------
@@ -285,7 +313,7 @@ def treatment(chattering: str | Treatment) -> Treatment:
         raise InvalidOption(sentence, "chattering", *error.message.arguments) from None
 
 
-#: The paper's fits of the critical amplitude: row i, column j has the coefficient of eta^i omega^j.
+#: Fits of the paper for the critical amplitude: coefficient of eta^i omega^j in row i, column j.
 _EQ76: Final = np.array([
     [1.079, 0.1405, -0.02818, 0.00176],
     [-0.1885, -0.1903, 0.03236, -0.00185],
@@ -297,7 +325,7 @@ _EQ77: Final = np.array([[1.271], [-0.45], [0.5763], [-0.3941]])
 
 
 def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
-    """Critical amplitudes over g alpha, flat: "exact", or by the paper's fits "eq76" and "eq77"."""
+    """Compute critical amplitudes, divided by g alpha, flat: "exact", or by the fits "eq76" and "eq77" of the paper."""
     from rocking.kernels.sine.sequence import critical_amplitudes
 
     if method != "exact":

@@ -1,1 +1,1 @@
-"""Inputs, each declared once: options, keys of study files, fields of the page and Python text are made from them."""
+"""Inputs, each declared once, as the source of options, keys of study files, fields of the page and Python code."""

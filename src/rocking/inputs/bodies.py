@@ -1,4 +1,4 @@
-"""A block, and what holds it back, from the values of its inputs."""
+"""Creation of a block and its restraints from the values of inputs."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from rocking.inputs.declared import BLOCK, INPUTS, READERS, SHAPES, Shape
 from rocking.inputs.notes import block_notes, restraint_notes
 from rocking.inputs.quantities import Quantity
 
-#: Bodies that are searched for likely mistakes.
+#: Number of bodies that are checked for likely mistakes.
 _NOTED: Final = 100
 
 
-#: What goes with a slenderness that is all that is known of a block.
+#: Hint if a slenderness is the only input of a block.
 _FREQUENCY_PARAMETER: Final = (
     "p is sqrt(3 g/(4 R)) of a rectangular block, with the distance R from its edge to its centre of mass; the mass "
     "alone does not matter"
@@ -29,7 +29,7 @@ _FREQUENCY_PARAMETER: Final = (
 
 
 def shape_of(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
-    """Return the description that names of inputs are of; an InvalidBlock if they are incomplete or of several."""
+    """Return the description that contains the named inputs, or raise `InvalidBlock` if there is not exactly one."""
     given = [name for name in BLOCK if name in {*names} and name != "restitution"]
     for shape in shapes:
         if {*shape.needed} <= {*given} <= {*shape.needed, *shape.optional}:
@@ -49,7 +49,7 @@ def shape_of(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
 
 
 def block_of(values: Mapping[str, Any], shapes: Sequence[Shape] = SHAPES) -> Block:
-    """Make the block that values describe.
+    """Create the block that the values describe.
 
     Examples
     --------
@@ -61,12 +61,12 @@ def block_of(values: Mapping[str, Any], shapes: Sequence[Shape] = SHAPES) -> Blo
 
 
 def call_of(values: Mapping[str, Any]) -> str:
-    """Write the call that makes the block that values describe, as Python has it."""
+    """Return the Python call that creates the block."""
     return f"{shape_of(values).make.__qualname__}({texts.arguments(_arguments(values))})"
 
 
 def body_of(block: Block, values: Mapping[str, Any], restraints: Sequence[Restraint] = ()) -> Body:
-    """Return a block with its restraints, and as a wall or leaning where values say so; without any the block alone."""
+    """Return a block with its restraints, as a wall or leaning if the values require it; by default the block alone."""
     held = {name: values[name] for name in ("one_sided", "lean") if name in values}
     if not restraints and not held:
         return block
@@ -74,7 +74,7 @@ def body_of(block: Block, values: Mapping[str, Any], restraints: Sequence[Restra
 
 
 def note_likely_mistakes(blocks: Sequence[Block], bodies: Sequence[Body] = ()) -> None:
-    """Note what looks like a mistake in the first of some blocks, or in their restraints, each sentence once."""
+    """Issue a note on each likely mistake in the first of some blocks, or in their restraints, without repetition."""
     notes = [sentence for block in blocks[:_NOTED] for sentence in block_notes(block)]
     for body in bodies[:_NOTED]:
         notes += restraint_notes(body) if isinstance(body, RestrainedBlock) else ()
@@ -83,13 +83,13 @@ def note_likely_mistakes(blocks: Sequence[Block], bodies: Sequence[Body] = ()) -
 
 
 def quantity_of(parameter: str) -> Quantity:
-    """Return what reads a parameter of a restraint or of another body."""
+    """Return the reader of a parameter of a restraint or of another body."""
     kind = INPUTS[parameter].kind if parameter in INPUTS else "number"
     return READERS.get(kind, READERS["number"])[0]
 
 
 def check_parameters(kind: Callable[..., object], given: Iterable[str], of: str, *names: str) -> None:
-    """Check that names are parameters of what is made, and that none is missing; ``names`` are those in ``of``."""
+    """Check that names are parameters of a kind and that none is missing; ``names`` are the parameters in ``of``."""
     known = inspect.signature(kind).parameters
     for name in given:
         if name not in known:
@@ -101,12 +101,12 @@ def check_parameters(kind: Callable[..., object], given: Iterable[str], of: str,
 
 
 def all_of(names: Sequence[str]) -> str:
-    """Return places for all of some names in a sentence."""
+    """Return placeholders for all of some names in a sentence."""
     return " and ".join(["{}"] * len(names))
 
 
 def one_of(descriptions: Iterable[Sequence[str]]) -> str:
-    """Return places for the names of one of some descriptions in a sentence."""
+    """Return placeholders for the names of one of several descriptions in a sentence."""
     return ", or ".join(map(all_of, descriptions))
 
 

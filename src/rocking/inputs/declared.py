@@ -1,4 +1,4 @@
-"""Every input, declared once: its name, how its text is read, what the help says of it, and its field on the page."""
+"""Declarations of all inputs: name, reader, help text, and field of the page."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rocking.inputs import quantities
 from rocking.inputs.notes import level_notes
 from rocking.records.units import plain_spelling
 
-#: What reads a number of each kind, and its SI unit.
+#: Reader of a number of each kind, and its SI unit.
 READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
     "number": (quantities.number, ""),
     "length": (quantities.length, "m"),
@@ -29,7 +29,7 @@ READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
 
 
 def noted_acceleration(text: str, name: str) -> float:
-    """Return an acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
+    """Return an acceleration, m/s^2, with a note if a number without a unit is probably in g."""
     value = quantities.acceleration(text, name)
     for sentence in level_notes(text, value, name):
         note(sentence)
@@ -38,28 +38,28 @@ def noted_acceleration(text: str, name: str) -> float:
 
 @dataclass(frozen=True)
 class Input:
-    """An input: an option of the command line, a key of study files, and a field of the page.
+    """Input: an option of the command line, a key of study files, and a field of the page.
 
     Attributes
     ----------
     name : str
-        Name of the option (with hyphens), of the key, and in the page's address.
+        Name of the option (with hyphens), of the key, and in the address of the page.
     group : str
-        Form of the page that sets it, which comparisons replace as a whole; empty where the page has no field.
+        Form of the page that contains the input, which comparisons replace as a whole; empty without a field.
     kind : str
-        How its text is read: a key of `READERS`, "acceleration at a period", "text", "flag" (yes or no), or "texts"
+        Type of the text: a key of `READERS`, "acceleration at a period", "text", "flag" (yes or no), or "texts"
         (several).
     help : str
         Help of its option.
     unit, default, low, high, logarithmic, step : str, str, float, float, bool, float
-        Field of the page: the unit that is shown, the text it starts with, ends of its slider, in that unit; whether
-        equal distances are equal ratios; steps of the slider where they are no thousandth of its way.
+        Field of the page: displayed unit, initial text, limits of the slider in that unit, whether the slider is
+        logarithmic, and its step if not a thousandth of its range.
     values : str
-        Whether the sides of a block may differ in it.
+        Whether the value may differ between the sides of a block.
     text : str
-        The page calls it ``field.TEXT`` and describes it as ``about.TEXT``; by default the name.
+        Suffix of the texts ``field.TEXT`` and ``about.TEXT`` of the page; by default the name.
     argument : str
-        Name of the argument in Python, where it is another.
+        Name of the Python argument, if different.
     """
 
     name: str
@@ -96,11 +96,11 @@ class Input:
         return tuple(found) if isinstance(found, list) else found
 
     def one(self, text: str) -> float:
-        """Return a number that belongs to one side, or to both."""
+        """Return a number for one side, or for both."""
         return READERS[self.kind][0](text, self.name)
 
     def axis(self, value: Any) -> list[Any]:
-        """Return the values that a study file gives: of a number one, a list, or a range; of pivots pairs."""
+        """Return the values of an entry of a study file: a number, a list, or a range (for pivots, of pairs)."""
         if self.kind not in READERS:
             return [value]
         reader = READERS[self.kind][0]
@@ -115,7 +115,7 @@ class Input:
         return [*found]
 
     def described(self) -> dict[str, Any]:
-        """Return what the page needs, in plain values."""
+        """Return the properties that the page requires, in plain values."""
         names = ("name", "group", "unit", "default", "low", "high", "logarithmic", "values", "step")
         plain = {name: getattr(self, name) for name in names}
         kind = "angle" if self.kind == "tilt" else self.kind
@@ -123,11 +123,11 @@ class Input:
 
     @property
     def suffix(self) -> str:
-        """Unit behind a number in the unit that is shown; an azimuth is in degrees without it."""
+        """Unit written after a number in the displayed unit; empty for an azimuth, always in degrees."""
         return "" if self.kind == "number" else {"°": "deg", "g": "g"}.get(self.unit, "")
 
     def _units(self) -> dict[str, float]:
-        """Return the size of each unit in the unit that is shown, by plain spellings as in `quantities.UNITS`."""
+        """Return the sizes of units relative to the displayed unit, by their plain spellings in `quantities.UNITS`."""
         kind = {"acceleration at a period": "acceleration", "tilt": "angle"}.get(self.kind, self.kind)
         if kind not in quantities.UNITS:
             return {}
@@ -141,7 +141,7 @@ def by_name(*inputs: Input) -> dict[str, Input]:
     return {each.name: each for each in inputs}
 
 
-#: All inputs of a single simulation, in the order of the page's address.
+#: All inputs of a single simulation, in the order of the address of the page.
 INPUTS: Final = by_name(
     Input("half_width", "", "position", "Half the width of a rectangular block, 0.12 (m) or 12cm."),
     Input("half_height", "", "position", "Half its height, m."),
@@ -217,12 +217,12 @@ INPUTS: Final = by_name(
         "rad/s", "0", -2.0, 2.0),
 )  # fmt: skip
 
-#: Inputs that scale a motion, of which there is one at most.
+#: Inputs that scale a motion, mutually exclusive.
 SCALINGS: Final = ("pga", "pgv", "sa", "scale")
 
 
 class Shape(NamedTuple):
-    """A way to describe a block: the inputs that it needs and accepts, and the function of `rocking` that makes one."""
+    """Description of a block: required and optional inputs, and the function of `rocking` that creates the block."""
 
     name: str
     needed: tuple[str, ...]
@@ -230,7 +230,7 @@ class Shape(NamedTuple):
     make: Callable[..., Block]
 
 
-#: A restitution goes with each of them.
+#: Each also accepts a restitution.
 SHAPES: Final = (
     Shape("sizes", ("width", "height"), ("offset", "mass"), Block),
     Shape("half sizes", ("half_width", "half_height"), ("offset", "mass"), Block),
@@ -238,10 +238,9 @@ SHAPES: Final = (
     Shape("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
 )
 
-#: Inputs that describe a block.
 BLOCK: Final = (*dict.fromkeys(n for shape in SHAPES for n in (*shape.needed, *shape.optional)), "restitution")
 
-#: Restraints, by the names of their inputs: couples are numbers, the others have parameters.
+#: Restraints by the names of their inputs. Couples are numbers, the others have parameters.
 COUPLES: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}
 FORCES: Final[Mapping[str, Callable[..., Restraint]]] = {"tendon": Tendon, "thrust": Thrust, "load": Load}
 HELD: Final = ("one_sided", "lean", "tendon", "spring", "damper", "thrust", "load")

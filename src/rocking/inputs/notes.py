@@ -1,4 +1,4 @@
-"""What is possible but looks like a mistake: sentences for the one who gave the numbers. Nothing is refused."""
+"""Notes on input values that are possible but probably mistaken, which raise no error."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from rocking.motion.description import Origin, begins_later
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
-#: Peak accelerations of ground motions that were ever of interest, g.
+#: Range of plausible peak ground accelerations, g.
 _WEAKEST: Final = 1e-3
 _STRONGEST: Final = 5.0
 
-#: Peak velocities and sampling steps beyond those of any record, m/s and s.
+#: Peak velocity and sampling step that no record exceeds, m/s and s.
 _FASTEST: Final = 5.0
 _COARSEST: Final = 0.1
 
-#: Peak velocities between which a hazard curve has some, m/s.
+#: Range of peak velocities that every hazard curve partly covers, m/s.
 _SPEEDS: Final = (1e-3, _FASTEST)
 
-#: Times of a record are even but for this part of a step; more gaps than this part of the steps are none.
+#: Tolerance of evenly spaced times, in steps, and largest fraction of gaps among the steps.
 _UNEVEN: Final = 0.02
 _FEW_GAPS: Final = 0.05
 
-#: Levels without a unit that look as if they were in g; they are taken for m/s^2.
+#: Levels without a unit that are read as m/s^2 but are probably in g.
 _PERHAPS_IN_G: Final = 1.5
 _UNITLESS: Final = re.compile(r"[\d.+-]+(?:e[+-]?\d+)?", re.IGNORECASE)
 
 #: Largest plausible diagonal of a block, m.
 _LARGEST: Final = 30.0
-#: Least plausible height of what is scanned or modelled, m.
+#: Smallest plausible height of a scanned or modelled body, m.
 _LOWEST: Final = 0.02
 #: Densities of solids, from foam and cork to osmium, kg/m^3.
 _LIGHTEST: Final = 10.0
 _HEAVIEST: Final = 23_000.0
-#: Largest plausible moment of a restraint per radian, over weight times R.
+#: Largest plausible moment of a restraint per radian, divided by weight times R.
 _MOST_HELD: Final = 1e5
 
 _VERTICAL: Final = re.compile(r"(up|down|dn|dwn|ver|vert|vertical|u-?d|z|v|[a-z]{2}z)\b.*", re.IGNORECASE)
@@ -53,7 +53,7 @@ _HORIZONTAL: Final = re.compile(
 
 
 def motion_notes(motion: Motion) -> tuple[str, ...]:
-    """Return what looks like a mistake in a motion that shakes a block; empty if nothing does."""
+    """Return likely mistakes in a ground motion; empty if there are none."""
     notes = reading_notes(motion)
     direction = _origin(motion).channel
     if _VERTICAL.fullmatch(direction):
@@ -62,7 +62,7 @@ def motion_notes(motion: Motion) -> tuple[str, ...]:
 
 
 def vertical_notes(motion: Motion) -> tuple[str, ...]:
-    """Return what looks like a mistake in the vertical component of a motion; empty if nothing does, or it has none."""
+    """Return likely mistakes in the vertical component of a motion; empty if there are none."""
     vertical = motion.vertical
     if vertical is None:
         return ()
@@ -85,7 +85,7 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
 
 
 def reading_notes(motion: Motion) -> tuple[str, ...]:
-    """Return what looks like a mistake in the units or the step that a motion was read with."""
+    """Return likely mistakes in the units or the step with which a motion was read."""
     notes = [*_strength_notes(motion)]
     step = motion.step or motion.duration / len(motion.coefficients)
     if motion.description.family.endswith("record") and step > _COARSEST:
@@ -99,7 +99,7 @@ def reading_notes(motion: Motion) -> tuple[str, ...]:
 
 
 def _gap_notes(motion: Motion) -> list[str]:
-    """Say where times of a record leave one or more of its even steps out."""
+    """Return notes on times of a record that skip one or more of its even steps."""
     steps = np.diff(motion.breakpoints)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(np.abs(steps - usual) > _UNEVEN * usual)
@@ -114,7 +114,7 @@ def _gap_notes(motion: Motion) -> list[str]:
 
 
 def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
-    """Return what looks like a mistake in an acceleration (m/s^2) that a text was taken for; empty if nothing does."""
+    """Return likely mistakes in an acceleration (m/s^2) that was read from a text; empty if there are none."""
     if _UNITLESS.fullmatch(text.strip()) is None or not 0.0 < value <= _PERHAPS_IN_G:
         return ()
     sentence = f"{{}} {text} is taken for {value:g} m/s^2, {value / STANDARD_GRAVITY:.3g} g; write {text}g for {text} g"
@@ -122,7 +122,7 @@ def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
 
 
 def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
-    """Return what looks like a mistake in the units of a hazard curve's intensities; empty if nothing does."""
+    """Return likely mistakes in the units of the intensities of a hazard curve; empty if there are none."""
     weakest, strongest = float(intensity[0]), float(intensity[-1])
     least, most = (_WEAKEST * STANDARD_GRAVITY, _STRONGEST * STANDARD_GRAVITY) if measure.units == "m/s^2" else _SPEEDS
     for which, value, is_odd in (("weakest", weakest, weakest > most), ("strongest", strongest, strongest < least)):
@@ -132,7 +132,7 @@ def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
 
 
 def block_notes(block: Block) -> tuple[str, ...]:
-    """Return what looks like a mistake in the sizes of a block; empty if nothing does."""
+    """Return likely mistakes in the dimensions of a block; empty if there are none."""
     notes = []
     largest = max(2.0 * side.radius for side in block.sides)
     if largest > _LARGEST:
@@ -146,14 +146,14 @@ def block_notes(block: Block) -> tuple[str, ...]:
 
 
 def height_notes(height: float) -> tuple[str, ...]:
-    """Return what looks like a mistake in the height, m, of a body that was read from a mesh; empty if nothing does."""
+    """Return likely mistakes in the height, m, of a body from a mesh; empty if there are none."""
     return (
         () if _LOWEST <= height <= _LARGEST else (f"the body is {height:.4g} m high: are its coordinates in metres?",)
     )
 
 
 def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
-    """Return what looks like a mistake in densities, kg/m^3, of parts of a body; empty if nothing does."""
+    """Return likely mistakes in densities, kg/m^3, of parts of a body; empty if there are none."""
     unlikely = [each for each in densities if each is not None and not _LIGHTEST <= each <= _HEAVIEST]
     return tuple(
         f"a density is {each:g} kg/m^3, and no solid is so light or so heavy: is it in kg/m^3?" for each in unlikely[:1]
@@ -161,7 +161,7 @@ def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
 
 
 def restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
-    """Return what looks like a mistake in the restraints of a block; empty if nothing does."""
+    """Return likely mistakes in the restraints of a block; empty if there are none."""
     strongest = max(max(*map(abs, terms[:4]), terms.stiffness * terms.opening) for terms in body._terms)
     if strongest <= _MOST_HELD:
         return ()
@@ -169,7 +169,7 @@ def restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
 
 
 def _strength_notes(motion: Motion) -> Iterator[str]:
-    """Sentences on accelerations and velocities of another order than those of ground motions."""
+    """Yield notes on accelerations and velocities of another order of magnitude than in ground motions."""
     pga = motion.pga / STANDARD_GRAVITY
     if pga == 0.0:
         yield "the acceleration is zero throughout"
@@ -185,7 +185,7 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
 
 
 def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> bool:
-    """Whether scaling makes one motion of the other, but for rounding; `reversed_too`: also by a negative factor."""
+    """Whether two motions differ only by a factor, within rounding error; with `reversed_too` also a negative one."""
     parts = [[part for part in (one, one.vertical) if part is not None] for one in (motion, other)]
     if [part.coefficients.shape for part in parts[0]] != [part.coefficients.shape for part in parts[1]]:
         return False

@@ -1,4 +1,4 @@
-"""Pulses by name: a function of `rocking.pulses`, with its parameters as people write them."""
+"""Pulses by name: functions of `rocking.pulses` with parameters as text."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from rocking.motion.motion import Motion
 
 
 def _parameter(name: str, kind: str, unit: str, default: str, low: float, high: float, text: str = "") -> Input:
-    """Declare a parameter of pulses; its slider is logarithmic where it can be."""
+    """Declare a parameter of pulses, with a logarithmic slider if possible."""
     logarithmic = low > 0.0 and name not in ("cycles", "gamma")
     return Input(name, "pulse", kind, "", unit, default, low, high, logarithmic, text=text or f"pulse_{name}")
 
 
-#: Parameters of pulses, each declared once for all pulses that have it.
+#: Parameters of pulses, each declared once for all pulses.
 PARAMETERS: Final = by_name(
     _parameter("amplitude", "acceleration", "g", "0.3g", 0.02, 2.0),
     _parameter("frequency", "frequency", "Hz", "1", 0.1, 10.0),
@@ -33,19 +33,19 @@ PARAMETERS: Final = by_name(
     Input("lobes", "pulse"),
     Input("kind", "pulse", "text"),
 )
-#: The amplitude of a pulse that is given by its velocity.
+#: Amplitude of a pulse that is specified by its velocity.
 _VELOCITY: Final = _parameter("amplitude", "velocity", "m/s", "0.6", 0.05, 3.0, "pulse_velocity")
 
 
 @dataclass(frozen=True)
 class PulseFamily:
-    """A family of pulses, and the function of `rocking.pulses` that makes one."""
+    """Family of pulses, with the function of `rocking.pulses` that creates them."""
 
     make: Callable[..., Motion]
 
     @property
     def name(self) -> str:
-        """Its name as it is written: "half-sine"."""
+        """Name in text: "half-sine"."""
         return self.make.__name__.replace("_", "-")
 
     @property
@@ -60,7 +60,7 @@ class PulseFamily:
 
     @property
     def is_of_velocity(self) -> bool:
-        """Whether its amplitude is that of its velocity."""
+        """Whether the amplitude is a velocity."""
         return self.make is pulses.mavroeidis_papageorgiou
 
     def parameter(self, name: str) -> Input:
@@ -71,15 +71,15 @@ class PulseFamily:
         return _VELOCITY if name == "amplitude" and self.is_of_velocity else PARAMETERS[name]
 
     def unit(self, parameter: str) -> str:
-        """Return the SI unit of a parameter; empty where it has none."""
+        """Return the SI unit of a parameter; empty without a unit."""
         return READERS.get(self.parameter(parameter).kind, (None, ""))[1]
 
     def quantity(self, parameter: str) -> quantities.Quantity | None:
-        """Return what reads a parameter from its text; None where it is a word."""
+        """Return the reader of a parameter; None for a word."""
         return READERS.get(self.parameter(parameter).kind, (None, ""))[0]
 
     def motion(self, values: Mapping[str, Any]) -> Motion:
-        """Make a pulse of the values of its parameters."""
+        """Create a pulse from the values of its parameters."""
         for name in values:
             self.parameter(name)
         missing = [name for name in self.needed if name not in values]
@@ -92,12 +92,11 @@ class PulseFamily:
         return {name: each.default for name, each in inspect.signature(self.make).parameters.items()}
 
 
-#: All families, by name.
 FAMILIES: Final = {family.name: family for family in (PulseFamily(getattr(pulses, name)) for name in pulses.__all__)}
 
 
 def pulse_family(name: str) -> PulseFamily:
-    """Family of pulses of a name; blanks, hyphens and underscores are the same."""
+    """Return the family of pulses with a name; blanks, hyphens and underscores are equivalent."""
     plain = checks.text(name, "pulse", InvalidOption).strip().lower().replace("_", "-").replace(" ", "-")
     if plain not in FAMILIES:
         hint = checks.meant(plain, [*FAMILIES], f"there are {_listed(FAMILIES)}")
@@ -106,15 +105,15 @@ def pulse_family(name: str) -> PulseFamily:
 
 
 def named_pulse(text: str) -> Motion:
-    """Pulse of a text: its family, a colon, and its parameters with commas between.
+    """Create a pulse from a text: its family, a colon, and its parameters separated by commas.
 
-    A parameter without a unit is in m/s^2, Hz, rad, s, and m/s where the amplitude is that of a velocity. Where lobes
-    have an amplitude each, they are written one after the other, with commas between.
+    Numbers without a unit are in m/s^2, Hz, rad or s, and in m/s for the amplitude of a velocity. Several amplitudes of
+    lobes are written one after the other, separated by commas.
 
     Parameters
     ----------
     text : str
-        For instance "sine:amplitude=0.2g,frequency=2Hz,cycles=5" or "n-lobe:amplitude=1,2,1,frequency=0.5".
+        For example "sine:amplitude=0.2g,frequency=2Hz,cycles=5" or "n-lobe:amplitude=1,2,1,frequency=0.5".
 
     Returns
     -------
@@ -123,7 +122,7 @@ def named_pulse(text: str) -> Motion:
     Raises
     ------
     InvalidOption
-        If there is no such family or parameter, one is missing or given twice, or a value cannot be read.
+        If there is no such family or parameter, a parameter is missing or repeated, or a value cannot be read.
 
     Examples
     --------
@@ -135,13 +134,13 @@ def named_pulse(text: str) -> Motion:
 
 
 def pulse_values(text: str) -> tuple[PulseFamily, dict[str, Any]]:
-    """Family and values (SI units) of the parameters that a text of `named_pulse` gives."""
+    """Return the family and the parameter values (SI units) of a text of `named_pulse`."""
     family, texts = pulse_texts(text)
     return family, {parameter: _value(family, parameter, parts) for parameter, parts in texts.items()}
 
 
 def pulse_texts(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
-    """Family and parameters of a text of `named_pulse` as they are written: of most one value, without blanks."""
+    """Return family and parameters of a text of `named_pulse` as written, mostly one value each, without blanks."""
     name, _, rest = checks.text(text, "pulse", InvalidOption).partition(":")
     family, texts = pulse_family(name), dict[str, list[str]]()
     for part in filter(None, rest.split(",")):
@@ -151,7 +150,7 @@ def pulse_texts(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
         if equals:
             texts[name] = [value]
         elif texts:
-            [*texts.values()][-1].append(name)  # another value of the parameter before
+            [*texts.values()][-1].append(name)  # another value of the previous parameter
         else:
             raise InvalidOption(f"a pulse is written NAME:PARAMETER=VALUE,PARAMETER=VALUE, but {part!r} has no name")
     return family, texts
@@ -169,7 +168,7 @@ def _value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:
 
 
 def _whole(value: Any) -> Any:
-    """Return a count as an int; what is none is left to the pulse to refuse."""
+    """Return a count as an int, and leave other values for the pulse to reject."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 

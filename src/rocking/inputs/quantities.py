@@ -1,4 +1,4 @@
-"""Numbers as people write them: with a unit, in pairs, in lists and ranges."""
+"""Numbers as text: with a unit, in pairs, in lists and in ranges."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rocking.errors import InvalidOption, literal
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import ACCELERATIONS, TIMES, Unit, plain_spelling
 
-#: What reads one number: its text and the name of the argument that it is of, to SI units.
+#: Reader of one number: converts its text, with the name of its argument, to SI units.
 Quantity = Callable[[str, str], float]
 
-#: Numbers of one range.
+#: Maximum count of numbers in a range.
 _MOST: Final = 100_000
 
 _WRITTEN: Final = re.compile(
@@ -31,7 +31,7 @@ _DEGREE: Final = Unit("deg", math.pi / 180.0, 1.0)
 
 
 def _units(*units: Unit, **spellings: str) -> dict[str, Unit]:
-    """Units by their plain spellings, with that of a number without a unit, and more spellings of some."""
+    """Return units by their plain spellings, with the unit of a number without one, and further spellings."""
     known = {plain_spelling(unit.name): unit for unit in units}
     return {"": _SI, **known, **{other: known[name] for name, others in spellings.items() for other in others.split()}}
 
@@ -47,7 +47,7 @@ _ANGLES: Final = _units(_SI._replace(name="rad"), _DEGREE, deg="° º degree deg
 _VELOCITIES: Final = _units(*(unit._replace(name=f"{name}/s") for name, unit in _LENGTHS.items() if name))
 _RATES: Final = _units(_SI._replace(name="rad/s"), _DEGREE._replace(name="deg/s"), degs="°s")
 
-#: Units by their plain spellings, for SI units and radians: the one list, which the explorer's page has too.
+#: Units by their plain spellings, in SI units and radians: the single list, also used by the page of the explorer.
 UNITS: Final[Mapping[str, Mapping[str, Unit]]] = {
     "length": _LENGTHS,
     "position": _LENGTHS,
@@ -70,7 +70,7 @@ def number(text: str, name: str) -> float:
 
 
 def _reader(units: Mapping[str, Unit], wanted: str) -> Quantity:
-    """Return what reads a number with or without one of some units."""
+    """Return a reader of a number with or without one of some units."""
 
     def read(text: str, name: str) -> float:
         value, spelling = _parts(text)
@@ -100,7 +100,7 @@ def length(text: str, name: str) -> float:
 
 
 def tilt(text: str, name: str) -> float:
-    """Return an angle, rad, as `angle`, of a block that stands: below pi/2, and no degrees without their unit."""
+    """Return the angle of a standing block, rad, as `angle`, but below pi/2 and with an explicit unit for degrees."""
     value = angle(text, name)
     if abs(value) < 0.5 * math.pi:
         return value
@@ -117,7 +117,7 @@ def sides(text: str, name: str, quantity: Quantity = number) -> float | list[flo
 
 
 def bounds(text: str, name: str, quantity: Quantity = number) -> float | tuple[float, ...]:
-    """Return one number, which is known, or two: the lowest and the highest that are thinkable."""
+    """Return one known number, or two: the lowest and highest plausible values."""
     wanted = "a number, if it is known, or two with a comma between, the lowest and the highest thinkable"
     found = _one_or_two(text, name, quantity, wanted)
     return tuple(found) if isinstance(found, list) else found
@@ -131,7 +131,7 @@ def _one_or_two(text: str, name: str, quantity: Quantity, wanted: str) -> float 
 
 
 def axis(value: Any, name: str, quantity: Quantity = number) -> Floats:
-    """Return the numbers of a value of a study file: one, a list, or a range."""
+    """Return the numbers of an entry of a study file: one, a list, or a range."""
     if isinstance(value, str):
         return values(value, name, quantity)
     numbers = value if isinstance(value, list) else [value]
@@ -169,7 +169,7 @@ def at_a_period(text: str, name: str, quantity: Quantity = acceleration) -> tupl
 
 
 def scaling(given: Mapping[str, str | float | None], quantity: Quantity = acceleration) -> tuple[float, Measure] | None:
-    """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given."""
+    """Return the level to which a motion is scaled, and its measure; None without a level."""
     chosen = {name: value for name, value in given.items() if value is not None}
     if not chosen:
         return None
@@ -191,18 +191,18 @@ def scaling(given: Mapping[str, str | float | None], quantity: Quantity = accele
 
 
 def _decimals(numbers: Floats) -> Floats:
-    """Numbers as people write them: 0.3, not 0.30000000000000004."""
+    """Round numbers to their usual decimals: 0.3, not 0.30000000000000004."""
     return np.array([decimal(value) for value in numbers])
 
 
 def _parts(text: str) -> tuple[float | None, str]:
-    """Return number and unit; None where there is no number."""
+    """Return number and unit; None without a number."""
     found = _WRITTEN.fullmatch(text)
     return (None, "") if found is None else (float(found[1]), found[2] or "")
 
 
 def densities(text: str, name: str) -> float | dict[str, float]:
-    """Return one density, kg/m^3, or those of parts by name, which are written as PART=NUMBER."""
+    """Return one density, kg/m^3, or densities of parts by name from entries PART=NUMBER."""
     if "=" not in text:
         return number(text, name)
     found = {}

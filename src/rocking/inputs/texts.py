@@ -1,4 +1,4 @@
-"""Inputs written for Python and for a shell."""
+"""Inputs as Python and shell text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def arguments(values: Mapping[str, Any]) -> str:
-    """Write arguments of a call, as Python has them."""
+    """Format the arguments of a Python call."""
     return ", ".join(f"{name}={value!r}" for name, value in values.items())
 
 
@@ -18,7 +18,7 @@ def option_of(name: str) -> str:
 
 
 def as_option(name: str, value: str) -> tuple[str, ...]:
-    """Write an option and its value, in one word where the value alone would be taken for another option.
+    """Return an option and its value, as one word if the value alone would be read as another option.
 
     Examples
     --------
@@ -30,10 +30,10 @@ def as_option(name: str, value: str) -> tuple[str, ...]:
 
 
 def as_path(name: str) -> str:
-    """Write the name of a file as an argument that no program takes for an option, or for standard input."""
+    """Return a file name as an argument that no program reads as an option or as standard input."""
     return f"./{name}" if name.startswith("-") else name
 
 
 def command_line(words: Iterable[str], options: Mapping[str, str]) -> str:
-    """Write a command with its options, as a shell takes it."""
+    """Format a shell command with its options."""
     return shlex.join([*words, *(word for name, value in options.items() for word in as_option(name, value))])

@@ -1,4 +1,4 @@
-"""A text file in TOML: its tables, and the line of every mistake in them."""
+"""TOML files: their tables, and the line of every mistake in them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _Kept = TypeVar("_Kept", bound=RockingError)
 
 
 class Tables:
-    """Tables of a file, and where each key of them stands."""
+    """Tables of a file, with the line of each key."""
 
     def __init__(self, path: str | Path) -> None:
         self.file = checks.path(path, "the file of a study", StudyError)
@@ -29,7 +29,7 @@ class Tables:
             raise StudyError(f"this is no TOML file: {error}; correct it", path=str(self.file)) from None
 
     def table(self, table: str, occurrence: int = 0) -> Any:
-        """Content of a table, empty where it is missing; of those of a list, the occurrence-th."""
+        """Return the content of a table (in a list of tables, by its occurrence), empty if the table is missing."""
         content: Any = self.tables
         for name in table.split("."):
             content = content.get(name, {})
@@ -37,7 +37,7 @@ class Tables:
 
     @contextlib.contextmanager
     def located(self, *tables: str, key: str | None = None, occurrence: int = 0) -> Iterator[None]:
-        """Give a mistake the line of this key, or of the first that it names in these tables, or of the heading."""
+        """Add to an error the line of this key, of the first key in these tables that it names, or of the heading."""
         try:
             yield
         except RockingError as error:
@@ -48,7 +48,7 @@ class Tables:
 
     @contextlib.contextmanager
     def located_record(self, name: str) -> Iterator[None]:
-        """Give what is wrong with a record the line that names it."""
+        """Add to an error about a record the line that names the record."""
         try:
             yield
         except (UnreadableRecord, InvalidMotion) as error:
@@ -58,13 +58,13 @@ class Tables:
             raise moved(error, type(error), self.file, line) from None
 
     def wrong(self, table: str, key: str | None, message: str, *names: str, value: object = None) -> StudyError:
-        """Return the error that says what is wrong with a key of a table, or with the table."""
+        """Return the error about a key of a table, or about the table."""
         return StudyError(message, *names, path=str(self.file), line=self.line_of(table, key), value=value)
 
     def line_of(self, table: str, key: str | None, occurrence: int = 0) -> int:
-        """Line of a key in a table, the occurrence-th of that name; of its heading without a key; 1 if unseen."""
+        """Return the line of a key in a table (by its occurrence), of the heading without a key, or 1 if not found."""
         if "." in table and not re.search(rf"^\s*\[+\s*{re.escape(table)}\b", self.text, re.MULTILINE):
-            parent, _, name = table.rpartition(".")  # it is written within its parent
+            parent, _, name = table.rpartition(".")
             return self.line_of(parent, name)
         here, seen, heading_line = "", -1, 1
         for number, line in enumerate(self.text.splitlines(), start=1):
@@ -83,7 +83,7 @@ class Tables:
 
 @contextlib.contextmanager
 def in_line(file: Path, line: int) -> Iterator[None]:
-    """Give a mistake the line of a file."""
+    """Add to an error the line of a file."""
     try:
         yield
     except RockingError as error:
@@ -91,12 +91,12 @@ def in_line(file: Path, line: int) -> Iterator[None]:
 
 
 def moved(error: RockingError, kind: type[_Kept], file: Path, line: int, where: str = "") -> _Kept:
-    """Return an error as one of this line, with all its data; what it says of a file of its own comes before."""
+    """Return an error with the same data at another line, after the location that the error already contains."""
     where += error.text().removesuffix(error.message.text())
     return kind(where + error.message.template, *error.message.arguments, path=str(file), line=line, value=error.value)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Say which known name is meant, or which there are."""
+    """Return the closest known name, or the list of known names."""
     names = [*known]
     return checks.meant(name, names, f"there are {', '.join(names)}")
