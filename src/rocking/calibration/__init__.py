@@ -1,4 +1,4 @@
-"""Calibration of a block from observed outcomes or from a measured rotation history."""
+"""Calibration of blocks from observed outcomes or a measured rotation history."""
 
 import lazy_loader as lazy
 

@@ -1,4 +1,4 @@
-"""Diagnostics of a calibration: scores of its predictions, effective candidates, agreement of runs, bounds reached."""
+"""Diagnostics of a calibration: scores, effective candidates, agreement of runs, bounds reached."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import counted
 from rocking.errors import InvalidOption
 
-#: A bound is reached if more than this share of the posterior (the share beyond one end of an interval) is within the
-#: outermost part of the range, in the logarithm. The interval then ends at the bound.
+#: An interval ends at a bound if more than this share of the posterior (the share beyond one end) is within the
+#: outermost part of the range, in the logarithm.
 _OUTERMOST: Final = 0.05
 
 
@@ -30,7 +30,7 @@ class Scores:
     accuracy : float
         Share of outcomes predicted on the correct side of 1/2.
     log_loss : float
-        Mean of -log of the probability of the observed outcome; infinite if an outcome had probability zero.
+        Mean of -log of the probability of the observed outcome, infinite for an outcome with probability zero.
     brier : float
         Mean squared difference between probability and outcome (Brier 1950).
 
@@ -56,7 +56,7 @@ class Scores:
 
     @classmethod
     def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
-        """Compute the scores of the predicted probabilities of m outcomes (bool)."""
+        """Compute the scores of predicted probabilities of m outcomes (bool)."""
         given, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if given.shape != seen.shape or not given.size:
             raise InvalidOption(f"there must be one probability for each outcome, not {given.shape} and {seen.shape}")
@@ -70,7 +70,7 @@ class Scores:
 
 
 def log_losses(probabilities: Floats, observed: Flags) -> Floats:
-    """Compute -log of the probability of each observed outcome; infinite if that probability is zero."""
+    """Compute -log of the probability of each observed outcome, infinite for probability zero."""
     with np.errstate(divide="ignore"):
         return np.asarray(-np.log(np.where(observed, probabilities, 1.0 - probabilities)))
 
@@ -82,9 +82,9 @@ class BoundReached:
     Attributes
     ----------
     name, end : str
-        Name of the estimate and of its bound, "lower" or "upper".
+        Estimate and bound, "lower" or "upper".
     bound, wider : float
-        The bound and a suggested wider one, in the parameter's unit.
+        Bound and suggested wider bound, in the parameter's unit.
     share : float
         Share of the posterior in the outermost 5 % of the range.
     """
@@ -108,7 +108,7 @@ class BoundReached:
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Diagnostics of the reliability of a calibration.
+    """Reliability of a calibration.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class Diagnostics:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Warnings about the estimates, one sentence each; empty if there are none."""
+        """Warnings about the estimates, one sentence each."""
         notes = [f"{one}" for one in self.bounds_reached]
         apart = [f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > AGREEMENT]
         if apart:
@@ -160,7 +160,7 @@ def diagnosed(found: Search, posterior: Floats) -> Diagnostics:
 
 
 def bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
-    """Return the estimates whose interval ends at a bound, from draws of the population's centre."""
+    """Return estimates whose interval ends at a bound, from draws of the population's centre."""
     found = []
     for name, values in space.named(centres).items():
         parameter = name.partition("_")[0]

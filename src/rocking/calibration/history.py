@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 #: Number of blocks at the start of the search.
 _CANDIDATES: Final = 2048
 
-#: Successive shares of the history that are fitted, and the number of best fits that continue to each. Over a whole
-#: history the misfit has many local minima because impacts drift out of phase. Over the first arcs it has few.
+#: Successive shares of the history to fit, and number of best fits that continue. Over the whole history the misfit has
+#: many local minima because impacts drift out of phase, over the first arcs few.
 _STAGES: Final = ((0.15, 16), (0.3, 8), (0.6, 4), (1.0, 2))
 
-#: Number of points then tried around the optimum, and widths of the three clouds in standard errors.
+#: Number of points then tried around the optimum, and widths of the clouds in standard errors.
 _AROUND: Final = 64
 _WIDTHS: Final = (6.0, 3.0, 1.5)
 
@@ -51,8 +51,7 @@ _WIDTHS: Final = (6.0, 3.0, 1.5)
 #: A sensitivity below this share of the largest counts as zero.
 _INSENSITIVE: Final = 1e-7
 
-#: Smallest step in the logarithms for the differences behind the standard errors; simulations are accurate to about
-#: 1e-12.
+#: Smallest step in the logarithms for differences of simulations, which are accurate to about 1e-12.
 _STEP: Final = 1e-5
 
 
@@ -77,10 +76,9 @@ class Measured:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HistoryCalibration(Result):
-    """Block fitted to a rotation history.
+    """Block fitted to a rotation history, returned by `calibrate_history`.
 
-    Returned by `calibrate_history`. The figure shows the measured rotation, the rotation of the fitted block, and the
-    residuals.
+    The figure shows the measured rotation, the fitted rotation, and the residuals.
 
     Attributes
     ----------
@@ -90,7 +88,7 @@ class HistoryCalibration(Result):
         Fitted parameters: "p" (rad/s), "alpha" (rad), "restitution" (with "_plus" and "_minus" for a two-sided block),
         "initial_rotation" (rad).
     covariance : ndarray, shape (k, k)
-        Covariance of the logarithms of the estimates, in their order.
+        Covariance of the logarithms of the estimates.
     times, residuals : ndarray, shape (n,)
         Times of the samples, s, and measured minus simulated rotation, rad.
     response : Response
@@ -177,20 +175,20 @@ def calibrate_history(
     Parameters
     ----------
     times : array_like, shape (n,)
-        Times of the samples, s, nonnegative and increasing; 0 is the release or the start of the motion.
+        Times of the samples, s, nonnegative and increasing, from the release or the start of the motion.
     rotation : array_like, shape (n,)
-        Measured rotation, rad; positive towards side +.
+        Measured rotation, rad, positive towards side +.
     motion : Motion, optional
-        Measured motion of the base. Without a motion, the block was released and rocked freely.
+        Measured motion of the base. By default the block was released and rocked freely.
     model : {"nonlinear", "linear"}
         Equation of motion.
     p, alpha, restitution : float or pair of float
-        Known value, or lowest and highest plausible value (rad/s; rad; -).
+        Known value, or lowest and highest plausible value (rad/s, rad, -).
     two_sided : bool
         Whether unknown parameters may differ between the sides. By default they may not, unlike in `calibrate`, because
-        the residuals of a history show whether one value for both sides is insufficient.
+        residuals show whether one value suffices.
     initial_rotation : float, optional
-        Rotation at time 0, rad, at which the block is held. By default fitted in a release test, and 0 under a motion.
+        Rotation of the held block at time 0, rad. By default fitted in a release test, and 0 under a motion.
     seed, progress : optional
         As for `calibrate`.
 
@@ -210,10 +208,10 @@ def calibrate_history(
 
     Notes
     -----
-    The method is least squares in the logarithms of the parameters, with the derivatives of `Sensitivity.rotation`. The
-    search starts from 2048 blocks over the whole range. The best ones are fitted to 15, 30, 60 and 100 % of the
-    history. Standard errors follow from the curvature at the optimum. They allow for residuals correlated in time, but
-    not for a specimen that is not a rigid plane block.
+    The method is least squares in the logarithms of the parameters, with derivatives from `Sensitivity.rotation`. The
+    search starts from 2048 blocks over the whole range and fits the best ones to 15, 30, 60 and 100 % of the history.
+    Standard errors follow from the curvature at the optimum. They allow for residuals correlated in time, but not for a
+    specimen that is not a rigid plane block.
 
     Examples
     --------
@@ -311,13 +309,13 @@ class _Problem:
         return simulate(self.block(logs), self.motion, model=self.model, duration=end, initial_rotation=start)
 
     def residuals(self, logs: Floats, count: int) -> Floats:
-        """Compute measured minus simulated rotation of the first samples; an overturned block stays at pi/2."""
+        """Compute measured minus simulated rotation of the first samples, with overturned blocks at pi/2."""
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
         return self.rotation[:count] - response.rotation(np.minimum(times, response.duration))
 
     def derivatives(self, logs: Floats, count: int) -> Floats:
-        """Compute the derivatives of the residuals with respect to the logarithms, shape (count, k)."""
+        """Compute the Jacobian of the residuals in the logarithms, shape (count, k)."""
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
         fallen = times > response.duration
@@ -354,7 +352,7 @@ def _released_from(rotation: Floats) -> _Unknown:
 
 
 def _best(problem: _Problem, rng: np.random.Generator, progress: bool | None) -> Floats:
-    """Find the logarithms of the unknowns with the smallest sum of squares over the whole history."""
+    """Find the logarithms of the unknowns with the least squares over the whole history."""
     from scipy.stats import qmc
 
     low, high = problem.bounds
@@ -385,7 +383,7 @@ def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
 
 
 def _shaken(problem: _Problem, found: Floats, width: float, rng: np.random.Generator) -> Floats:
-    """Search around an optimum, `width` standard errors wide; a forced response can be rugged on that scale."""
+    """Search within `width` standard errors of an optimum, because a forced response can be rugged on that scale."""
     whole = len(problem.times)
     covariance = _covariance(problem, found, problem.residuals(found, whole))
     around = found + width * rng.multivariate_normal(np.zeros(len(found)), covariance, _AROUND, method="cholesky")
@@ -423,7 +421,7 @@ def _covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
 
 
 def _slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats:
-    """Differentiate the residuals, shape (n, k), by differences over about one standard error because they jump."""
+    """Differentiate the residuals, shape (n, k), by differences over about one standard error, because of jumps."""
     count, low, high = len(problem.times), *problem.bounds
     columns = []
     for k in range(len(logs)):

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from rocking.plot.curves import Parameter
 
-#: Numbers of move rounds for draws from the posterior over populations, and of draws for a fit without a fold.
+#: Rounds of moves of draws from the posterior over populations, and draws for a fit without a fold.
 ROUNDS: Final = 4
 _DRAWS: Final = 256
 
@@ -100,9 +100,9 @@ class Validation:
 class Calibration(Result):
     """Ensemble of blocks fitted to the outcomes of tests, returned by `calibrate`.
 
-    The table "ensemble" has a row for each block: parameters of both sides, weight, and equation of motion. Commands
-    such as `rocking fragility --ensemble` read this table. The figure shows the ensemble, and the outcomes against the
-    fitted probability of every test.
+    The table "ensemble" contains parameters of both sides, weight, and equation of motion of each block. Commands such
+    as `rocking fragility --ensemble` read this table. The figure shows the ensemble, and outcomes against fitted
+    probabilities.
 
     Attributes
     ----------
@@ -111,17 +111,15 @@ class Calibration(Result):
     weights : ndarray, shape (n,)
         Weights of the blocks, with sum 1.
     estimates : mapping of str to Estimate
-        Parameters of the population: "p" (rad/s), "restitution", and "alpha" (rad), for a two-sided block "alpha_plus"
-        and "alpha_minus".
+        Parameters of the population: "p" (rad/s), "restitution", and "alpha" (rad), or "alpha_plus" and "alpha_minus".
     draws : mapping of str to ndarray, shape (d,)
         Posterior draws of the population's centre, by the same names.
     probabilities, observed : ndarray, shape (m,)
-        Fitted probability of overturning under each motion of the calibration, and observed outcome (bool).
+        Fitted probability of overturning under each motion, and observed outcome (bool).
     model, lapse, seed : str, float, int
         As for `calibrate`.
     diagnostics : Diagnostics
-        Effective candidates, agreement of runs, and bounds that the posterior reaches. Its `notes` are part of the
-        summary.
+        Effective candidates, agreement of runs, and bounds reached. Its `notes` are part of the summary.
 
     See Also
     --------
@@ -145,13 +143,13 @@ class Calibration(Result):
 
     @property
     def scores(self) -> Scores:
-        """Scores on the motions of the calibration itself, which are optimistic (see `cross_validate`)."""
+        """Scores on the calibration's own motions, which are optimistic (see `cross_validate`)."""
         return Scores.of(self.probabilities, self.observed)
 
     def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
         """Compute the probability that each of m motions overturns the specimen, shape (m,).
 
-        The probability is the weighted share of the ensemble that overturns, bounded away from 0 and 1 by the lapse.
+        The weighted share of the ensemble that overturns is bounded away from 0 and 1 by the lapse.
         """
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
@@ -173,8 +171,8 @@ class Calibration(Result):
         Parameters
         ----------
         groups : sequence, optional
-            Label of each motion. Tests with the same label are left out together, for example scaled versions of one
-            source motion.
+            Labels of the motions. Tests with one label, such as scaled versions of one source motion, are left out
+            together.
         folds, repeats : int
             Number of parts, and of random divisions into parts.
         seed : int
@@ -209,8 +207,8 @@ class Calibration(Result):
     def fragility(self, motions: Motions, *, model: Model | None = None, **options: Any) -> Fragility:
         """Compute the specimen's fragility with `rocking.fragility`, for the ensemble and by default in its model.
 
-        The uncertainty of the block and its dispersion from test to test widen the curve. The band represents the
-        motions. The lapse of `predict` is left out, because a motion too weak for uplift does not overturn the block.
+        The uncertainty of the block and its dispersion between tests widen the curve. The band represents the motions.
+        The lapse of `predict` is ignored, because a motion too weak for uplift does not overturn the block.
         """
         return fragility(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
@@ -288,7 +286,7 @@ class Calibration(Result):
 def overturned_under(
     blocks: Bodies, motions: Motions, model: Model, threads: int | None, progress: bool | None
 ) -> NDArray[np.float32]:
-    """Return 1 if a block overturns under a motion, 0 if not, 0.5 if the simulation was abandoned; shape (n, m)."""
+    """Return 1 for overturning, 0 for none, 0.5 for an abandoned simulation; shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
     note_missing(simulated.unfinished.values)
     known = simulated.overturned.astype(np.float32).where(~simulated.unfinished, np.float32(0.5))
@@ -302,7 +300,7 @@ def chances_of(share: Floats, effective: float, lapse: float) -> Floats:
 
 
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
-    """Return the number of each motion's group, from 0; without groups each motion is its own."""
+    """Return the group of each motion, numbered from 0; by default each motion is a group."""
     labels = groups_of(range(count) if groups is None else groups, "groups", count)
     checks.whole(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
@@ -324,7 +322,7 @@ def calibrate(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Calibration:
-    """Fit blocks to the observed outcomes (overturned or not) of a specimen under several motions.
+    """Fit blocks to the outcomes (overturned or not) of a specimen under several motions.
 
     Parameters
     ----------
@@ -333,21 +331,21 @@ def calibrate(
     overturned : array_like of bool, shape (m,)
         Whether the specimen overturned.
     model : {"nonlinear", "linear"}
-        Equation of motion; the linear model is faster and suitable for slender specimens.
+        Equation of motion. The linear model is faster and suitable for slender specimens.
     p, alpha, restitution : float or pair of float
         Known value on both sides in every test (a number, or a pair of equal numbers), or lowest and highest plausible
-        value on either side (rad/s; rad; -) with a log-uniform prior. A body of known size has p =
-        ``Block(width=..., height=...).p``. If the restitution is "housner", it is computed from the slenderness as 1 -
-        1.5 sin(alpha)^2 (Housner 1963). For a two-sided block p and restitution then follow from the rectangle with an
-        eccentric centre of mass that has these slendernesses, and p is that rectangle's value.
+        value on either side (rad/s, rad, -) with a log-uniform prior. A body of known size has p =
+        ``Block(width=..., height=...).p``. The restitution "housner" is computed from the slenderness as 1 - 1.5
+        sin(alpha)^2 (Housner 1963). For two sides it comes from a rectangle with an eccentric centre of mass and these
+        slendernesses, and p is the rectangle's.
     two_sided : bool
         Whether the slendernesses of the two sides may differ, by a factor of at most 3. By default they may, unlike in
-        `calibrate_history`, because few specimens are symmetric and outcomes alone would not reveal it.
+        `calibrate_history`, because few specimens are symmetric and outcomes alone would not reveal this.
     lapse : float
         Probability that an outcome does not come from a rocking block.
     candidates : int
-        Approximate number of blocks simulated under every distinct motion. It grows up to twofold while the runs
-        disagree or few candidates represent a typical population.
+        Approximate number of blocks simulated under every distinct motion, up to twice as many while runs disagree or
+        few candidates represent a typical population.
     ensemble : int
         Largest number of blocks for predictions.
     seed : int
@@ -363,8 +361,8 @@ def calibrate(
     Raises
     ------
     InvalidOption
-        If an argument is out of range, no parameter is unknown, the numbers of motions and outcomes differ, or all
-        outcomes are equal (they bound the block from one side only).
+        If an argument is out of range, all parameters are known, the numbers of motions and outcomes differ, or all
+        outcomes are equal (these bound the block from one side only).
 
     See Also
     --------
@@ -374,11 +372,11 @@ def calibrate(
 
     Notes
     -----
-    Each test is assumed to have its own block, drawn from a population that is lognormal in p, alpha, restitution and
-    the ratio of the sides' slendernesses. The posterior over populations is sampled by sequential Monte Carlo (Del
-    Moral, Doucet and Jasra 2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs fill
-    the bounds evenly, then add blocks near their own best fits. Candidates are weighted by the inverse of their density
-    so that the prior does not change (deterministic mixture; Owen and Zhou 2000).
+    The block of each test is drawn from a population that is lognormal in p, alpha, restitution and the ratio of the
+    slendernesses. The posterior over populations is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra
+    2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs fill the bounds evenly, then
+    add blocks near their own best fits. Weights inverse to the density of candidates preserve the prior (deterministic
+    mixture; Owen and Zhou 2000).
 
     Two mirrored blocks often explain the outcomes equally well. The estimates of each side are then wide, but the
     predictions are not.
@@ -428,7 +426,7 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
     centres, dispersions = unpacked(populations)
     sides = dispersions[:, : len(space.unknown)].copy()
     if space.two_sided:
-        # The logarithm of a side is the logarithm of the mean plus or minus half the logarithm of the ratio.
+        # Logarithm of a side: that of the mean plus or minus half the ratio's.
         sided = space.unknown.index(SIDED)
         sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersions[:, -1])
     dispersion = dict(zip(space.unknown, sides.mean(axis=0).tolist(), strict=True))

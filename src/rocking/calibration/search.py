@@ -1,10 +1,9 @@
 """Sequential Monte Carlo for the posterior over populations, and the search for its candidates.
 
-The likelihood of a population comes from blocks simulated near it, so the location of the candidates determines whether
-all regions of the posterior are found. Independent runs therefore search the whole space and are compared at the end.
-Each run fills the space evenly, then adds blocks near its own fits, first near fair ones, finally near the best. This
-order matters because a narrow region lies within a wider one that is better than the rest. Runs share nothing until
-they are compared.
+The likelihood of a population comes from blocks simulated near it, so the candidates determine whether all regions of
+the posterior are found. Independent runs therefore search the whole space, share nothing, and are compared at the end.
+Each run fills the space evenly, then adds blocks near its own fits, first near fair ones, finally near the best,
+because a narrow region lies within a wider one that is better than the rest.
 """
 
 from __future__ import annotations
@@ -33,10 +32,10 @@ _DISPERSION_LOG_DEVIATION: Final = 0.6
 _BATCH: Final = 64
 
 
-#: Factor by which the dispersions of a guide are widened to draw blocks.
+#: Factor on the dispersions of a guide to draw blocks.
 PROPOSAL_WIDTH: Final = 1.2
 
-#: A share estimated from n simulated blocks is itself uncertain: Jeffreys' prior, Beta(1/2, 1/2).
+#: Jeffreys' prior, Beta(1/2, 1/2), of a share estimated from n simulated blocks.
 _JEFFREYS: Final = 0.5
 
 
@@ -60,7 +59,7 @@ def log_prior_of_dispersions(space: Space, populations: Floats) -> Floats:
 
 
 def drawn(populations: Floats, widened: float, count: int, rng: np.random.Generator) -> Floats:
-    """Draw points from populations in turn, with dispersions times `widened`; shape (count, k)."""
+    """Draw points from populations in turn, with dispersions times `widened`, shape (count, k)."""
     centre, dispersion = unpacked(populations[np.arange(count) % len(populations)])
     return centre + widened * dispersion * rng.standard_normal(centre.shape)
 
@@ -110,7 +109,7 @@ class Candidates:
         return -self.log_density(self.points)
 
     def log_density(self, points: Floats) -> Floats:
-        """Compute the logarithm of the number of candidates per volume at points in the space, shape (c,)."""
+        """Compute the log-density of candidates per volume at points in the space, shape (c,)."""
         parts = [np.full(len(points), np.log(self.evenly / self.space.volume))]
         parts += [np.log(count) + log_density(guide, PROPOSAL_WIDTH, points) for count, guide in self.guides]
         return np.asarray(np.logaddexp.reduce(parts))
@@ -130,7 +129,7 @@ class Evidence:
         return replace(self, candidates=self.candidates.of_tests(tests), observed=self.observed[tests])
 
     def weights(self, populations: Floats) -> NDArray[np.float32]:
-        """Compute the share of each population that each candidate represents, shape (c, n); rows sum to 1."""
+        """Compute the share of each population that each candidate represents, shape (c, n), with row sums 1."""
         weights = self._factors(populations) @ self._powers
         weights -= weights.max(axis=1, keepdims=True)
         np.exp(weights, out=weights)
@@ -138,7 +137,7 @@ class Evidence:
         return weights
 
     def mean_weights(self, populations: Floats) -> Floats:
-        """Compute the weights of the candidates averaged over populations, shape (n,)."""
+        """Compute weights of the candidates averaged over populations, shape (n,)."""
         batches = np.split(populations, range(_BATCH, len(populations), _BATCH))
         parts = [self.weights(batch).sum(axis=0, dtype=np.float64) for batch in batches]
         return np.asarray(np.sum(parts, axis=0) / len(populations))
@@ -196,37 +195,36 @@ class Evidence:
 
 
 def expected_share(share: Floats, effective: ArrayLike) -> Floats:
-    """Compute the mean of a share estimated from this many effective blocks; one block gives no certainty."""
+    """Compute the mean of a share estimated from this many effective blocks."""
     count = np.asarray(effective)
     return np.asarray((count * share + _JEFFREYS) / (count + 2.0 * _JEFFREYS))
 
 
 def with_outliers(probabilities: Floats, lapse: float) -> Floats:
-    """Compute probabilities of recorded outcomes from the probabilities of the rocking block."""
+    """Compute probabilities of recorded outcomes from those of the rocking block."""
     return lapse + (1.0 - 2.0 * lapse) * probabilities
 
 
 #: Number of independent runs.
 RUNS: Final = 2
 
-#: The candidates of a run come in equal parts: two that fill the space, then one for each exponent of the likelihood
-#: that guides the run. While the runs disagree or too few candidates represent the posterior, the runs continue, at
-#: most `_MORE` times.
+#: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the guiding likelihood.
+#: Runs that disagree, or too few effective candidates, add at most `_MORE` parts.
 _FILLING: Final = 2
 _EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
 _MORE: Final = 2
 
-#: Draws from a posterior, and rounds of moves after each tempering step, as guide of the search and for the comparison.
+#: Draws from a posterior, and rounds of moves after each tempering step, for the search and the comparison.
 _PROPOSAL: Final = (256, 2)
 _COMPARED: Final = (256, 4)
 
-#: Runs agree if R-hat is below this value: their means then differ by less than two thirds of a standard deviation.
+#: Largest R-hat of agreeing runs: their means differ by less than two thirds of a standard deviation.
 AGREEMENT: Final = 1.1
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Calibration problem: parameter space, observed outcomes, and the function `tried` that simulates blocks."""
+    """Calibration problem: parameter space, observed outcomes, and simulation of blocks (`tried`)."""
 
     space: Space
     observed: Flags
@@ -244,7 +242,7 @@ class Problem:
         return Candidates(self.space, points, self.tried(points), count)
 
     def propose(self, candidates: Candidates, exponent: float, count: int, rng: np.random.Generator) -> Candidates:
-        """Also simulate blocks near fitted populations; a lower exponent of the likelihood spreads them wider."""
+        """Also simulate blocks near fitted populations, wider for a lower exponent of the likelihood."""
         populations = posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent, progress=False)
         points = drawn(populations, PROPOSAL_WIDTH, count, rng)
         points = points[self.space.contains(points)]
@@ -307,7 +305,7 @@ def _compared(
 
 
 def r_hat(runs: Floats) -> float:
-    """Compute R-hat of the ranks of draws (runs, draws), or of distances from the middle; 1 if the runs agree."""
+    """Compute R-hat of the ranks, or distances from the middle, of draws (runs, draws)."""
     from scipy.special import ndtri
     from scipy.stats import rankdata
 
@@ -394,7 +392,7 @@ def systematic(weights: Floats, count: int, rng: np.random.Generator) -> Integer
 def _differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats:
     first, second = (rng.integers(len(guides), size=count) for _ in range(2))
     size = guides.shape[1]
-    # 2.38/sqrt(2 d) suits a normal posterior (ter Braak 2006); whole differences jump between optima.
+    # 2.38/sqrt(2 d) suits a normal posterior (ter Braak 2006). Whole differences jump between optima.
     scale = np.where(rng.random(count) < 0.1, 1.0, 2.38 / np.sqrt(2.0 * size))
     # Jitter lets the moves leave the span of the particles.
     return scale[:, None] * (guides[first] - guides[second]) + 1e-3 * rng.standard_normal((count, size))

@@ -25,13 +25,13 @@ _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "initial": "r
 #: Largest values of a block's parameters.
 HIGHEST: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
 
-#: The sides of a rigid body differ in slenderness as much as the distances from the pivots to the centre of mass. Their
-#: p and restitution differ only by terms of second order, which outcomes do not reveal.
+#: The sides of a rigid body differ in slenderness as much as the pivots in distance from the centre of mass. Their p
+#: and restitution differ only to second order, which outcomes do not reveal.
 SIDED: Final = "alpha"
 
 
-#: Restitution from the slenderness (Housner 1963), where it is positive. For two sides both follow from a rectangle
-#: with an eccentric centre of mass. Then p belongs to the rectangle, and the p of each side differs from it.
+#: Restitution from the slenderness (Housner 1963), where positive. For two sides it comes from a rectangle with an
+#: eccentric centre of mass. Then p is the rectangle's and differs from the sides' values.
 HOUSNER: Final = "housner"
 _HOUSNER_ENDS: Final = math.asin(math.sqrt(2.0 / 3.0))
 
@@ -50,7 +50,7 @@ Knowledge = float | Range | Literal["housner"]
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Blocks in logarithmic coordinates: the unknown ones of p, slenderness (mean of both sides) and restitution.
+    """Space of the unknown ones of log p, slenderness (mean of both sides) and restitution.
 
     `lower` and `upper` are the logarithms of the bounds. A restitution that is neither unknown nor known follows from
     the slenderness. The last coordinate of a two-sided block is the logarithm of the ratio of its slendernesses.
@@ -85,8 +85,7 @@ class Space:
         lower, upper = np.log(list(bounds.values())).T
         ratio = 0.0
         if two_sided and SIDED in bounds:
-            # The ratio is no wider than the bounds of a side allow. Otherwise a box around narrow bounds would be
-            # almost empty.
+            # Narrow bounds limit the ratio. Otherwise their box would be almost empty.
             ratio = min(math.log(3.0), math.log(bounds[SIDED][1] / bounds[SIDED][0]))
         return cls(tuple(bounds), known, lower, upper, ratio)
 
@@ -135,7 +134,7 @@ class Space:
         return np.asarray(inside & np.all((points >= low) & (points <= high), axis=1))
 
     def sides(self, points: Floats) -> dict[str, Floats]:
-        """Return p, alpha and restitution by name, for side + and side -; shape (n, 2) each."""
+        """Return p, alpha and restitution by name, for side + and side -, shape (n, 2) each."""
         found = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
         values = found | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
         if "restitution" not in values and self.two_sided:
@@ -146,7 +145,7 @@ class Space:
         return values
 
     def named(self, points: Floats) -> dict[str, Floats]:
-        """Return the unknown parameters by name, for each side if they differ; shape (n,) each."""
+        """Return the unknown parameters by name, for each side if they differ, shape (n,) each."""
         values = np.exp(self._log_sides(points))
         return {
             name + side: values[:, i, k]

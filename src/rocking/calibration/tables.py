@@ -62,7 +62,7 @@ class _Table:
         return tuple(self.convert(line, row[column].lower(), read, what) for line, row in self.rows)
 
     def convert(self, line: int, text: str, how: Callable[[str], Any], what: str) -> Any:
-        """Convert a cell; an error contains the line and the expected kind of value."""
+        """Convert a cell, or raise an error with its line and the expected kind of value."""
         try:
             return how(text)
         except (ValueError, KeyError):
@@ -138,7 +138,7 @@ def read_table(path: Path, name: Callable[[str], str] = str) -> _Table:
 
 
 def _tests_of(table: _Table, **about: Any) -> list[ShakeTest]:
-    """Return the tests of a table with these columns; errors contain the line."""
+    """Return the tests of a table with these columns."""
     specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
     if len(specimens) > 1:
         raise table.error(f"the tests are of {counted(len(specimens), 'specimen')}: give each a table of its own")
@@ -148,7 +148,7 @@ def _tests_of(table: _Table, **about: Any) -> list[ShakeTest]:
 
 
 def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
-    """Read the motion of each row, scaled and with its vertical; the row's channel, dt_s and units take precedence."""
+    """Read each row's motion, scaled and with its vertical. The row's channel, dt_s and units take precedence."""
     several = len({row["motion"] for _, row in table.rows}) > 1
     read: dict[tuple[object, ...], Motion] = {}
     motions = []
@@ -171,7 +171,7 @@ def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Mo
 
 
 def _motion_of(table: Path, name: str, vertical: str, *, several: bool, **about: Any) -> Motion:
-    """Read a motion with its optional vertical component; a pulse has the syntax of the commands."""
+    """Read a record or pulse (in command syntax) with its optional vertical component."""
     record = _beside(table, name)
     upwards = _beside(table, vertical) if vertical else None
     if record != name or name.partition(":")[0] not in FAMILIES:
@@ -201,12 +201,11 @@ def read_tests(
     Parameters
     ----------
     path : str or pathlib.Path
-        Table with a header. The column "motion" contains a record file (relative to the table), a shipped record, or a
-        pulse such as "one-sine:amplitude=0.2g,frequency=2Hz". The column "overturned" contains the observed outcome (1
-        or 0, yes or no, true or false). Optional columns are "scale" (factor on the motion), "vertical" (file or
-        channel of the vertical component), "channel", "dt_s" (step, s) and "units" (for files that do not state them),
-        and "name" and "group" (see `ShakeTest`). A column "specimen" must contain one specimen throughout. Other
-        columns are ignored.
+        Table with a header. Column "motion" contains a record file (relative to the table), a shipped record, or a
+        pulse such as "one-sine:amplitude=0.2g,frequency=2Hz", and "overturned" the outcome (1 or 0, yes or no, true or
+        false). Optional columns are "scale" (factor on the motion), "vertical" (file or channel of the vertical
+        component), "channel", "dt_s" (step, s) and "units" (for files that do not state them), "name" and "group" (see
+        `ShakeTest`). A column "specimen" must contain one specimen throughout. Other columns are ignored.
     channel, dt, units : optional
         As for `rocking.read`, for rows that do not state them.
 
@@ -246,9 +245,9 @@ def read_observed(
 ) -> dict[str, Any]:
     """Read a table of observed outcomes as arguments of `fit_fragility`.
 
-    The table has a column "overturned" (the count if there is a column "trials"), and either an intensity (`HEADINGS`)
-    or a motion (see `read_tests`). The column "group" labels outcomes that belong together. Outcomes under one motion
-    always do, as do groups that share a motion. A row without a label belongs to no group.
+    The table has a column "overturned" (a count with a column "trials"), and either an intensity (`HEADINGS`) or a
+    motion (see `read_tests`). Column "group" labels outcomes that belong together. Outcomes under one motion, and
+    groups with a common motion, always do. A row without label belongs to no group.
     """
     table = read_table(path, heading_of)
     columns = table.columns
@@ -295,7 +294,7 @@ def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, A
 
 
 def _clusters(table: _Table, families: Mapping[str, int]) -> list[int]:
-    """Return the cluster of each row; rows that share a motion (or a multiple) or a group, even indirectly, are one."""
+    """Return the cluster of each row: a common motion (or multiple) or group, even indirectly, joins rows."""
     clusters = [*range(len(table.rows))]
     first: dict[tuple[str, str | int], int] = {}
     for k, (_, row) in enumerate(table.rows):

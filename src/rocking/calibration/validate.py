@@ -44,10 +44,10 @@ class ShakeTest:
     overturned : bool
         Whether the specimen overturned.
     name : str
-        Name of the test; by default the name of the motion.
+        Name of the test, by default of the motion.
     group : str
-        Label of tests that belong together, such as tests with one command or one source motion. Standard errors allow
-        for groups. By default tests under the same motion form a group.
+        Label of tests that belong together, such as tests with one command or source motion, for standard errors. By
+        default tests under one motion form a group.
 
     See Also
     --------
@@ -108,10 +108,10 @@ class Score:
     Attributes
     ----------
     value, error : float
-        Mean over the tests and its standard error; the error is NaN for a single cluster of tests or an infinite score.
+        Mean over the tests and its standard error, which is NaN for a single cluster or an infinite score.
     skill, skill_error : float
-        1 minus the ratio of the score to the score of the base rate of the same tests, and its standard error. The
-        skill is 1 for perfect predictions, 0 if the base rate is equally good, and NaN if the base rate is perfect.
+        1 minus the ratio of the score to the base rate's score on the same tests, and its standard error. The skill is
+        1 for perfect predictions, 0 for the base rate, and NaN if the base rate is perfect.
     tests, clusters : int
         Number of tests, and of clusters of tests that belong together.
     """
@@ -261,20 +261,19 @@ def validate(
     tests : sequence of ShakeTest
         m tests, for example from `read_tests`.
     blocks : Block, Blocks, RestrainedBlock, sequence of one kind, Calibration or Validation
-        One known block, n draws of a block that is uncertain or varies from test to test, a calibration, or the result
-        of its `cross_validate` on the same tests in the order of the calibration.
+        Known block, n draws of a block that is uncertain or varies between tests, calibration, or result of its
+        `cross_validate` on the same tests in the same order.
     weights : array_like, optional
-        Weights of several blocks; equal by default.
+        Weights of several blocks, equal by default.
     model : {"nonlinear", "linear"}, optional
-        Equation of motion; by default the model of a calibration, otherwise nonlinear.
+        Equation of motion, by default the model of a calibration, otherwise nonlinear.
     lapse : float, optional
-        Probability that an outcome does not come from a rocking block; by default the value of a calibration, otherwise
-        0.
+        Probability that an outcome does not come from a rocking block, by default from a calibration, otherwise 0.
     bins : int
         Number of bins of the reliability diagram, of equal width.
     simulations, seed : int
-        Number of draws from the predictions for the bands and `reliability_chance`, and their seed. Each test has its
-        own block.
+        Number of draws from the predictions for the bands and `reliability_chance`, and their seed. Draws for each test
+        are independent.
     threads, progress : optional
         As for `simulate_many`.
 
@@ -295,9 +294,9 @@ def validate(
 
     Notes
     -----
-    The share of n blocks that overturn is itself uncertain. The probability is its mean under Jeffreys' prior, except
-    for a single known block. Standard errors are computed by a jackknife over clusters, which are the tests of one
-    group or otherwise of one motion. The base rate of the skill comes from the same tests, which favours the base rate.
+    The share of n blocks that overturn is uncertain, so the probability is its mean under Jeffreys' prior, except for a
+    known block. Standard errors come from a jackknife over clusters: tests of one group, or else of one motion. The
+    base rate of the skill comes from the same tests, which favours the base rate.
 
     References
     ----------
@@ -355,7 +354,7 @@ def validate(
     outcomes = rng.random((simulations, len(given))) < probabilities
     places = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
     term = miscalibration(probabilities, np.vstack([observed, outcomes]), places)
-    # Sums of the same numbers in a different order differ in their last digits.
+    # Summation order changes the last digits.
     larger = np.count_nonzero(term[1:] >= term[0] - 1e-9 * abs(term[0]))
     rows = zip(numbered([test.name for test in given]), given, probabilities.tolist(), strict=True)
     return ModelValidation(
@@ -370,7 +369,7 @@ def validate(
 
 
 def _left_out(source: Validation, count: int, weights: object, lapse: float | None) -> Floats:
-    """Return the predicted probabilities of the tests of a calibration while they were left out."""
+    """Return the predicted probabilities of left-out tests of a calibration."""
     if weights is not None or lapse is not None:
         name = "lapse" if weights is None else "weights"
         raise InvalidOption("predictions of tests that were left out take no {}: leave it out", name)
@@ -385,7 +384,7 @@ def _left_out(source: Validation, count: int, weights: object, lapse: float | No
 
 
 def score_of(each: Floats, observed: Flags, base: Callable[[float], float], clusters: Integers) -> Score:
-    """Compute the mean score and its skill; `base` maps the share that overturned to the score of the base rate."""
+    """Compute mean score and skill, with `base` from the share that overturned to the base rate's score."""
 
     def mean(chosen: Integers) -> float:
         return float(each[chosen].mean())
@@ -414,7 +413,7 @@ def _entropy(share: float) -> float:
 
 
 def miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Floats:
-    """Compute the reliability term of the Brier score (Murphy 1973) of outcomes (s, m); bins have shape (m,)."""
+    """Compute the reliability term of the Brier score (Murphy 1973) of outcomes (s, m) in bins (m,)."""
     counts = np.bincount(bins)
     member = (bins[:, None] == np.arange(len(counts))).astype(np.float64)
     excess = (observed - probabilities) @ member

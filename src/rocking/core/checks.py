@@ -1,7 +1,7 @@
-"""Checks of arguments for all parts of the package; each accepts the type of error to raise.
+"""Checks of arguments, each with the type of error to raise.
 
-A number is any real number of Python or NumPy, or an array without dimensions that contains one. Text and truth values
-are rejected although ``float`` accepts them, because "0.2" is more often a mistake than intended.
+A number is any real number of Python or NumPy, or an array without dimensions. Text and truth values are rejected,
+although ``float`` accepts them, because they are usually mistakes.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
 
 
 def axis(values: ArrayLike, name: str, error: Error) -> Floats:
-    """Return finite, increasing numbers of an axis with any sign, or raise `error`; one number is an axis."""
+    """Return finite, increasing numbers of an axis (at least one), or raise `error`."""
     found = np.atleast_1d(numbers(values, name, error))
     if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found)) or np.any(np.diff(found) <= 0.0):
         raise error("{} must be increasing finite numbers", name, value=values)

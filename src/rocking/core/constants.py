@@ -2,10 +2,10 @@
 
 from typing import Final, Literal
 
-#: Standard acceleration of gravity, m/s^2; readers and blocks use the same value.
+#: Standard acceleration of gravity of readers and blocks, m/s^2.
 STANDARD_GRAVITY: Final = 9.80665
 
-#: Highest degree of a motion's pieces; the series of an arc has a degree higher by two.
+#: Highest degree of a motion's pieces, lower by two than that of an arc's series.
 HIGHEST_DEGREE: Final = 20
 
 #: Version of the package.

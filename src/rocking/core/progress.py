@@ -37,7 +37,7 @@ _listener = _Listener()
 
 
 def spelled(message: Message) -> str:
-    """Return a message with argument names for the present reader; on the command line these are options."""
+    """Return a message with argument names for the present reader, options on the command line."""
     return message.text(_listener.spelling)
 
 
@@ -55,7 +55,7 @@ def note(message: Message | str) -> None:
 
 @contextlib.contextmanager
 def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[None]:
-    """Choose audience of notes and spelling of arguments while a command runs; each note appears once."""
+    """Set audience of notes and spelling of arguments while a command runs, and show each note once."""
     global _listener
 
     def show(message: Warning | str, category: type[Warning], *place: Any) -> None:

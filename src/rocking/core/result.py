@@ -46,7 +46,7 @@ class Row(NamedTuple):
     name : str
         Words in a summary, name of a quantity in a dictionary.
     value : object
-        Value; in a summary a text with the significant digits.
+        Value, in a summary as text with the significant digits.
     unit : str
         Unit of the value, "1" if dimensionless.
     note : str
@@ -75,7 +75,7 @@ def text_of(rows: Iterable[Row], width: int) -> str:
 
 
 def dictionary_of(rows: Iterable[Row]) -> dict[str, Any]:
-    """Return rows as plain values by name with unit; None for numbers that are not finite."""
+    """Return rows as plain values by name with unit, with None for numbers that are not finite."""
     return {named(row.name, row.unit): plain(row.value) for row in rows}
 
 
@@ -85,7 +85,7 @@ class Result(ABC):
     Attributes
     ----------
     TABLES : collection of str
-        Names of the tables, the default one first; empty for a result without tables.
+        Names of the tables, the default one first.
     """
 
     TABLES: ClassVar[Collection[str]] = ()
@@ -99,10 +99,10 @@ class Result(ABC):
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as plain values by name; units are in the names, or SI."""
+        """Return the result as plain values by name, with units in the names or SI."""
 
     def to_json(self, path: str | Path) -> None:
-        """Write the values of `to_dict` to a JSON file, completely or not at all; NaN and infinity become null.
+        """Write the values of `to_dict` to a JSON file, with null for NaN and infinity, completely or not at all.
 
         Raises `OutputError` if the file cannot be written.
         """
@@ -123,11 +123,14 @@ class Result(ABC):
         return frame_of(self._columns(checks.one_of(table or names[0], "table", InvalidOption, names)))
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
-        """Write a table of `to_dataframe` to a CSV file, like `to_json`; "inf" stands for infinity."""
+        """Write a table of `to_dataframe` to a CSV file, with "inf" for infinity, like `to_json`."""
         write_csv(path, self.to_dataframe(table), digits=self._FORMAT)
 
     def to_excel(self, path: str | Path) -> None:
-        """Write all tables as sheets of a workbook (.xlsx), like `to_json`; raises `InvalidOption` without openpyxl."""
+        """Write all tables as sheets of a workbook (.xlsx), like `to_json`.
+
+        Raises `InvalidOption` without openpyxl.
+        """
         write_excel(path, {table: self.to_dataframe(table) for table in self.TABLES or [""]})
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -136,9 +139,9 @@ class Result(ABC):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Axes for the main panel alone; by default a new figure contains all panels.
+            Axes for the main panel alone, by default a new figure with all panels.
         title : str
-            Title; by default a description of the result.
+            Title, by default a description of the result.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
 
@@ -177,7 +180,7 @@ class DatasetResult(Result):
     TABLES : mapping of str to tuple of str
         Tables, the default one first, and the variables of each.
     POOLED : tuple of str
-        Dimensions over which some numbers are aggregated; these numbers are not defined for a part of such a dimension.
+        Dimensions over which some numbers are aggregated, which do not apply to a part of them.
     """
 
     TABLES: ClassVar[Mapping[str, tuple[str, ...]]]
@@ -191,8 +194,7 @@ class DatasetResult(Result):
         Parameters
         ----------
         **labels : object
-            Label or labels for each dimension, such as ``alpha=0.2`` or ``alpha=[0.1, 0.2]``; numbers select the
-            nearest.
+            Label or labels for each dimension, such as ``alpha=0.2`` or ``alpha=[0.1, 0.2]`` (the nearest numbers).
 
         Returns
         -------

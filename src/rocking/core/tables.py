@@ -49,9 +49,9 @@ class Column(NamedTuple):
     values : array_like
         One value for each row.
     unit : str
-        Unit of the values, "1" if dimensionless; part of the column's name in files.
+        Unit of the values, part of the column's name in files, or "1".
     label : str
-        Heading in displayed text; empty if only files contain the column.
+        Heading in displayed text, empty for columns in files only.
     """
 
     name: str
@@ -309,7 +309,7 @@ def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
 
 
 def write_figure(path: str | Path, figure: Figure, **options: Any) -> None:
-    """Write a figure in the format of the file's suffix, completely or not at all; options as for its ``savefig``."""
+    """Write a figure in the suffix's format, completely or not at all, with options of its ``savefig``."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format=Path(path).suffix.removeprefix("."), **options)
     write_bytes(path, drawn.getvalue())

@@ -31,9 +31,9 @@ def in_threads(
 ) -> Iterator[Found]:
     """Yield the results of some work on each item, in order; by default with one thread per core.
 
-    Items are consumed as needed, some per thread ahead of the results. If several items fail, the error of the first
-    one is raised. On an early exit, for example by an interrupt, `cancelled` is set for running work, which is awaited,
-    and the remaining work is discarded.
+    Items are consumed as needed, some per thread ahead of the results. The first of several failed items determines the
+    error. On an early exit, for example an interrupt, `cancelled` is set, running work is awaited, and other work is
+    discarded.
     """
     count = min(cores() if threads is None else threads, len(items) if isinstance(items, Sized) else 2**16)
     if count < 2:

@@ -17,7 +17,7 @@ _SCALED: Final = re.compile(r"(scaled by \S+) to .*")
 
 @dataclass(frozen=True)
 class Origin:
-    """Facts that a record file or the catalogue states about a motion; empty if not stated.
+    """Facts about a motion from its record file or the catalogue, empty if not stated.
 
     Attributes
     ----------
@@ -28,13 +28,13 @@ class Origin:
     channel, number : str, int or None
         Name of the component ("90 Deg", "Up", "HNE", ...) and its number in the file.
     azimuth : float or None
-        Direction of positive acceleration, degrees clockwise from north; None if vertical or unknown.
+        Direction of positive acceleration, degrees clockwise from north, or None if vertical or unknown.
     units, heading_units : str
         Units of the numbers in the file, as spelled there, and units in the heading of a text table.
     start : float or None
-        Instant of the first sample by the file's clock, s; None if unknown, or if the motion was delayed or cut.
+        Instant of the first sample by the file's clock, s, or None if unknown, delayed or cut.
     reversed : bool
-        Whether the motion is opposite to `channel`; `azimuth` refers to the motion.
+        Whether the motion (and `azimuth`) is opposite to `channel`.
     """
 
     format: str = ""
@@ -62,15 +62,15 @@ class Description:
     Attributes
     ----------
     family : str
-        Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... After a delay or processing the name shows
-        it ("delayed sine", "processed record"), because the formula of `text` then no longer starts at time zero.
+        Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... A delay or processing is included
+        ("delayed sine", "processed record"), because the formula of `text` then no longer starts at time zero.
     parameters : mapping of str to float
         Parameters of the formula in SI units and radians, for example amplitude, frequency, phase and cycles of a sine.
         Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it negative).
     text : str
         Formula, or source and terms of the record, in words.
     origin : Origin, optional
-        Facts about a record as data; `text` contains them in words.
+        Facts about a record as data.
 
     Raises
     ------
@@ -121,7 +121,7 @@ class Description:
         return replace(self, parameters=parameters, origin=origin)
 
     def changed(self, how: str) -> Description:
-        """Return the description of a changed motion; its family contains the change ("delayed", "processed") once."""
+        """Return the description of a changed motion, with the change ("delayed", "processed") once in its family."""
         family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
         origin = None if self.origin is None else replace(self.origin, start=None)
         return replace(self, family=family, origin=origin)

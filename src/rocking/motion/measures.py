@@ -30,24 +30,24 @@ def checked_damping(value: object, error: checks.Error) -> float:
 
 
 class Measured:
-    """Kinematics and intensity measures of a piecewise polynomial; they refer to the horizontal component."""
+    """Kinematics and intensity measures of the horizontal component."""
 
     breakpoints: Floats
     coefficients: Floats
 
     @property
     def duration(self) -> float:
-        """Time of the last breakpoint, s; the acceleration is zero after it."""
+        """Time of the last breakpoint, s, after which the acceleration is zero."""
         return float(self.breakpoints[-1])
 
     @property
     def samples(self) -> tuple[Floats, Floats]:
-        """Times (s) and accelerations (m/s^2) at the breakpoints; at a jump, the acceleration after it."""
+        """Times (s) and accelerations (m/s^2) at the breakpoints, after a jump there."""
         return piecewise.samples(self)
 
     @property
     def jumps(self) -> bool:
-        """Whether the acceleration jumps between pieces by more than rounding; the ends of the motion do not count."""
+        """Whether the acceleration jumps between pieces by more than rounding, the ends of the motion excepted."""
         return piecewise.jumps(self)
 
     def _widths(self) -> Floats:
@@ -62,20 +62,20 @@ class Measured:
         return piecewise.antiderivative(self._widths(), self._velocity())
 
     def acceleration(self, time: ArrayLike) -> Any:
-        """Return the ground acceleration at times (s), m/s^2, shaped like `time`; zero outside the motion."""
+        """Return the ground acceleration at times (s), m/s^2, shaped like `time` and zero outside the motion."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self.coefficients, at)
         result = np.where((at < 0.0) | (at > self.duration), 0.0, result)
         return result if result.ndim else float(result)
 
     def velocity(self, time: ArrayLike) -> Any:
-        """Return the ground velocity at times (s), m/s, from rest; constant after the end of the motion."""
+        """Return the ground velocity at times (s), m/s, from rest, constant after the end of the motion."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self._velocity(), at)
         return result if result.ndim else float(result)
 
     def displacement(self, time: ArrayLike) -> Any:
-        """Return the ground displacement at times (s), m, from rest; the last velocity continues after the end."""
+        """Return the ground displacement at times (s), m, from rest, with the last velocity after the end."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self._displacement(), at)
         result = result + self.velocity(self.duration) * np.maximum(at - self.duration, 0.0)
@@ -110,17 +110,17 @@ class Measured:
 
     @property
     def cumulative_absolute_velocity(self) -> float:
-        """Exact integral of the absolute acceleration, m/s; changes of sign within a piece are located."""
+        """Exact integral of the absolute acceleration, m/s, with sign changes located within pieces."""
         widths = self._widths()
         integral = self._velocity()[:, np.newaxis, :]
         roots = piecewise.root_candidates(widths, self.coefficients)
         cuts = np.hstack([np.zeros((len(widths), 1)), roots, widths[:, np.newaxis]])
-        # Between two cuts the sign is constant. Adding the integral's start value would only lose digits.
+        # The sign is constant between cuts. Adding the integral's start value would only lose digits.
         integral[..., 0] = 0.0
         return float(np.sum(np.abs(np.diff(piecewise.value(integral, cuts), axis=1))))
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
-        """Return the time between two fractions of the Arias intensity, s; NaN if the intensity is zero.
+        """Return the time between two fractions of the Arias intensity, s, or NaN if the intensity is zero.
 
         Raises `InvalidMotion` unless ``0 <= start < end <= 1``.
         """
@@ -134,8 +134,8 @@ class Measured:
     def spectral_acceleration(self, period: ArrayLike, damping: float = DAMPING) -> Any:
         """Compute the pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement.
 
-        The linear oscillator starts from rest. The Taylor series of the exact solution on each piece give its motion
-        until the first extremum after the end of the ground motion. Extrema between samples are located.
+        Taylor series of the exact solution on each piece follow the linear oscillator from rest until the first
+        extremum after the end of the ground motion. Extrema between samples are located.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class Measured:
         return result if result.ndim else float(result)
 
     def measures(self, periods: Sequence[float] = ()) -> dict[str, float]:
-        """Return intensity measures in SI units by name; each name ends in its unit.
+        """Return intensity measures in SI units by name, which ends in the unit.
 
         Spectral accelerations (5 % damping) are added for `periods`, s.
         """
@@ -194,7 +194,7 @@ class Measured:
 
 
 def significant_span(motion: Measured, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
-    """Return the times, s, at which the Arias intensity reaches two fractions of its total; NaN if it is zero."""
+    """Return the times, s, at which the Arias intensity reaches two fractions of its total, or NaN if zero."""
     cumulated = np.append(0.0, np.cumsum(_energy(motion.coefficients, np.diff(motion.breakpoints))))
     if cumulated[-1] == 0.0:
         return math.nan, math.nan

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 class Motion(Processable):
     """Ground acceleration that is a polynomial on each of its pieces and zero outside ``[0, duration]``.
 
-    Pieces may jump. A record is exactly piecewise linear; a pulse is approximated to 1e-15 of its amplitude. Motions
+    Pieces may jump. Records are exactly piecewise linear, pulses are approximated to 1e-15 of their amplitude. Motions
     are usually created by `from_samples`, `from_points`, `rocking.pulses`, `rocking.records` or `rocking.read`.
 
     Parameters
     ----------
     breakpoints : array_like, shape (n + 1,)
-        Ends of the pieces, s; strictly increasing from 0.
+        Ends of the pieces, s, strictly increasing from 0.
     coefficients : array_like, shape (n, degree + 1)
         m/s^2, m/s^3, ...: the acceleration on piece k is ``sum_j coefficients[k, j] * (t - breakpoints[k])**j``.
     name : str
@@ -44,10 +44,10 @@ class Motion(Processable):
     history : tuple of str
         Later changes to the motion, one sentence each.
     error : float
-        Bound on the difference from the motion in `description`, m/s^2, beyond the rounding of breakpoints and
-        coefficients; 0 if the pieces are the motion itself (records).
+        Bound on the difference from the motion in `description`, m/s^2, beyond rounding of breakpoints and
+        coefficients, or 0 if the pieces are the motion itself (records).
     vertical : Motion, optional
-        Vertical ground acceleration over the same time, positive upwards; see `with_vertical`.
+        Vertical ground acceleration over the same time, positive upwards (see `with_vertical`).
 
     Attributes
     ----------
@@ -58,8 +58,7 @@ class Motion(Processable):
     ------
     InvalidMotion
         If the arrays do not describe a piecewise polynomial, its degree is above 20, or a number exceeds the supported
-        range (accelerations of 1e30 m/s^2, also over a piece extended to 1e-9 s; durations below 1e-9 s or above 1e15
-        s).
+        range (accelerations up to 1e30 m/s^2, also over a piece extended to 1e-9 s, durations from 1e-9 to 1e15 s).
 
     See Also
     --------
@@ -124,7 +123,7 @@ class Motion(Processable):
         Parameters
         ----------
         acceleration : array_like, shape (n,)
-            Ground acceleration, m/s^2, n >= 2; the first sample is at time 0.
+            Ground acceleration, m/s^2, n >= 2, from time 0.
         dt : float
             Sampling step, s, from 1e-9 to 1e9.
         name, description : str, Description, optional
@@ -164,9 +163,9 @@ class Motion(Processable):
         name: str = "points",
         description: Description | None = None,
     ) -> Motion:
-        """Create a motion that is linear between points at uneven times, s; otherwise like `from_samples`.
+        """Create a motion that is linear between points at uneven times, s, like `from_samples`.
 
-        Times must increase strictly. The time of the motion starts at the first.
+        Times must increase strictly. The first one becomes 0.
         """
         samples = piecewise.checked_samples(acceleration)
         instants = piecewise.checked_times(times, len(samples))
@@ -177,7 +176,7 @@ class Motion(Processable):
 
     @property
     def end(self) -> float:
-        """Time of the last breakpoint of both components, s; the ground is at rest afterwards."""
+        """Time of the last breakpoint of both components, s, after which the ground does not move."""
         return self.duration if self.vertical is None else max(self.duration, self.vertical.duration)
 
     @property
@@ -186,7 +185,7 @@ class Motion(Processable):
         return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
 
     def scaled(self, factor: float) -> Motion:
-        """Return the motion times a factor; a negative factor reverses only the horizontal component.
+        """Return the motion times a factor, of which a negative sign reverses only the horizontal component.
 
         Raises `InvalidMotion` if the factor is not a finite number, or the scaled motion would exceed the supported
         range.
@@ -235,8 +234,8 @@ class Motion(Processable):
         The vertical component is scaled, delayed, processed and added with the horizontal one, but not reversed with
         it. A record with a channel named "Down" or "DWN" is inverted.
 
-        `vertical` is in m/s^2, positive upwards, and starts at the same time; None removes the component. Raises
-        `InvalidMotion` if `vertical` is not a motion, or itself has a vertical component.
+        `vertical` (m/s^2, positive upwards) starts at the same time. None removes the component. Raises `InvalidMotion`
+        if `vertical` is not a motion, or itself has a vertical component.
         """
         origin = vertical.description.origin if isinstance(vertical, Motion) else None
         if vertical is not None and origin is not None and origin.downwards:
@@ -244,7 +243,7 @@ class Motion(Processable):
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the ground acceleration in g over time, and the vertical one below; parameters as for `Result.plot`.
+        """Draw the ground acceleration in g over time, and the vertical one below, as `Result.plot`.
 
         In `ax` only the horizontal acceleration is drawn. The default title is the label of the motion.
         """
@@ -263,8 +262,8 @@ class Motion(Processable):
     def drawing_times(self, start: float, end: float) -> Floats:
         """Return times (s) for drawing an interval: its ends, breakpoints, and additional points on curved pieces.
 
-        Breakpoints of both components are included. At a jump there are two times, one just before it. The end of the
-        motion is a jump to zero.
+        Breakpoints of both components are included, and a second time just before each jump. The end of the motion is a
+        jump to zero.
         """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:
@@ -356,11 +355,10 @@ def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float 
 def lifting_factors(
     motion: Motion, thresholds: ArrayLike, gravity: float = STANDARD_GRAVITY, own: ArrayLike | None = None
 ) -> Floats:
-    """Compute the smallest factors on both components that lift blocks from rest, shape (n,); possibly infinite.
+    """Compute the smallest factors on both components that lift blocks from rest, shape (n,), or infinity.
 
-    The thresholds are pairs as for `exceedances`, with shape (n, 2). `own` is the part of each due to the weight, by
-    default all. A vertical motion changes only this part. The threshold is infinite on one side if a block rocks to the
-    other side only.
+    The thresholds, shape (n, 2), are pairs as for `exceedances`. `own` is the part due to the weight, by default all,
+    which alone changes with a vertical motion. Thresholds are infinite on sides without rocking.
     """
     pairs = np.asarray(thresholds, dtype=np.float64)
     weighing = pairs if own is None else np.asarray(own, dtype=np.float64)
@@ -390,7 +388,7 @@ def _push(motion: Motion, threshold_over_g: float) -> Motion:
 
 
 def _reaching(motion: Motion, level: float) -> Flags:
-    """Return which pieces may reach this magnitude; few in a record with few strong pulses."""
+    """Return which pieces may reach this magnitude, often few."""
     bounds = piecewise.bounds(np.diff(motion.breakpoints), motion.coefficients)
     return np.asarray(bounds >= level * (1.0 - 1e-12))
 

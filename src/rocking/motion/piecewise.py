@@ -20,8 +20,8 @@ _JUMP: Final = 1e-12
 #: Even breakpoints leave their grid by at most this fraction of the duration, some units in its last place.
 _ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 
-#: Far above any ground motion, and small enough that squares and integrals in measures do not overflow. The solvers do
-#: not terminate above 1e42 m/s^2.
+#: Far above any ground motion, but small enough that squares and integrals in measures do not overflow, and that the
+#: solvers terminate (up to 1e42 m/s^2).
 STRONGEST: Final = 1e30
 _LONGEST: Final = 1e15
 
@@ -61,7 +61,7 @@ def even_step(pieces: Piecewise) -> float | None:
 
 
 def jumps(pieces: Piecewise) -> bool:
-    """Return whether a piece starts away from the end of the previous one by more than rounding."""
+    """Return whether a piece starts off the end of the previous one, beyond rounding."""
     return bool(np.any(jumps_after(pieces)[:-1]))
 
 
@@ -73,7 +73,7 @@ def jumps_after(pieces: Piecewise) -> Flags:
 
 
 def samples(pieces: Piecewise) -> tuple[Floats, Floats]:
-    """Return times (s) and values at the breakpoints; at a jump, the value after it."""
+    """Return times (s) and values at the breakpoints, after a jump there."""
     last = value(pieces.coefficients[-1], np.diff(pieces.breakpoints)[-1])
     return pieces.breakpoints, np.append(pieces.coefficients[:, 0], last)
 
@@ -88,7 +88,7 @@ def value(coefficients: Floats, x: Floats) -> Floats:
 
 
 def at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floats:
-    """Return the value at `time`, clipped to the span of the breakpoints; at a jump, the value after it."""
+    """Return the value at `time`, clipped to the span of the breakpoints, after a jump there."""
     inside = np.clip(time, breakpoints[0], breakpoints[-1])
     piece = np.minimum(np.searchsorted(breakpoints, inside, side="right"), len(coefficients)) - 1
     return value(coefficients[piece], inside - breakpoints[piece])
@@ -166,7 +166,7 @@ def together(one: Piecewise, other: Piecewise) -> tuple[Floats, tuple[Floats, Fl
 
 
 def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
-    """Return a superset of the roots of each piece; shape (pieces, degree), sorted along each row.
+    """Return a superset of the roots of each piece, shape (pieces, degree), sorted along each row.
 
     Rows are padded with points that are not roots, which is harmless in a search for extrema.
     """
@@ -199,7 +199,7 @@ def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
 
 
 def _significant_degrees(pieces: Floats) -> Integers:
-    """Return the degree of each piece; a leading coefficient far below rounding would distort the roots."""
+    """Return the degree of each piece without leading coefficients far below rounding, which distort the roots."""
     sizes = np.abs(pieces)
     significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
     last = pieces.shape[1] - 1 - np.argmax(significant[:, ::-1], axis=1)

@@ -40,7 +40,7 @@ _Step = Callable[[Piecewise], Processed]
 
 
 class Processable(Measured):
-    """Methods that derive motions from a motion; a base class of `Motion` only."""
+    """Methods of `Motion` that derive other motions."""
 
     name: str
     description: Description
@@ -69,7 +69,7 @@ class Processable(Measured):
         azimuth : float
             Positive direction of the result, degrees clockwise from north.
         recorded : pair of float, optional
-            Azimuths of this component and the other, degrees clockwise from north; by default from their records.
+            Azimuths of both components, degrees clockwise from north, by default from their records.
 
         Returns
         -------
@@ -115,7 +115,7 @@ class Processable(Measured):
         )
 
     def delayed(self, delay: float) -> Self:
-        """Return the motion after a time of zero acceleration, s; ``processed(trim=...)`` removes an early part."""
+        """Return the motion after a time of zero acceleration, s. ``processed(trim=...)`` removes an early part."""
         wait = checks.positive(delay, "delay", InvalidMotion, "s")
         return self._changed(
             "delayed",
@@ -133,13 +133,13 @@ class Processable(Measured):
         period, damping : float
             Natural period of the building, s, and its fraction of critical damping.
         ringing : float, optional
-            Time after the ground motion until which the floor motion is computed, s; by default until a free
-            oscillation has decayed to a thousandth.
+            Duration of the floor motion after the ground motion, s, by default until a free oscillation decays to a
+            thousandth.
 
         Returns
         -------
         Motion
-            Polynomials of degree 9 on pieces of at most a quarter radian; the vertical component is unchanged.
+            Polynomials of degree 9 on pieces of at most a quarter radian, with unchanged vertical component.
 
         Raises
         ------
@@ -148,9 +148,9 @@ class Processable(Measured):
 
         Notes
         -----
-        In a building with one mode, this is the motion of the floor at which mode shape times participation factor is
-        1. The motion at a value of 0.6 is ``ground + (floor + -ground) * 0.6``. Contents do not act back on the floor.
-        The hazard curve of the ground does not apply to a fragility in terms of floor measures.
+        In a building with one mode, this is the motion of the floor where mode shape times participation factor is 1.
+        At 0.6 the motion is ``ground + (floor + -ground) * 0.6``. Contents do not act back on the floor. A hazard curve
+        of the ground does not apply to a fragility against floor measures.
         """
         breakpoints, coefficients, error = _floor_pieces(self, period, damping, ringing, self.error)
         done = f"on a floor of period {period:.6g} s, damping {damping:.6g}"
@@ -165,27 +165,27 @@ class Processable(Measured):
         order: int | None = None,
         resample: float | None = None,
     ) -> Self:
-        """Return a processed motion; the steps run in the order of the parameters and are recorded in `history`.
+        """Return a processed motion, with steps in the order of the parameters and recorded in `history`.
 
         Parameters
         ----------
         trim : (start, end)
-            Part to keep, s; its start becomes time 0. For even samples the ends move to the nearest sample.
+            Part to keep, s, whose start becomes time 0. For even samples the ends move to the nearest sample.
         baseline : int
             Degree of the polynomial in time that is fitted to the samples by least squares and subtracted.
         band_pass : (low, high)
             Corner frequencies of a Butterworth filter, Hz, run forwards and backwards (no phase shift) with temporary
-            zeros before and after the samples; None leaves that side open.
+            zeros before and after. None leaves that side open.
         order : int
-            Order of the filter in each direction, 4 by default; only with `band_pass`.
+            Order of the filter in each direction with `band_pass`, 4 by default.
         resample : float
-            New sampling step, s: values of the motion at its multiples, joined by straight lines. Before a coarser
-            step, use `band_pass` to remove content above its Nyquist frequency.
+            New sampling step, s: values at its multiples, joined by straight lines. For a coarser step, use `band_pass`
+            to remove content above its Nyquist frequency.
 
         Returns
         -------
         Motion
-            Processed motion with the same name; both components are processed alike.
+            Motion with the same name, and both components processed alike.
 
         Raises
         ------
@@ -217,7 +217,7 @@ class Processable(Measured):
         """Return the part between two times (s) after these steps."""
         motion: Piecewise = self
         history = self.history
-        # A motion made of samples consists of the exact lines between them from this step on.
+        # From this step on the motion is exactly the lines between the samples.
         error = 0.0 if steps else self.error
         if kept is not None:
             start, end = kept[0], min(kept[1], self.duration)

@@ -43,10 +43,10 @@ class Measure:
     ----------
     name : {"factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
         Factor on the motion, peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2), or a
-        dimensionless measure of the block. "pga_ratio" is the peak acceleration divided by the uplift acceleration,
-        "pgv_ratio" the peak velocity divided by the product of the uplift acceleration and the block's time scale 1/p.
-        For a free block these are PGA/(g tan alpha) and p PGV/(g tan alpha), in the linear model with alpha for tan
-        alpha. Restraints and leaning change the uplift acceleration.
+        dimensionless measure of the block: "pga_ratio" is the peak acceleration divided by the uplift acceleration,
+        "pgv_ratio" the peak velocity divided by the uplift acceleration and the time scale 1/p. For a free block these
+        are PGA/(g tan alpha) and p PGV/(g tan alpha), in the linear model with alpha for tan alpha. Restraints and
+        leaning change the uplift acceleration.
     period, damping : float, optional
         Period of the oscillator of "sa", s, and its fraction of critical damping.
 
@@ -86,7 +86,7 @@ class Measure:
 
     @classmethod
     def of(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
-        """Return a measure, or the measure with a name that is in the list of accepted ones."""
+        """Return a measure, or the measure with an accepted name."""
         name = measure.name if isinstance(measure, Measure) else measure
         checks.one_of(name, "measure", InvalidOption, among)
         if isinstance(measure, Measure):
@@ -97,7 +97,7 @@ class Measure:
 
     @property
     def units(self) -> str:
-        """Units of the measure; "1" for a dimensionless measure."""
+        """Units of the measure, or "1"."""
         return _MEASURES[self.name][0]
 
     @property
@@ -133,11 +133,11 @@ class Measure:
 
     @property
     def shown_in(self) -> str:
-        """Units for display; empty for a dimensionless measure."""
+        """Units for display, empty for a dimensionless measure."""
         return {"m/s^2": "g", "m/s": "m/s", "1": ""}[self.units]
 
     def shown(self, value: float) -> str:
-        """Return a value with its unit, to six digits; an acceleration also in g."""
+        """Return a value with its unit, to six digits, and accelerations also in g."""
         if self.units == "m/s^2":
             return f"{value:.6g} m/s^2 ({value / STANDARD_GRAVITY:.4g} g)"
         return f"{value:.6g}" if self.units == "1" else f"{value:.6g} {self.units}"
@@ -153,7 +153,7 @@ class Measure:
         return self if self.of_motion == self.name else Measure(self.of_motion, self.period, self.damping)
 
     def value(self, motion: Measured) -> float:
-        """Return the measure of a motion alone, in SI units; 1 if levels are factors."""
+        """Return the measure of a motion alone, in SI units, or 1 if levels are factors."""
         if self.period is not None:
             return float(motion.spectral_acceleration(self.period, self.damping))
         if self.of_motion == "factor":
@@ -180,7 +180,7 @@ class Measure:
         return lifting if self.name == "pga_ratio" else lifting / p
 
     def options(self) -> dict[str, float]:
-        """Return period (s) and damping of "sa"; empty for all other measures."""
+        """Return period (s) and damping of "sa", or nothing for other measures."""
         return {} if self.period is None else {"period": self.period, "damping": self.damping}
 
     def scaling(self, level: float, factor: float) -> str:

@@ -1,8 +1,8 @@
 """Strong-motion records shipped with the package.
 
-The catalogue contains every channel of three stations: China Lake and Tower 2 in the 2019 Ridgecrest earthquake (M
-7.1), and the free field of the Meloland overpass in El Centro in the 1979 Imperial Valley earthquake, whose 270 degree
-channel has a near-fault pulse. The values are exactly those published.
+It contains every channel of three stations: China Lake and Tower 2 in the 2019 Ridgecrest earthquake (M 7.1), and the
+free field of the Meloland overpass in El Centro in the 1979 Imperial Valley earthquake, whose 270 degree channel has a
+near-fault pulse. The values are exactly those published.
 """
 
 from __future__ import annotations
@@ -127,8 +127,8 @@ def load(name: str) -> Motion:
     """Load a shipped record as a motion, linear between samples, with the published values in m/s^2.
 
     The Ridgecrest records are uncorrected. Their mean is zero, but the baseline of the instruments moves by some mm/s^2
-    during the shaking. This drift does not affect a rocking block, but the displacement drifts by metres. To remove the
-    drift, use::
+    during the shaking, so the displacement drifts by metres. This does not affect a rocking block. To remove the drift,
+    use::
 
         rocking.records.load("ridgecrest-clc-090").processed(baseline=0, band_pass=(0.05, None))
 

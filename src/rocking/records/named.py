@@ -27,14 +27,14 @@ Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
 
 
 def one_motion(motion: Motion | None) -> Motion | None:
-    """Return a motion (None is free rocking), or raise an error for another type."""
+    """Return a motion (None is free rocking), or raise an error."""
     if motion is not None and not isinstance(motion, Motion):
         raise InvalidMotion(_refusal(motion))
     return motion
 
 
 def several_motions(motions: Motions) -> list[Motion]:
-    """Return one motion or several as a list; motions of a mapping are renamed by its keys."""
+    """Return one motion or several as a list, renamed by the keys of a mapping."""
     if isinstance(motions, Mapping):
         several = several_motions([*motions.values()])
         return [replace(motion, name=name) for name, motion in zip(motions, several, strict=True)]
@@ -103,8 +103,8 @@ def named_motion(
 ) -> Motion:
     """Return the scaled motion of a record file ("-" is standard input), or of a shipped record if no file exists.
 
-    The channel, dt and units are optional. With `several`, they apply to several files: files that state their step and
-    units keep them, and a file with one channel is used whatever the channel's name.
+    Channel, dt and units are optional. With `several`, they apply to several files: files that state step and units
+    keep them, and the name of a single channel does not matter.
     """
     several = several or (vertical is not None and _stands_alone(vertical))
     if is_shipped(name):
@@ -142,7 +142,7 @@ def refuse_what_is_known(name: str, **said: object) -> None:
 
 
 def is_there(name: str | Path) -> bool:
-    """Return whether a file or folder exists; the name may be too long for one."""
+    """Return whether a file or folder exists, also for names too long for one."""
     return os.path.exists(name)  # noqa: PTH110 - Path.exists() raises then
 
 
@@ -176,13 +176,13 @@ class Contents:
     Attributes
     ----------
     title : str
-        Title of the list; may be empty.
+        Title of the list, possibly empty.
     facts : dict
         Properties common to all entries.
     kind : {"records", "channels"}
         Kind of the entries.
     entries : list of dict
-        Entries with the same names in the same order; units are in the names.
+        Entries with the same names, including units, in the same order.
     motions : tuple of Motion
         Motions of a file's channels.
     """
@@ -206,7 +206,7 @@ class Contents:
         return f"<Contents: {'; '.join(filter(None, (self.title, f'{len(self.entries)} {kind}: {names}')))}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table as plain values: the facts, and the entries under their kind."""
+        """Return the facts, and the entries under their kind."""
         return {**self.facts, self.kind: self.entries}
 
 
@@ -257,7 +257,7 @@ def contents(
     channel, dt, units : str or float, optional
         As for `rocking.read`; by default all channels are listed.
     several : bool
-        Whether the arguments apply to several files; files that state their step and units then keep them.
+        Whether the arguments apply to several files. Files that state step and units then keep them.
 
     Returns
     -------

@@ -18,7 +18,7 @@ from rocking.records.formats.source import Request, Source, open_source
 __all__ = ["Channel", "Identification", "channels", "identify", "read"]
 
 
-#: Formats with a header, in the order of recognition; add a new format here.
+#: Formats with a header, in the order of recognition.
 FORMATS: Final = (headed.AT2, csmip.COSMOS, csmip.V1, csmip.V2, headed.SMC, headed.ESM, headed.KNET)
 #: The last two accept content without a recognised header.
 _RECOGNISERS: Final = (*(each.recognise for each in FORMATS), table.recognise, through_obspy.recognise)
@@ -40,9 +40,9 @@ def read(
         (accelerations), two (times, accelerations) or more named by a heading (times, then channels), or any file that
         ObsPy reads if the `formats` extra is installed. The format is recognised from the content.
     channel : int or str, optional
-        Number or name of the channel; required only if the file contains several.
+        Number or name of the channel, required only if the file contains several.
     dt : float, optional
-        Sampling step, s; required only for one column of accelerations, and for times printed with too few digits.
+        Sampling step, s, required only for one column of accelerations, and for times printed with too few digits.
         Otherwise it must agree with the file.
     units : {"g", "m/s2", "cm/s2", "gal", "mm/s2", "mg"}, optional
         Units of the accelerations, which override a heading. Required only if the file does not state them: ObsPy's
@@ -51,14 +51,14 @@ def read(
     Returns
     -------
     Motion
-        Motion in m/s^2, linear between the samples, with time measured from the first sample. A constant instrument
-        offset, as in K-NET files, is not removed.
+        Motion in m/s^2, linear between the samples, from time 0. A constant instrument offset, as in K-NET files, is
+        kept.
 
     Raises
     ------
     UnreadableRecord
-        If the file is missing or unreadable, its format is unknown, its content contradicts its header, a number is
-        damaged, or the channel is unknown or not specified. The message contains file, line and correction.
+        If the file is missing, unreadable or inconsistent, its format is unknown, a number is damaged, or the channel
+        is unknown or not specified. The message contains file, line and correction.
     InvalidMotion
         If `dt` is not a positive number, or the samples do not form a motion.
 

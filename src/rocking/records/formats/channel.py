@@ -41,8 +41,7 @@ def even_step(times: Floats) -> float | None:
     resolution = _resolution(times, rounding)
     multiple = round(mean / resolution) * resolution if resolution else 0.0
     if abs(multiple - mean) <= (resolution + rounding) / intervals:
-        # The decimals can represent this step, so nothing is rounded, and a missing sample must not be taken for
-        # rounding.
+        # The decimals represent this step exactly. A missing sample must not pass for rounding.
         return _simplest_fit(times, multiple, rounding, _JITTER * mean + rounding)
     if resolution > 0.5 * mean:
         return None
@@ -65,7 +64,7 @@ def prints_as(times: Floats, step: float) -> bool:
 
 
 def _resolution(times: Floats, rounding: float) -> float:
-    """Return the place of the last printed decimal of the times, s; 0 for all digits."""
+    """Return the place of the last printed decimal of the times, s, or 0 for all digits."""
     for decimals in range(10):
         scaled = times * 10.0**decimals
         if float(np.abs(scaled - np.rint(scaled)).max()) <= max(_JITTER, rounding * 10.0**decimals):
@@ -74,7 +73,7 @@ def _resolution(times: Floats, rounding: float) -> float:
 
 
 def _simplest_fit(times: Floats, step: float, drift: float, allowed: float) -> float | None:
-    """Return the step (s) of fewest digits within `drift` of `step` over all times; None if they leave its grid."""
+    """Return the step (s) of fewest digits within `drift` of `step` over all times, or None off its grid."""
     candidates = (float(f"{step:.{digits}g}") for digits in range(1, 18))
     simplest = next((each for each in candidates if abs(each - step) * len(times) <= drift), step)
     spread = float(np.ptp(times - simplest * np.arange(len(times))))
@@ -84,7 +83,7 @@ def _simplest_fit(times: Floats, step: float, drift: float, allowed: float) -> f
 def timing(
     source: Source, request: Request, written: Floats, unit: Unit, at: int, row_at: Callable[[int], int] | None = None
 ) -> tuple[float | None, Floats | None]:
-    """Return the step (s) of times in a unit, or else the times (s), and check them against the requested step."""
+    """Return the step (s) of times in a unit, or else the times (s), checked against the requested step."""
     times, row_at = unit.to_si(written), row_at or (lambda _: at)
     fault = first_fault(times)
     step = even_step(written) if fault is None and len(written) > 1 else None
@@ -130,13 +129,13 @@ class Channel:
     number : int
         Channel number in the file, counted from 1 if the file states none.
     acceleration : ndarray, shape (n,)
-        Acceleration, m/s^2; a constant instrument offset is not removed.
+        Acceleration, m/s^2, including a constant instrument offset.
     dt : float or None
-        Sampling step, s; None for uneven samples.
+        Sampling step, s, or None for uneven samples.
     times : ndarray, shape (n,), or None
-        Instants of uneven samples, s; None for even samples.
+        Instants of uneven samples, s, or None for even samples.
     azimuth : float or None
-        Direction of positive acceleration, degrees clockwise from north; None if vertical or unknown.
+        Direction of positive acceleration, degrees clockwise from north, or None if vertical or unknown.
     units : str
         Units of the numbers in the file, as spelled there.
     station, event : str
@@ -144,7 +143,7 @@ class Channel:
     metadata : mapping of str to str
         Other facts: format, file, location, retained content, ...
     start : float or None
-        Instant of the first sample by the file's clock, s; None if unknown.
+        Instant of the first sample by the file's clock, s, or None if unknown.
 
     See Also
     --------
@@ -181,7 +180,7 @@ class Channel:
         return f"{self.number} {self.name!r}"
 
     def motion(self) -> Motion:
-        """Return the channel as a motion, linear between samples, with time measured from the first sample.
+        """Return the channel as a motion, linear between samples, from time 0.
 
         Returns
         -------

@@ -1,8 +1,8 @@
 """Conversion of numbers in bulk, and one reader for every format with a header.
 
-A format defines how it is recognised and, in a function of a channel's header, the location of count, step, unit,
-labels and layout of the numbers. The rest is shared by all formats: which channel comes next, whether the numbers are
-finite and as many as stated, whether step and unit agree with the request, and construction of the channel.
+A format defines its recognition and, in a function of a channel's header, the location of count, step, unit, labels and
+layout of the numbers. All formats share the rest: the next channel, checks that the numbers are finite and as many as
+stated and that step and unit agree with the request, and construction of the channel.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _NUMBER: Final = re.compile(rf"({NUMBER})\s*$")
 
 @dataclass
 class Header:
-    """Header of one channel, read line by line by a format; the numbers begin at `end`."""
+    """Header of one channel, read line by line by a format; numbers begin at `end`."""
 
     source: Source
     form: Format
@@ -99,7 +99,7 @@ class Header:
         return next((line.start for line in self.lines if pattern.search(line.text)), self.end)
 
     def positive(self, key: re.Pattern[str], form: re.Pattern[str] = _NUMBER) -> list[float]:
-        """Return the numbers that follow a key in this form; each must be positive."""
+        """Return the positive numbers that follow a key in this form."""
         found = form.match(self.text(key))
         numbers = [parse(group.encode("latin-1")) or 0.0 for group in found.groups()] if found else [0.0]
         if not all(number > 0.0 for number in numbers):
@@ -174,7 +174,7 @@ class Format(NamedTuple):
         return channels
 
     def _end(self, source: Source, start: int) -> int:
-        """Return the end of the numbers of a channel: the end of the file, or a line that begins other content."""
+        """Return the end of a channel's numbers: the end of the file, or a line that begins other content."""
         end = numeric_end(source, start) if self.several else len(source.data)
         line = source.line(end)
         ends = _END_OF_DATA.match(line.text) or self.begins(line) or self.other.search(line.text)
@@ -232,7 +232,7 @@ def number(text: str) -> float:
 
 
 def step_of(rate: float) -> float:
-    """Return the step, s, for a number of samples per second; 0 for 0."""
+    """Return the step, s, for this many samples per second, or 0 for 0."""
     return 1.0 / rate if rate else 0.0
 
 
@@ -276,7 +276,7 @@ def numeric_end(source: Source, start: int) -> int:
 
 
 def read_values(source: Source, start: int, end: int, layout: Layout | None, stated: Stated) -> Floats:
-    """Return all numbers between the offsets `start` and `end`, which begin lines; their count must be as stated."""
+    """Return all numbers between the offsets `start` and `end` of lines, as many as stated."""
     values, reached = _in_blocks(source, start, end, None)
     further = reached
     if layout is not None and not (reached == end and stated.fits(len(values))):
@@ -284,7 +284,7 @@ def read_values(source: Source, start: int, end: int, layout: Layout | None, sta
         if further == end and (reached < end or stated.fits(len(columns))):
             values, reached = columns, end
     if reached < end:
-        # The file was written for the reading that got further, so its error message is the helpful one.
+        # The reading that got further has the helpful error message.
         bad = _first_bad(source, reached, None), _first_bad(source, further, layout)
         raise not_a_number(source, *max(bad, key=lambda each: each[1]))
     if not stated.fits(len(values)):
@@ -304,7 +304,7 @@ def not_a_number(source: Source, token: bytes, at: int) -> UnreadableRecord:
 
 
 def parse(token: bytes) -> float | None:
-    """Return the number written by `token` (also with D exponent; possibly not finite), or None."""
+    """Return the number written by `token` (also with D exponent, possibly not finite), or None."""
     if len(token) > _LONGEST or b"_" in token:
         return None
     try:
@@ -314,7 +314,7 @@ def parse(token: bytes) -> float | None:
 
 
 def convert(tokens: list[bytes]) -> Floats | None:
-    """Return the numbers written by the tokens (also with D exponents), or None if one is not a finite number."""
+    """Return the numbers written by the tokens (also with D exponents), or None unless all are finite."""
     if not tokens:
         return np.empty(0)
     joined = b"\n".join(tokens)

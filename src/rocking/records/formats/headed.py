@@ -51,9 +51,8 @@ def _at2(header: Header) -> Said:
     )
 
 
-# USGS SMC: 11 text lines, 48 integers, 50 reals, comments. Integer 16 is the number of comment lines, integer 17 the
-# number of values, after which the last row may be padded. Real 2 is the rate. A digitised film has no rate and its
-# values are pairs.
+# USGS SMC: 11 text lines, 48 integers, 50 reals, comments. Integer 16 counts the comment lines, integer 17 the values,
+# after which the last row may be padded. Real 2 is the rate. Digitised films have no rate and pairs of values.
 
 _SMC_TITLE: Final = re.compile(
     r"(?i)^\s*([0-6])\s+(unknown|(?:un)?corrected accelerogram|velocity|displacement|response|fourier)"
@@ -117,7 +116,7 @@ def _knet(header: Header) -> Said:
         header.at(_KNET["Scale Factor"]),
         "gal",
         1.0 / rate,
-        # The duration is in whole seconds. With fewer samples some are missing, and a surplus of a second is too many.
+        # The duration is in whole seconds. Fewer samples, or a surplus of a second, are errors.
         Stated(seconds * rate, header.at(_KNET["Duration Time"]), "the duration", more=rate - 1.0),
         {
             "name": name,

@@ -30,7 +30,7 @@ _SUFFIX: Final = re.compile(r"(?i)(?:(?<![^\W_])a|(?:acc|acel|beschl)[^\W_]*)_(?
 _BREAK: Final = re.compile(r"[\s_/,;:.-]+(?:in\s+)?")
 #: Line without content: a rule, or delimiters only.
 RULE: Final = re.compile(r"[-=_~+|\s]{3,}|#+|[,;\s]*")
-#: Possible unit; the number in "channel (3)" is not a unit.
+#: Possible unit, unlike the number in "channel (3)".
 _UNIT_LIKE: Final = re.compile(r".*(?:[^\W\d_]|[%°])")
 
 _TIMES: Final = {"t", "time", "times", "timestamp", "zeit", "temps", "tiempo", "tempo", "tid", "tijd"}
@@ -45,7 +45,7 @@ _ACCELERATION: Final = re.compile(r"(?i)\b(a|acc\w*|acel\w*|beschl\w*)(?![a-z])"
 
 
 class Column(NamedTuple):
-    """Column according to a heading; `strange` is the text of an unknown unit."""
+    """Column according to a heading, with the text of an unknown unit (`strange`)."""
 
     kind: Kind
     name: str
@@ -143,7 +143,7 @@ def _words(name: str) -> set[str]:
 
 
 def _time_of(line: str) -> Unit | None:
-    """Return the unit of time in a name; "ns" alone means north and south."""
+    """Return the unit of time in a name, except in "ns" (north and south)."""
     return None if line.lower() == "ns" else next(filter(None, map(find_time_unit, _texts(line))), None)
 
 
@@ -169,7 +169,7 @@ def _acceleration_unit(cell: tuple[str, ...], rest: str) -> tuple[Unit | None, s
 
 
 def _cells(line: str, count: int, delimiter: str) -> tuple[str, ...]:
-    """Return the names in a line with this many columns, or none if the line cannot be split into them."""
+    """Return the names in a line with this many columns, or none if it cannot be split."""
     if count == 1:
         return (line.strip(),)
     for split, sure in _ways(delimiter):
@@ -201,7 +201,7 @@ def _texts(name: str) -> list[str]:
 
 
 def _ends(name: str) -> Iterator[str]:
-    """Yield ends of a name that may be its unit, the longest first; "g" alone only after an acceleration."""
+    """Yield ends of a name that may be its unit, the longest first, and "g" alone only after an acceleration."""
     yield _bare(name)
     text = _without_brackets(name).rstrip("_. ")
     for found in _BREAK.finditer(text):

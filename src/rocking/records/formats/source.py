@@ -18,10 +18,10 @@ from rocking.errors import InvalidMotion, UnreadableRecord, literal
 from rocking.records import catalogue
 from rocking.records.units import CHOICES, Unit, choose_unit, find_unit
 
-#: Largest accepted file, bytes; the longest strong-motion records are a hundred times smaller.
+#: Largest accepted file, bytes, a hundred times the longest strong-motion records.
 SIZE_LIMIT = 512 * 2**20
 
-#: Header lines are decoded up to this length, so that a file without line ends costs no more than any other.
+#: Decoded length of header lines, which limits the cost of files without line ends.
 LINE_LIMIT = 512
 
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n")
@@ -85,7 +85,7 @@ class Source:
 
     @cached_property
     def is_binary(self) -> bool:
-        """Whether at least one byte in a hundred cannot occur in a text file; stray ones are accepted."""
+        """Whether at least one byte in a hundred cannot occur in a text file."""
         return len(self.data.translate(None, _CONTROL)) < 0.99 * len(self.data)
 
     def error(self, message: str, at: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
@@ -95,7 +95,7 @@ class Source:
 
 
 def unreadable(name: str, error: Exception) -> UnreadableRecord:
-    """Return an error for a file that could not be opened, with a similar shipped record if there is one."""
+    """Return an error for a file that could not be opened, with any similar shipped record."""
     text = f"this file could not be read ({getattr(error, 'strerror', None) or error}); check the name and the disk"
     if isinstance(error, FileNotFoundError):
         shipped = {each: f"the shipped record {each}" for each in catalogue.names()}
@@ -141,18 +141,17 @@ def _text(raw: bytes) -> bytes:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", "replace").encode("latin-1", "replace")
     data = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    # At the start of a line a form feed is a page break of the printer and does not occupy a column.
+    # A form feed at the start of a line is a page break and does not occupy a column.
     data = data.removeprefix(b"\f").replace(b"\n\f", b"\n").replace(b"\f", b" ")
     return data.rstrip(b"\x00\x1a")
 
 
 @dataclass(frozen=True)
 class Request:
-    """Arguments `dt` (s), `units` and `channel` of a read; None if the file should state them.
+    """Arguments `dt` (s), `units` and `channel` of a read, or None if the file should state them.
 
-    ``most`` is the largest number of samples that may be unpacked from a compressed file; None is unlimited. For
-    several files, the arguments apply to files that do not state the values or contain several channels. For a single
-    file they must not contradict it.
+    ``most`` limits the number of samples unpacked from a compressed file, unless None. For several files, the arguments
+    apply to files that do not state the values or contain several channels. They must not contradict a single file.
     """
 
     dt: float | None = None
@@ -176,7 +175,7 @@ class Request:
 
     def step(self, source: Source, stated: float, at: int | None) -> float:
         """Return the step (s) that the file states at the offset `at`, after checks."""
-        # A file contains at most as many samples as bytes, so this also bounds the duration of the record.
+        # Files contain fewer samples than bytes, so this also bounds the record's duration.
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):

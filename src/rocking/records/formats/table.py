@@ -1,10 +1,10 @@
 """Plain text and CSV: accelerations with dt=, times and accelerations, or the columns named by a heading.
 
-Columns and units come from the heading (`heading`) or units=; times are in seconds by default. Heading lines and
+Columns and units come from the heading (`heading`) or units=. Times are in seconds by default. Heading lines and
 comments (#, %, !, //) are skipped, except lines that look like a damaged row. The delimiter is a semicolon (a comma is
 then the decimal sign), a comma, or blanks. Between blanks a comma within a number is the decimal sign. Numbers may be
 quoted and may have Fortran exponents (1.0D-3). Rows such as "1,5" in a file without any point, and without two names
-above them, may be one number or two and are therefore rejected.
+above, are ambiguous and rejected.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _DELIMITERS: Final = {",": "a comma", ";": "a semicolon", " ": "a blank"}
 
 #: Largest number of heading lines.
 HEADING_LINES: Final = 1000
-#: Longest row of numbers; longer lines are rejected before they are split.
+#: Longest row of numbers. Longer lines are rejected before splitting.
 _ROW_LIMIT: Final = 1024
 #: Text after a longer piece on its line may not be seen.
 _LONG: Final = 300
@@ -133,7 +133,7 @@ class _Table(NamedTuple):
         return {"dt": dt, "times": instants, "start": float(unit.to_si(numbers[:1, column])[0])}
 
     def _check_step(self, dt: float | None) -> None:
-        """Raise an error for a table without times if no step is specified, or if its heading states another one."""
+        """Raise an error for a table without times if the step is missing or differs from its heading."""
         said = "the file does not say its sampling step"
         for line in itertools.takewhile(lambda line: line.start < self.start, self.source.lines(0, HEADING_LINES)):
             match = _STATES_STEP.search(line.text)
@@ -209,7 +209,7 @@ def recognise(source: Source) -> Recognised | None:
 
 
 def refusal(source: Source) -> UnreadableRecord | None:
-    """Return the reason why an apparent table cannot be read, or None if it does not look like a table."""
+    """Return the reason why an apparent table cannot be read, or None for other content."""
     table = _table(source)
     if table is None:
         return None
@@ -258,11 +258,10 @@ def _tokens(line: Line, translation: bytes) -> list[bytes]:
 
 
 def _damaged(text: str, tokens: list[bytes], columns: int, *, named: bool) -> bytes:
-    """Return the first non-numeric piece of a line above the rows if the line looks like a row; else empty bytes.
+    """Return the first non-numeric piece of a line above the rows if the line looks like a row, else empty bytes.
 
-    A line looks like a row if all pieces look like numbers. A line with as many pieces as columns and at least one
-    number also does if it is below names, or if it has delimiters other than blanks and either its first piece is a
-    number or a number has a point.
+    In a row all pieces look like numbers, or there are as many as columns with a number among them, below names or with
+    delimiters other than blanks and a number that is first or has a point.
     """
     strange = [token for token in tokens if parse(token) is None]
     numbers = [token for token in tokens if parse(token) is not None]

@@ -16,7 +16,7 @@ from rocking.records.formats.channel import Channel, Recognised, channel_of
 from rocking.records.formats.source import Request, Source
 from rocking.records.units import Unit
 
-#: PICKLE executes code from a file; the other two open further files that a file names.
+#: PICKLE executes code from a file. The other two open files named in a file.
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
 _TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
@@ -43,7 +43,7 @@ def recognise(source: Source) -> Recognised | None:
 
 
 def _read(source: Source, name: str, request: Request) -> list[Channel]:
-    """Return all traces of the file, times their calibration factor."""
+    """Return all traces of the file times their calibration factor."""
     unit = request.units(source, None, None)
     if request.most is not None:  # the file states its number of samples before they are unpacked
         heads = _traces(source, name, headonly=True)
@@ -67,7 +67,7 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, name: str
         raise source.error(f"trace {number} has gaps, or no numbers; get a record without gaps")
     with np.errstate(all="ignore"):
         values = np.asarray(trace.data, dtype=np.float64).reshape(len(trace.data)) * float(stats.calib)
-    # SAC states the azimuth of a component, and its angle from the vertical, about a right angle for horizontal ones.
+    # SAC states the azimuth of a component and its angle from the vertical, about 90 degrees if horizontal.
     sac = {"cmpaz": None, "cmpinc": None, **stats.get("sac", {})}
     horizontal = None not in (sac["cmpaz"], sac["cmpinc"]) and abs(sac["cmpinc"] - 90.0) <= 5.0
     return channel_of(
@@ -118,7 +118,7 @@ def _opened(source: Source) -> io.BytesIO:
 
 
 def _traces(source: Source, name: str, *, headonly: bool = False) -> Any:
-    """Return ObsPy's traces, or the reason for their absence; only their headers if the format supports it."""
+    """Return ObsPy's traces (only headers if supported and requested), or the reason for their absence."""
     import obspy
     from obspy.io.mseed import InternalMSEEDWarning
 
