@@ -147,7 +147,7 @@ class Calibration(Result):
         return Scores.of(self.probabilities, self.observed)
 
     def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
-        """Compute the probability that each of m motions overturns the specimen, shape (m,).
+        """Compute the probability of overturning under m motions, shape (m,).
 
         The weighted share of the ensemble that overturns is bounded away from 0 and 1 by the lapse.
         """
@@ -286,7 +286,7 @@ class Calibration(Result):
 def overturned_under(
     blocks: Bodies, motions: Motions, model: Model, threads: int | None, progress: bool | None
 ) -> NDArray[np.float32]:
-    """Return 1 for overturning, 0 for none, 0.5 for an abandoned simulation; shape (n, m)."""
+    """Return 1 for overturning, 0 for none, 0.5 for an abandoned simulation, shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
     note_missing(simulated.unfinished.values)
     known = simulated.overturned.astype(np.float32).where(~simulated.unfinished, np.float32(0.5))
@@ -300,7 +300,7 @@ def chances_of(share: Floats, effective: float, lapse: float) -> Floats:
 
 
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
-    """Return the group of each motion, numbered from 0; by default each motion is a group."""
+    """Return the group of each motion, numbered from 0. By default each motion is a group."""
     labels = groups_of(range(count) if groups is None else groups, "groups", count)
     checks.whole(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
@@ -344,8 +344,8 @@ def calibrate(
     lapse : float
         Probability that an outcome does not come from a rocking block.
     candidates : int
-        Approximate number of blocks simulated under every distinct motion, up to twice as many while runs disagree or
-        few candidates represent a typical population.
+        Approximate number of blocks simulated under every distinct motion, up to twice as many if runs disagree or few
+        represent a typical population.
     ensemble : int
         Largest number of blocks for predictions.
     seed : int
@@ -376,7 +376,7 @@ def calibrate(
     slendernesses. The posterior over populations is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra
     2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs fill the bounds evenly, then
     add blocks near their own best fits. Weights inverse to the density of candidates preserve the prior (deterministic
-    mixture; Owen and Zhou 2000).
+    mixture, Owen and Zhou 2000).
 
     Two mirrored blocks often explain the outcomes equally well. The estimates of each side are then wide, but the
     predictions are not.
@@ -426,7 +426,7 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
     centres, dispersions = unpacked(populations)
     sides = dispersions[:, : len(space.unknown)].copy()
     if space.two_sided:
-        # Logarithm of a side: that of the mean plus or minus half the ratio's.
+        # The mean's logarithm plus or minus half the ratio's.
         sided = space.unknown.index(SIDED)
         sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersions[:, -1])
     dispersion = dict(zip(space.unknown, sides.mean(axis=0).tolist(), strict=True))

@@ -208,8 +208,8 @@ def with_outliers(probabilities: Floats, lapse: float) -> Floats:
 #: Number of independent runs.
 RUNS: Final = 2
 
-#: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the guiding likelihood.
-#: Runs that disagree, or too few effective candidates, add at most `_MORE` parts.
+#: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the guiding likelihood. The
+#: search continues at most `_MORE` times if runs disagree or too few candidates are effective.
 _FILLING: Final = 2
 _EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
 _MORE: Final = 2

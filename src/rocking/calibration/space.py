@@ -50,7 +50,7 @@ Knowledge = float | Range | Literal["housner"]
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Space of the unknown ones of log p, slenderness (mean of both sides) and restitution.
+    """Space of logarithms of the unknown parameters: p, slenderness (mean of both sides) and restitution.
 
     `lower` and `upper` are the logarithms of the bounds. A restitution that is neither unknown nor known follows from
     the slenderness. The last coordinate of a two-sided block is the logarithm of the ratio of its slendernesses.

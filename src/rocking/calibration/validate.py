@@ -46,8 +46,8 @@ class ShakeTest:
     name : str
         Name of the test, by default of the motion.
     group : str
-        Label of tests that belong together, such as tests with one command or source motion, for standard errors. By
-        default tests under one motion form a group.
+        Label of tests that belong together, such as tests with one command or source motion. Standard errors allow for
+        groups. By default tests under one motion form a group.
 
     See Also
     --------
@@ -160,7 +160,7 @@ class ModelValidation(Result):
     tests : tuple of JudgedTest
         Predictions and observations.
     brier, log_loss : Score
-        Mean squared difference between probability and outcome; mean of -log of the probability of the outcome.
+        Mean squared difference between probability and outcome; mean of -log of the outcome's probability.
     reliability : tuple of ShareInBin
         Shares that overturned, in the nonempty bins of the predicted probability.
     reliability_chance : float
@@ -272,8 +272,7 @@ def validate(
     bins : int
         Number of bins of the reliability diagram, of equal width.
     simulations, seed : int
-        Number of draws from the predictions for the bands and `reliability_chance`, and their seed. Draws for each test
-        are independent.
+        Number of independent draws from the predictions for the bands and `reliability_chance`, and their seed.
     threads, progress : optional
         As for `simulate_many`.
 
@@ -384,7 +383,7 @@ def _left_out(source: Validation, count: int, weights: object, lapse: float | No
 
 
 def score_of(each: Floats, observed: Flags, base: Callable[[float], float], clusters: Integers) -> Score:
-    """Compute mean score and skill, with `base` from the share that overturned to the base rate's score."""
+    """Compute mean score and skill against the base rate, whose score is `base` of the share that overturned."""
 
     def mean(chosen: Integers) -> float:
         return float(each[chosen].mean())

@@ -1,7 +1,7 @@
 """Checks of arguments, each with the type of error to raise.
 
-A number is any real number of Python or NumPy, or an array without dimensions. Text and truth values are rejected,
-although ``float`` accepts them, because they are usually mistakes.
+A number is any real number of Python or NumPy, or an array without dimensions. Text and truth values are rejected
+although ``float`` accepts them, because a text such as "0.2" is usually a mistake.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
 
 
 def axis(values: ArrayLike, name: str, error: Error) -> Floats:
-    """Return finite, increasing numbers of an axis (at least one), or raise `error`."""
+    """Return finite, increasing numbers of an axis (one or more, of any sign), or raise `error`."""
     found = np.atleast_1d(numbers(values, name, error))
     if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found)) or np.any(np.diff(found) <= 0.0):
         raise error("{} must be increasing finite numbers", name, value=values)

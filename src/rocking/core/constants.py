@@ -5,7 +5,7 @@ from typing import Final, Literal
 #: Standard acceleration of gravity of readers and blocks, m/s^2.
 STANDARD_GRAVITY: Final = 9.80665
 
-#: Highest degree of a motion's pieces, lower by two than that of an arc's series.
+#: Highest degree of a motion's pieces. The series of an arc exceeds it by two.
 HIGHEST_DEGREE: Final = 20
 
 #: Version of the package.

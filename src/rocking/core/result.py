@@ -180,7 +180,7 @@ class DatasetResult(Result):
     TABLES : mapping of str to tuple of str
         Tables, the default one first, and the variables of each.
     POOLED : tuple of str
-        Dimensions over which some numbers are aggregated, which do not apply to a part of them.
+        Dimensions over which some numbers are aggregated. These numbers do not apply to a part of a dimension.
     """
 
     TABLES: ClassVar[Mapping[str, tuple[str, ...]]]
@@ -194,7 +194,8 @@ class DatasetResult(Result):
         Parameters
         ----------
         **labels : object
-            Label or labels for each dimension, such as ``alpha=0.2`` or ``alpha=[0.1, 0.2]`` (the nearest numbers).
+            Label or labels for each dimension, such as ``alpha=0.2`` or ``alpha=[0.1, 0.2]``. Numbers select the
+            nearest.
 
         Returns
         -------

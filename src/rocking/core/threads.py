@@ -29,7 +29,7 @@ def in_threads(
     threads: int | None = None,
     cancelled: threading.Event | None = None,
 ) -> Iterator[Found]:
-    """Yield the results of some work on each item, in order; by default with one thread per core.
+    """Yield the results of some work on each item, in order, by default with one thread per core.
 
     Items are consumed as needed, some per thread ahead of the results. The first of several failed items determines the
     error. On an early exit, for example an interrupt, `cancelled` is set, running work is awaited, and other work is

@@ -66,11 +66,11 @@ class Description:
         ("delayed sine", "processed record"), because the formula of `text` then no longer starts at time zero.
     parameters : mapping of str to float
         Parameters of the formula in SI units and radians, for example amplitude, frequency, phase and cycles of a sine.
-        Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it negative).
+        Scaling multiplies parameters with names that start with "amplitude" (possibly to negative values).
     text : str
         Formula, or source and terms of the record, in words.
     origin : Origin, optional
-        Facts about a record as data.
+        Facts about a record, which `text` contains in words.
 
     Raises
     ------
@@ -128,7 +128,7 @@ class Description:
 
 
 def begins_later(first: Description, second: Description, step: float | None) -> float:
-    """Return how much later the second of two records begins, s, by the clock of their files."""
+    """Return the delay of the second of two records, s, by the clock of their files."""
     one, other = (each.origin or Origin() for each in (first, second))
     if one.start is None or other.start is None or one.format != other.format:
         return 0.0
@@ -137,6 +137,6 @@ def begins_later(first: Description, second: Description, step: float | None) ->
 
 
 def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
-    """Return the name of a motion and of its vertical component with their processing but without scaling."""
+    """Return the name of a motion and its vertical component with processing but without scaling."""
     both = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))

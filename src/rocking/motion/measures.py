@@ -22,7 +22,7 @@ DAMPING: Final = 0.05
 
 
 def checked_damping(value: object, error: checks.Error) -> float:
-    """Return a fraction of critical damping, or raise `error`."""
+    """Return a damping ratio, or raise `error`."""
     ratio = checks.number(value, "damping", error)
     if not 0.0 <= ratio < 1.0:
         raise error(f"{{}} must be a fraction of critical from 0 to below 1, not {ratio:g}", "damping", value=value)
@@ -42,12 +42,12 @@ class Measured:
 
     @property
     def samples(self) -> tuple[Floats, Floats]:
-        """Times (s) and accelerations (m/s^2) at the breakpoints, after a jump there."""
+        """Times (s) and accelerations (m/s^2) at the breakpoints, with the value after a jump."""
         return piecewise.samples(self)
 
     @property
     def jumps(self) -> bool:
-        """Whether the acceleration jumps between pieces by more than rounding, the ends of the motion excepted."""
+        """Whether the acceleration jumps between pieces, beyond rounding."""
         return piecewise.jumps(self)
 
     def _widths(self) -> Floats:
@@ -83,24 +83,24 @@ class Measured:
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """Lowest and highest acceleration with their signs, m/s^2: exact extrema of the pieces."""
+        """Exact lowest and highest acceleration with their signs, m/s^2."""
         return -piecewise.highest(self._widths(), -self.coefficients), piecewise.highest(
             self._widths(), self.coefficients
         )
 
     @property
     def pga(self) -> float:
-        """Peak ground acceleration, m/s^2: exact extremum of the pieces."""
+        """Exact peak ground acceleration, m/s^2."""
         return piecewise.largest_magnitude(self._widths(), self.coefficients)
 
     @property
     def pgv(self) -> float:
-        """Peak ground velocity, m/s: exact extremum of the exact integral, from rest."""
+        """Exact peak ground velocity from rest, m/s."""
         return piecewise.largest_magnitude(self._widths(), self._velocity())
 
     @property
     def pgd(self) -> float:
-        """Peak ground displacement until the end of the motion, m: exact extremum of the exact integral."""
+        """Exact peak ground displacement until the end of the motion, m."""
         return piecewise.largest_magnitude(self._widths(), self._displacement())
 
     @property
@@ -152,8 +152,8 @@ class Measured:
         Raises
         ------
         InvalidMotion
-            If a period is not positive and finite or is below a millionth of the duration (use `pga` instead), or the
-            damping is out of range.
+            If a period is not positive and finite, or below a millionth of the duration (use `pga`), or the damping is
+            out of range.
         """
         from rocking.kernels import oscillator  # imported on first use because it loads the library
 
@@ -194,7 +194,7 @@ class Measured:
 
 
 def significant_span(motion: Measured, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
-    """Return the times, s, at which the Arias intensity reaches two fractions of its total, or NaN if zero."""
+    """Return the times, s, at two fractions of the total Arias intensity, or NaN if zero."""
     cumulated = np.append(0.0, np.cumsum(_energy(motion.coefficients, np.diff(motion.breakpoints))))
     if cumulated[-1] == 0.0:
         return math.nan, math.nan
@@ -210,7 +210,7 @@ def _energy(coefficients: Floats, span: Floats) -> Floats:
 
 
 def _time_at(motion: Measured, cumulated: Floats, fraction: float) -> float:
-    """Find by bisection within a piece the first time at which the energy reaches a fraction of the total."""
+    """Find by bisection within a piece the first time at a fraction of the total energy."""
     wanted = fraction * cumulated[-1]
     piece = max(int(np.searchsorted(cumulated, wanted, side="left")) - 1, 0)
     start, end = motion.breakpoints[piece : piece + 2]

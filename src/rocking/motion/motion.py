@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Motion(Processable):
-    """Ground acceleration that is a polynomial on each of its pieces and zero outside ``[0, duration]``.
+    """Piecewise polynomial ground acceleration, zero outside ``[0, duration]``.
 
-    Pieces may jump. Records are exactly piecewise linear, pulses are approximated to 1e-15 of their amplitude. Motions
-    are usually created by `from_samples`, `from_points`, `rocking.pulses`, `rocking.records` or `rocking.read`.
+    Pieces may jump. Records are exactly piecewise linear, and pulses are approximated to 1e-15 of their amplitude.
+    Usual constructors are `from_samples`, `from_points`, `rocking.pulses`, `rocking.records` and `rocking.read`.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class Motion(Processable):
 
     @property
     def end(self) -> float:
-        """Time of the last breakpoint of both components, s, after which the ground does not move."""
+        """Time of the last breakpoint of both components, s."""
         return self.duration if self.vertical is None else max(self.duration, self.vertical.duration)
 
     @property
@@ -185,10 +185,10 @@ class Motion(Processable):
         return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
 
     def scaled(self, factor: float) -> Motion:
-        """Return the motion times a factor, of which a negative sign reverses only the horizontal component.
+        """Return the motion times a factor.
 
-        Raises `InvalidMotion` if the factor is not a finite number, or the scaled motion would exceed the supported
-        range.
+        A negative factor reverses only the horizontal component. Raises `InvalidMotion` if the factor is not finite, or
+        the scaled motion would exceed the supported range.
         """
         by = checks.finite(factor, "factor", InvalidMotion)
         return self._times(by, FACTOR.scaling(by, by))
@@ -212,8 +212,7 @@ class Motion(Processable):
         Raises
         ------
         InvalidMotion
-            If `level` is not positive, the motion is zero throughout, or the scaled motion would exceed the supported
-            range.
+            If `level` is not positive, the motion is zero, or the scaled motion would exceed the supported range.
         InvalidOption
             If `measure` is not a measure of a motion alone.
 
@@ -231,8 +230,8 @@ class Motion(Processable):
     def with_vertical(self, vertical: Motion | None) -> Motion:
         """Return the motion with a vertical component, which changes the effective gravity.
 
-        The vertical component is scaled, delayed, processed and added with the horizontal one, but not reversed with
-        it. A record with a channel named "Down" or "DWN" is inverted.
+        Scaling, delay, processing and addition apply to both components, reversal only to the horizontal one. A record
+        with a channel named "Down" or "DWN" is inverted.
 
         `vertical` (m/s^2, positive upwards) starts at the same time. None removes the component. Raises `InvalidMotion`
         if `vertical` is not a motion, or itself has a vertical component.
@@ -243,7 +242,7 @@ class Motion(Processable):
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the ground acceleration in g over time, and the vertical one below, as `Result.plot`.
+        """Draw the ground acceleration in g over time, and the vertical one below, with parameters of `Result.plot`.
 
         In `ax` only the horizontal acceleration is drawn. The default title is the label of the motion.
         """
@@ -262,8 +261,8 @@ class Motion(Processable):
     def drawing_times(self, start: float, end: float) -> Floats:
         """Return times (s) for drawing an interval: its ends, breakpoints, and additional points on curved pieces.
 
-        Breakpoints of both components are included, and a second time just before each jump. The end of the motion is a
-        jump to zero.
+        Breakpoints of both components are included, and times just before jumps. The end of the motion is a jump to
+        zero.
         """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:
@@ -278,7 +277,7 @@ class Motion(Processable):
         return f"<Motion: {self}>"
 
     def __str__(self) -> str:
-        """Return name, duration, step, peak acceleration and changes of the motion, in one line."""
+        """Return name, duration, step, peak acceleration and changes in one line."""
         step = "" if self.step is None else f" in steps of {self.step:.5g} s"
         parts = [f"{self.name}, {self.duration:.5g} s{step}, {_peak(self)}", *self.history]
         if self.vertical is not None:
@@ -394,7 +393,7 @@ def _reaching(motion: Motion, level: float) -> Flags:
 
 
 def _crossings(motion: Motion, level: float, pieces: Flags) -> Floats:
-    """Return a superset of the times, s, at which the motion crosses a level inside one of the pieces."""
+    """Return a superset of the times, s, at which the motion crosses a level inside a piece."""
     widths = np.diff(motion.breakpoints)[pieces]
     shifted = motion.coefficients[pieces]
     shifted[:, 0] -= level

@@ -17,7 +17,7 @@ from rocking.errors import InvalidMotion
 
 #: Pieces that meet within this fraction of the largest value do not jump.
 _JUMP: Final = 1e-12
-#: Even breakpoints leave their grid by at most this fraction of the duration, some units in its last place.
+#: Largest distance of even breakpoints from their grid divided by the duration, some units in the last place.
 _ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 
 #: Far above any ground motion, but small enough that squares and integrals in measures do not overflow, and that the
@@ -27,7 +27,7 @@ _LONGEST: Final = 1e15
 
 TOO_STRONG: Final = f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale"
 
-#: Far below any ground motion. Pieces may be shorter, but must not change faster than over this time.
+#: Far below any ground motion. Pieces may be shorter, but not change faster than over this time.
 SHORTEST: Final = 1e-9
 
 
@@ -51,7 +51,7 @@ class Pieces(NamedTuple):
 
 
 def even_step(pieces: Piecewise) -> float | None:
-    """Return the length of the pieces if they are straight lines of equal length, else None."""
+    """Return the length of straight pieces of equal length, else None."""
     breakpoints, coefficients = pieces.breakpoints, pieces.coefficients
     if coefficients.shape[1] < 2 or np.any(coefficients[:, 2:]):
         return None
@@ -66,14 +66,14 @@ def jumps(pieces: Piecewise) -> bool:
 
 
 def jumps_after(pieces: Piecewise) -> Flags:
-    """Return which pieces end in a jump beyond rounding, to the next piece or, after the last, to zero."""
+    """Return which pieces end in a jump, beyond rounding (the last one to zero)."""
     widths, coefficients = np.diff(pieces.breakpoints), pieces.coefficients
     gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - value(coefficients, widths))
     return gaps > _JUMP * largest_magnitude(widths, coefficients)
 
 
 def samples(pieces: Piecewise) -> tuple[Floats, Floats]:
-    """Return times (s) and values at the breakpoints, after a jump there."""
+    """Return times (s) and values at the breakpoints, with the value after a jump."""
     last = value(pieces.coefficients[-1], np.diff(pieces.breakpoints)[-1])
     return pieces.breakpoints, np.append(pieces.coefficients[:, 0], last)
 
@@ -88,7 +88,7 @@ def value(coefficients: Floats, x: Floats) -> Floats:
 
 
 def at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floats:
-    """Return the value at `time`, clipped to the span of the breakpoints, after a jump there."""
+    """Return the value at `time`, clipped to the span of the breakpoints, with the value after a jump."""
     inside = np.clip(time, breakpoints[0], breakpoints[-1])
     piece = np.minimum(np.searchsorted(breakpoints, inside, side="right"), len(coefficients)) - 1
     return value(coefficients[piece], inside - breakpoints[piece])
@@ -143,7 +143,7 @@ def moved_exactly(coefficients: Floats, shift: Floats) -> Floats:
 
 
 def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: int) -> Floats:
-    """Return coefficients on the pieces of `finer`, which contains all breakpoints and may end later (zero there)."""
+    """Return coefficients on the pieces of `finer`, which contains all breakpoints (zero after the end)."""
     piece = np.minimum(np.searchsorted(breakpoints, finer[:-1], side="right"), len(coefficients)) - 1
     shift = finer[:-1] - breakpoints[piece]
     cut = shift > 0.0
@@ -155,7 +155,7 @@ def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: i
 
 
 def together(one: Piecewise, other: Piecewise) -> tuple[Floats, tuple[Floats, Floats]]:
-    """Return the breakpoints of both, and the coefficients of each between them, of equal degree."""
+    """Return common breakpoints, and the coefficients of each between them, of equal degree."""
     columns = max(one.coefficients.shape[1], other.coefficients.shape[1])
     if np.array_equal(one.breakpoints, other.breakpoints):
         breakpoints = one.breakpoints
@@ -228,7 +228,7 @@ def bounds(widths: Floats, coefficients: Floats) -> Floats:
 
 
 def highest(widths: Floats, coefficients: Floats) -> float:
-    """Return the highest value over all pieces, at their ends or interior extrema."""
+    """Return the highest value over all pieces."""
     best = max(float(np.max(coefficients[:, 0])), float(np.max(value(coefficients, widths))))
     if coefficients.shape[1] <= 2:
         return best
@@ -241,12 +241,12 @@ def highest(widths: Floats, coefficients: Floats) -> float:
 
 
 def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
-    """Return the largest absolute value over all pieces, at their ends or interior extrema."""
+    """Return the largest absolute value over all pieces."""
     return max(highest(widths, coefficients), highest(widths, -coefficients))
 
 
 def from_quadrant(quarters: Floats, rest: Floats) -> tuple[Floats, Floats]:
-    """Compute sine and cosine of a whole number of quarter turns plus the rest of an angle, rad."""
+    """Compute sine and cosine of quarter turns plus the rest of an angle, rad."""
     sine, cosine = np.sin(rest), np.cos(rest)
     quadrant = np.mod(quarters, 4.0).astype(np.int64)
     return np.choose(quadrant, [sine, cosine, -sine, -cosine]), np.choose(quadrant, [cosine, -sine, -cosine, sine])

@@ -65,7 +65,7 @@ class Processable(Measured):
         Parameters
         ----------
         other : Motion
-            Second horizontal component at the same place, which starts at the same time.
+            Second horizontal component at the same place and time.
         azimuth : float
             Positive direction of the result, degrees clockwise from north.
         recorded : pair of float, optional
@@ -144,7 +144,7 @@ class Processable(Measured):
         Raises
         ------
         InvalidMotion
-            If the period or the damping is out of range, or both damping and `ringing` are missing.
+            If period or damping is out of range, or both damping and `ringing` are missing.
 
         Notes
         -----
@@ -172,7 +172,7 @@ class Processable(Measured):
         trim : (start, end)
             Part to keep, s, whose start becomes time 0. For even samples the ends move to the nearest sample.
         baseline : int
-            Degree of the polynomial in time that is fitted to the samples by least squares and subtracted.
+            Degree of the polynomial in time that is fitted by least squares and subtracted.
         band_pass : (low, high)
             Corner frequencies of a Butterworth filter, Hz, run forwards and backwards (no phase shift) with temporary
             zeros before and after. None leaves that side open.
@@ -191,7 +191,7 @@ class Processable(Measured):
         ------
         InvalidMotion
             If no step is specified, an argument is invalid or out of place, or `baseline` or `band_pass` is applied to
-            a motion that is not linear between even samples, or jumps (resample it first, in a separate call).
+            a motion that jumps or is not linear between even samples (resample it in a previous call).
         """
         steps: list[_Step] = []
         kept = None if trim is None else _ends(self, *_pair(trim, "trim"))
@@ -282,7 +282,7 @@ def _baseline(motion: Piecewise, degree: int) -> Processed:
 
 
 def _band_pass(motion: Piecewise, low: float | None, high: float | None, order: int) -> Processed:
-    """Apply a Butterworth band-pass forwards and backwards with zeros at both ends (Converse and Brady 1992)."""
+    """Apply a Butterworth band-pass both ways with zeros at both ends (Converse and Brady 1992)."""
     from scipy import signal  # imported on first use because it takes half a second
 
     step = _step(motion, "band_pass")
@@ -339,7 +339,7 @@ def _joined(samples: Floats, step: float, done: str) -> Processed:
 def _floor_pieces(
     motion: Piecewise, period: float, damping: float, ringing: float | None, error: float = 0.0
 ) -> tuple[Floats, Floats, float]:
-    """Compute the absolute acceleration of an oscillator from rest, and an error bound of its pieces, m/s^2.
+    """Compute the absolute acceleration of an oscillator from rest, and its error bound, m/s^2.
 
     For u'' + 2 z w u' + w^2 u = -a(t) it is -(2 z w u' + w^2 u). On each piece u is the Taylor series of the exact
     solution about its start, from the series of the solutions of the states (1, 0) and (0, 1) and of the one from rest.
@@ -396,7 +396,7 @@ def _at(series: Floats, x: Floats) -> Floats:
 
 
 def _marched(ends: Floats) -> Floats:
-    """Compute displacement and velocity at the start of every piece, shape (2, pieces), from the maps of the pieces."""
+    """Compute displacement and velocity at the start of every piece, shape (2, pieces)."""
     found = np.empty((2, ends.shape[2]))
     u = v = 0.0
     for k, (a, b, c, d, e, f) in enumerate(ends.transpose(2, 0, 1).reshape(-1, 6).tolist()):
@@ -414,7 +414,7 @@ def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def _recorded_azimuths(one: Processable, other: Processable, recorded: Any) -> tuple[float, float]:
-    """Return the azimuths of two components, specified or from their records, or raise an error."""
+    """Return the azimuths of two components, specified or from their records."""
     if recorded is None:
         recorded = [(each.description.origin or Origin()).azimuth for each in (one, other)]
         if None in recorded:
@@ -439,7 +439,7 @@ def _recorded_azimuths(one: Processable, other: Processable, recorded: Any) -> t
 
 
 def shares(recorded: tuple[float, float], azimuth: float) -> tuple[float, float]:
-    """Return the factors on two components whose sum is the component along another azimuth."""
+    """Return the factors on two components for the component along another azimuth."""
     first, second = recorded
     sine, _ = sine_cosine([second - azimuth, azimuth - first, second - first])
     return float(sine[0] / sine[2]) + 0.0, float(sine[1] / sine[2]) + 0.0

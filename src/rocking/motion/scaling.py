@@ -53,7 +53,7 @@ class Measure:
     Raises
     ------
     InvalidOption
-        If the measure does not exist, or `period` or `damping` is missing, out of place or out of range.
+        If the measure is unknown, or `period` or `damping` is missing, out of place or out of range.
 
     See Also
     --------

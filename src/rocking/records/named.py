@@ -1,4 +1,4 @@
-"""Motions as arguments, by name, from record files and folders, and lists of records and channels."""
+"""Motions as arguments, by name or from record files, and lists of records and channels."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def several_motions(motions: Motions) -> list[Motion]:
 
 
 def motions_by_name(motions: Motions) -> dict[str, Motion]:
-    """Return one motion or several by the names of a mapping, or else by their own."""
+    """Return motions by the names of a mapping, or else by their own."""
     several = several_motions(motions)
     if isinstance(motions, Mapping):
         return dict(motions)
@@ -58,12 +58,12 @@ def motions_by_name(motions: Motions) -> dict[str, Motion]:
 
 
 def names_of(motions: Sequence[Motion]) -> list[str]:
-    """Return the names of motions, numbered where several share a name, so that table rows are distinct."""
+    """Return distinct names of motions, numbered if necessary."""
     return numbered([motion.name for motion in motions])
 
 
 def numbered(given: Sequence[str]) -> list[str]:
-    """Return names, with repeated ones numbered so that no two are equal."""
+    """Return names, with repeated ones numbered."""
     shared = {name for name, count in Counter(given).items() if count > 1}
     taken = {*given}
     names = []
@@ -75,7 +75,7 @@ def numbered(given: Sequence[str]) -> list[str]:
 
 
 def distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
-    """Return distinct motions, and the index of each motion among them, because inputs are often repeated."""
+    """Return distinct motions, and the index of each motion among them."""
     distinct: dict[tuple[bytes, ...], Motion] = {}
     keys = []
     for motion in motions:
@@ -119,7 +119,7 @@ def named_motion(
 
 
 def named_vertical(name: str, record: str, *, several: bool = False, **about: Any) -> Motion:
-    """Return a vertical motion by name: a separate file or shipped record, or else a channel of the horizontal file."""
+    """Return a vertical motion by name: a file, a shipped record, or else a channel of the horizontal file."""
     about = {key: value for key, value in about.items() if key != "channel"}  # the channel of the horizontal motion
     if _stands_alone(name):
         return named_motion(name, several=True, **about)
@@ -130,7 +130,7 @@ def named_vertical(name: str, record: str, *, several: bool = False, **about: An
 
 
 def _stands_alone(vertical: str) -> bool:
-    """Return whether a vertical motion is a separate file or shipped record, not a channel of the horizontal file."""
+    """Return whether a vertical motion is a file or shipped record, not a channel of the horizontal file."""
     return os.path.isfile(vertical) or vertical in catalogue.names()  # noqa: PTH113 - see `is_there`
 
 
@@ -142,7 +142,7 @@ def refuse_what_is_known(name: str, **said: object) -> None:
 
 
 def is_there(name: str | Path) -> bool:
-    """Return whether a file or folder exists, also for names too long for one."""
+    """Return whether a file or folder exists (False for overlong names)."""
     return os.path.exists(name)  # noqa: PTH110 - Path.exists() raises then
 
 
@@ -152,7 +152,7 @@ def is_shipped(name: str) -> bool:
 
 
 def expanded(names: Iterable[str]) -> list[str]:
-    """Return the record names that files, folders, patterns and shipped records stand for, without repetition."""
+    """Return the distinct record names from files, folders, patterns and shipped records."""
     return list(dict.fromkeys(itertools.chain.from_iterable(map(_files, names))))
 
 
@@ -255,7 +255,7 @@ def contents(
     file : str, path or binary file
         As for `rocking.read`.
     channel, dt, units : str or float, optional
-        As for `rocking.read`; by default all channels are listed.
+        As for `rocking.read`. By default all channels are listed.
     several : bool
         Whether the arguments apply to several files. Files that state step and units then keep them.
 

@@ -48,7 +48,7 @@ TIMES = _by_spelling(
     }
 )
 
-#: Units of acceleration by spelling without signs: "cm/s^2", "cm/sec/sec" and "cm_s2" are "cms2" or "cmss".
+#: Units of acceleration by spelling without signs, such as "cms2" for "cm/s^2" and "cm_s2", "cmss" for "cm/sec/sec".
 ACCELERATIONS = _by_spelling(
     {
         Unit("g", STANDARD_GRAVITY, 1.0): "g gs",

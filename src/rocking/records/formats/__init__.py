@@ -1,7 +1,7 @@
 """Readers of strong-motion records: PEER AT2, CSMIP V1 and V2, COSMOS, SMC, K-NET, ESM, text, ObsPy's formats.
 
 The format is recognised from the content, never from the file name. Numbers are converted to m/s^2 (g = 9.80665 m/s^2)
-without filter, baseline correction or removal of an offset.
+without filter, baseline correction or offset removal.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rocking.records.formats.source import Request, Source, open_source
 __all__ = ["Channel", "Identification", "channels", "identify", "read"]
 
 
-#: Formats with a header, in the order of recognition.
+#: Formats with a header, in the order of recognition. Add a new format here.
 FORMATS: Final = (headed.AT2, csmip.COSMOS, csmip.V1, csmip.V2, headed.SMC, headed.ESM, headed.KNET)
 #: The last two accept content without a recognised header.
 _RECOGNISERS: Final = (*(each.recognise for each in FORMATS), table.recognise, through_obspy.recognise)
@@ -36,14 +36,14 @@ def read(
     Parameters
     ----------
     path : str, path or binary file
-        File in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, a text table of one column
+        File in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, text table of one column
         (accelerations), two (times, accelerations) or more named by a heading (times, then channels), or any file that
         ObsPy reads if the `formats` extra is installed. The format is recognised from the content.
     channel : int or str, optional
         Number or name of the channel, required only if the file contains several.
     dt : float, optional
-        Sampling step, s, required only for one column of accelerations, and for times printed with too few digits.
-        Otherwise it must agree with the file.
+        Sampling step, s, required only for one column of accelerations and times with too few digits. Otherwise it must
+        agree with the file.
     units : {"g", "m/s2", "cm/s2", "gal", "mm/s2", "mg"}, optional
         Units of the accelerations, which override a heading. Required only if the file does not state them: ObsPy's
         formats, and text tables without a heading such as "acceleration (cm/s2)" or "a_g".
@@ -82,7 +82,7 @@ def read(
 
 
 def chosen(path: str | os.PathLike[str] | BinaryIO, request: Request, vertical: str | None = None) -> Channel:
-    """Return the channel of a record file that `read` converts to a motion, or the vertical channel by name."""
+    """Return the channel of a record file for `read`, or the vertical channel by name."""
     source = open_source(path)
     found = _recognised(source).read(request)
     if vertical is not None:
@@ -200,7 +200,7 @@ def _choose(source: Source, found: list[Channel], wanted: int | str | None, what
 
 
 def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:
-    """Return the channels with that name, or else that number, or a name that begins with that word."""
+    """Return the channels with that name, else number, else first word of the name."""
     text = str(wanted).casefold().split()
     by_number = [channel for channel in found if [str(channel.number)] == text]
     by_name = [channel for channel in found if channel.name.casefold().split() == text]

@@ -17,16 +17,16 @@ from rocking.motion.motion import Motion
 from rocking.records.formats.source import Request, Source
 from rocking.records.units import Unit
 
-#: Even times may leave their grid by this fraction of the step (or by the rounding of the printed decimals).
+#: Largest distance of even times from their grid divided by the step (or the rounding of printed decimals).
 _JITTER = 1e-6
-#: Rounded times leave the best even grid by one unit of the last decimal, plus a margin for the error of that grid.
+#: Distance of rounded times from the best even grid in units of the last decimal, with a margin for the grid's error.
 _SPREAD = 1.25
 #: Later times are mistakes, s (30,000 years).
 _LATEST = 1e12
 
 
 def first_fault(times: Floats) -> int | None:
-    """Return the index of the first time that does not exceed its predecessor, or None."""
+    """Return the first index at which the time does not increase, or None."""
     with np.errstate(over="ignore"):
         fine = (np.diff(times) > 0.0) & (np.abs(times[1:]) <= _LATEST) & (np.abs(times[:-1]) <= _LATEST)
     faults = np.flatnonzero(~fine)
@@ -52,7 +52,7 @@ def even_step(times: Floats) -> float | None:
 
 
 def prints_as(times: Floats, step: float) -> bool:
-    """Return whether even times with this step may be printed as `times` with this many decimals."""
+    """Return whether even times with this step may be printed as `times`."""
     sizes = np.abs(times)
     if not sizes.max() <= _LATEST or not np.all(np.diff(times) >= 0.0):
         return False
@@ -111,7 +111,7 @@ class Identification(NamedTuple):
 
 
 class Recognised(NamedTuple):
-    """Recognised format of a file, the reason, and the reader of its channels."""
+    """Recognised format, reason, and reader of the channels."""
 
     format: str
     reason: str
@@ -204,8 +204,8 @@ class Channel:
         return Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
 
 
-#: Numbers that represent missing values in files: nines before and after the point, the marks of well logs and of SAC,
-#: and the limits of 16 and 24 bits.
+#: Numbers that represent missing values: nines before and after the point, marks of well logs and SAC, limits of 16 and
+#: 24 bits.
 _MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(2, 9) for decimals in range(5)]
 _MARKS += [999.25, 12345.0, 32767.0, 32768.0, 8388607.0, 8388608.0]
 
@@ -252,6 +252,6 @@ def gap_at(values: Floats) -> int | None:
 
 
 def missing_value(source: Source, value: float, at: int | None) -> UnreadableRecord:
-    """Return the error for a number at the offset `at` that represents a missing value."""
+    """Return the error for a missing value at the offset `at`."""
     text = f"{value:g} seems to stand for a missing value; get a record that has a value at every instant"
     return source.error(text, at)

@@ -1,9 +1,9 @@
 """Formats with several channels per file: CSMIP V1 (uncorrected) and V2 (corrected), and COSMOS 1.20.
 
 CSMIP files have text, integer and real headers for each channel, then a line with count, step or rate, units and
-columns. Older V1 files, and files of networks that adopted the format, have no such line. In these, pairs of time and
-acceleration follow at once, in touching columns 10F7.3, in seconds and g/10. In V2, velocity and displacement follow
-the acceleration. COSMOS files state the length and columns of each header.
+columns. Older V1 files, and files of other networks, instead have pairs of time and acceleration, in touching columns
+10F7.3, in seconds and g/10. In V2, velocity and displacement follow the acceleration. COSMOS files state the length and
+columns of each header.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Conversion of numbers in bulk, and one reader for every format with a header.
 
 A format defines its recognition and, in a function of a channel's header, the location of count, step, unit, labels and
-layout of the numbers. All formats share the rest: the next channel, checks that the numbers are finite and as many as
-stated and that step and unit agree with the request, and construction of the channel.
+layout of the numbers. All formats share the rest: search for the next channel, checks of the numbers and their count,
+agreement of step and unit with the request, and construction of the channel.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _NUMBER: Final = re.compile(rf"({NUMBER})\s*$")
 
 @dataclass
 class Header:
-    """Header of one channel, read line by line by a format; numbers begin at `end`."""
+    """Header of one channel, read line by line by a format, with the numbers from `end`."""
 
     source: Source
     form: Format
@@ -70,7 +70,7 @@ class Header:
         return found
 
     def take_until(self, pattern: re.Pattern[str], most: int) -> re.Match[str] | None:
-        """Read the lines up to the first match, within a limit and before the title of another channel."""
+        """Read the lines up to the first match, within a limit and the same channel."""
         for k, line in enumerate(self.source.lines(self.end, most)):
             if found := pattern.search(line.text):
                 self.take(k + 1)
@@ -86,11 +86,11 @@ class Header:
         return read_values(self.source, start, self.end, layout, Stated(count, start))
 
     def find(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
-        """Return the match of a pattern in the first line that has one."""
+        """Return the first match of a pattern in the lines."""
         return next((found for line in self.lines if (found := pattern.search(line.text))), None)
 
     def text(self, pattern: re.Pattern[str]) -> str:
-        """Return the first group of the match of a pattern, or an empty text."""
+        """Return the first group of a match, or an empty text."""
         found = self.find(pattern)
         return found[1].strip() if found else ""
 
@@ -221,7 +221,7 @@ def stated_layout(text: str) -> Layout | None:
 
 
 def direction(pattern: re.Pattern[str], name: str) -> float | None:
-    """Return the direction, degrees clockwise from north, at the start of a name that matches the pattern, or None."""
+    """Return the direction, degrees clockwise from north, at the start of a matching name, or None."""
     found = pattern.match(name)
     return float(found[1]) % 360.0 if found else None
 
@@ -237,7 +237,7 @@ def step_of(rate: float) -> float:
 
 
 class Stated(NamedTuple):
-    """Number of values stated in a file, offset of the line that states it, and name of its source.
+    """Number of values stated in a file, offset of its line, and name of its source.
 
     Up to `more` additional values may fill the last row, or are not counted by a length in whole seconds.
     """
@@ -266,7 +266,7 @@ class Layout(NamedTuple):
 
 
 def numeric_end(source: Source, start: int) -> int:
-    """Return the offset of the first line from `start` that contains more than numbers, or the file's end."""
+    """Return the offset of the first line from `start` that is not numeric, or the file's end."""
     data = source.data
     for begin in range(start, len(data), _CHUNK):
         position = data[begin : begin + _CHUNK].translate(_IS_OTHER).find(1)
@@ -295,7 +295,7 @@ def read_values(source: Source, start: int, end: int, layout: Layout | None, sta
 
 
 def not_a_number(source: Source, token: bytes, at: int) -> UnreadableRecord:
-    """Return the error for a piece of text that should be a finite number."""
+    """Return the error for text that should be a finite number."""
     shown, number = repr(token[:40].decode("latin-1")), parse(token)
     if b"," in token and parse(token.replace(b",", b".")) is not None:
         return source.error(f"{shown} is not a number; write decimal points in place of commas", at)
@@ -330,7 +330,7 @@ def convert(tokens: list[bytes]) -> Floats | None:
 
 
 def _in_blocks(source: Source, start: int, end: int, layout: Layout | None) -> tuple[Floats, int]:
-    """Return the numbers of purely numeric blocks, and the offset of the first other block or the end."""
+    """Return the numbers of purely numeric blocks, and the offset of their end."""
     parts = [np.empty(0)]
     while start < end:
         found = (_LINE_END if layout else _SPACE).search(source.data, min(start + _CHUNK, end) - 1, end)

@@ -91,8 +91,8 @@ def _smc(header: Header) -> Said:
     )
 
 
-# K-NET and KiK-net: 17 lines, then counts that the scale factor converts to gal. The counts include the constant offset
-# of the instrument (some gal), which is kept. "Record Time" is 15 s later than the first sample.
+# K-NET and KiK-net: 17 lines, then counts that the scale factor converts to gal. The instrument's constant offset (some
+# gal) is kept. "Record Time" is 15 s later than the first sample.
 
 _KNET_KEYS: Final = (
     "Origin Time", "Lat.", "Lon", "Depth", "Mag.", "Station Code", "Station Lat", "Station Lon", "Station Height",

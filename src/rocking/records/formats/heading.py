@@ -1,7 +1,7 @@
 """Headings of text tables: columns of times, channels, and the unit of each.
 
-A unit is in brackets, "a (cm/s2)", or ends a name: "a_g", "t/ms", "Time in ms", "Time, s". Alternatively, a line of
-units is below or above the names.
+A unit is in brackets, "a (cm/s2)", ends a name ("a_g", "t/ms", "Time in ms", "Time, s"), or is in a line of units below
+or above the names.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def _time_of(line: str) -> Unit | None:
 
 
 def _time_unit(cell: tuple[str, ...], rest: str) -> tuple[Unit | None, str]:
-    """Return the unit of a column of times, by default seconds unless the rest has another unit in brackets."""
+    """Return the unit of a column of times, seconds unless other text has a unit in brackets."""
     unit = next(filter(None, map(_time_of, cell)), None)
     strange = "" if unit else _strange(cell[0])
     if unit or strange:
@@ -169,7 +169,7 @@ def _acceleration_unit(cell: tuple[str, ...], rest: str) -> tuple[Unit | None, s
 
 
 def _cells(line: str, count: int, delimiter: str) -> tuple[str, ...]:
-    """Return the names in a line with this many columns, or none if it cannot be split."""
+    """Return the names in a line with this many columns, or none."""
     if count == 1:
         return (line.strip(),)
     for split, sure in _ways(delimiter):
@@ -182,7 +182,7 @@ def _cells(line: str, count: int, delimiter: str) -> tuple[str, ...]:
 
 
 def _ways(delimiter: str) -> Iterator[tuple[Callable[[str], list[str]], bool]]:
-    """Yield ways to split a line of names, ways that fit the rows below first, and whether each is certain."""
+    """Yield ways to split a line of names, and whether each is certain. Ways that fit the rows below come first."""
     for sign in ["\t", ";", ","] if delimiter == " " else [delimiter, ";", ",", "\t"]:
         yield functools.partial(_divided, sign), True
     yield lambda line: re.split(r"\t+|\s{2,}", line.strip()), True
@@ -201,7 +201,7 @@ def _texts(name: str) -> list[str]:
 
 
 def _ends(name: str) -> Iterator[str]:
-    """Yield ends of a name that may be its unit, the longest first, and "g" alone only after an acceleration."""
+    """Yield ends of a name that may be its unit, the longest first ("g" alone only after an acceleration)."""
     yield _bare(name)
     text = _without_brackets(name).rstrip("_. ")
     for found in _BREAK.finditer(text):

@@ -89,7 +89,7 @@ class Source:
         return len(self.data.translate(None, _CONTROL)) < 0.99 * len(self.data)
 
     def error(self, message: str, at: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
-        """Return an error with this message about the file, at the line that contains the offset `at`."""
+        """Return an error with this message about the file's line at the offset `at`."""
         line = None if at is None else self.line_number(at)
         return UnreadableRecord(message, *arguments, path=self.path, line=line, value=value)
 
@@ -174,8 +174,8 @@ class Request:
         return cls(step, None if units is None else choose_unit(units), channel, several)
 
     def step(self, source: Source, stated: float, at: int | None) -> float:
-        """Return the step (s) that the file states at the offset `at`, after checks."""
-        # Files contain fewer samples than bytes, so this also bounds the record's duration.
+        """Return the checked step (s) that the file states at the offset `at`."""
+        # Files contain no more samples than bytes, so this also bounds the record's duration.
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):
@@ -184,7 +184,7 @@ class Request:
         return stated
 
     def units(self, source: Source, stated: Unit | str | None, at: int | None) -> Unit:
-        """Return the unit that the file states at the offset `at`, in any spelling, or else the requested one."""
+        """Return the unit that the file states at the offset `at`, or else the requested one."""
         spelling = stated.strip() if isinstance(stated, str) else ""
         unit = find_unit(spelling) if isinstance(stated, str) else stated
         unit = unit or (None if spelling and self.several else self.unit)

@@ -70,7 +70,7 @@ class _Table(NamedTuple):
 
     @property
     def ambiguous(self) -> bool:
-        """Whether commas may be decimal signs or delimiters: rows such as "1,5" and no point anywhere."""
+        """Whether commas may be decimal signs or delimiters, as in rows such as "1,5" without any point."""
         # A comma before blanks or at the end of a row is not a decimal sign.
         return (
             self.delimiter == ","
@@ -93,7 +93,7 @@ class _Table(NamedTuple):
         heading, dt = self.heading, request.dt
         assumed = heading.assumed and heading.named and heading.columns[0].kind == "time"
         if assumed and dt is not None and first_fault(numbers[:, 0]) is not None:
-            # The assumption that the first column contains times is wrong.
+            # The first column does not contain times as assumed.
             first = heading.columns[0]._replace(kind="channel", unit=None)
             heading = heading._replace(columns=(first, *heading.columns[1:]))
         return self._replace(heading=heading)._channels(request, numbers)
@@ -120,7 +120,7 @@ class _Table(NamedTuple):
         return channels
 
     def _timing(self, request: Request, numbers: Floats, place: int) -> dict[str, Any]:
-        """Return step or times, and start (s), from the nearest column of times before a channel, or else the first."""
+        """Return step or times, and start (s), from the nearest column of times before a channel, else the first."""
         times = self.heading.places("time")
         if not times:
             return {"dt": request.dt}
@@ -218,7 +218,7 @@ def refusal(source: Source) -> UnreadableRecord | None:
 
 
 def _table(source: Source) -> _Table | None:
-    """Return the table that begins at the first purely numeric line, or None if there is no such line."""
+    """Return the table that begins at the first purely numeric line, or None."""
     lines = [] if source.is_binary else source.lines(0, HEADING_LINES)
     for k, line in enumerate(lines):
         if line.text.startswith(OTHER_TITLE):
@@ -231,7 +231,7 @@ def _table(source: Source) -> _Table | None:
                 # Between blanks commas may be decimal signs, in rows below the first one with a comma.
                 ways = (_delimiter(each) for each in following if "," in each.text)
                 translation = next((way for way, sign in ways if sign == " "), translation)
-            # The second row determines the number of columns because the first one may be damaged.
+            # The first row may be damaged, so the second one determines the number of columns.
             columns = len(_tokens(following[0] if following else line, translation))
             heading = heading_of(source, line.start, columns, delimiter)
             damaged = None
@@ -258,7 +258,7 @@ def _tokens(line: Line, translation: bytes) -> list[bytes]:
 
 
 def _damaged(text: str, tokens: list[bytes], columns: int, *, named: bool) -> bytes:
-    """Return the first non-numeric piece of a line above the rows if the line looks like a row, else empty bytes.
+    """Return the first non-numeric piece of a line if it looks like a damaged row, else empty bytes.
 
     In a row all pieces look like numbers, or there are as many as columns with a number among them, below names or with
     delimiters other than blanks and a number that is first or has a point.

@@ -67,7 +67,7 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, name: str
         raise source.error(f"trace {number} has gaps, or no numbers; get a record without gaps")
     with np.errstate(all="ignore"):
         values = np.asarray(trace.data, dtype=np.float64).reshape(len(trace.data)) * float(stats.calib)
-    # SAC states the azimuth of a component and its angle from the vertical, about 90 degrees if horizontal.
+    # SAC states azimuth and angle from the vertical, about 90 degrees if horizontal.
     sac = {"cmpaz": None, "cmpinc": None, **stats.get("sac", {})}
     horizontal = None not in (sac["cmpaz"], sac["cmpinc"]) and abs(sac["cmpinc"] - 90.0) <= 5.0
     return channel_of(
