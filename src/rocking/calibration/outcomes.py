@@ -111,7 +111,8 @@ class Calibration(Result):
     weights : ndarray, shape (n,)
         Weights of the blocks, with sum 1.
     estimates : mapping of str to Estimate
-        Parameters of the population: "p" (rad/s), "restitution", and "alpha" (rad), or "alpha_plus" and "alpha_minus".
+        Parameters of the population: "p" (rad/s), "restitution", and "alpha" (rad), or for a two-sided block
+        "alpha_plus" and "alpha_minus".
     draws : mapping of str to ndarray, shape (d,)
         Posterior draws of the population's centre, by the same names.
     probabilities, observed : ndarray, shape (m,)
