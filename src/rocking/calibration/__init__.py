@@ -1,4 +1,4 @@
-"""Calibration: the block behind observed outcomes, or behind a measured rotation history."""
+"""Calibration of blocks from observed outcomes or a measured rotation history."""
 
 import lazy_loader as lazy
 

@@ -1,7 +1,4 @@
-"""How good a calibration is: scores of its predictions, and what it does not know.
-
-It does not know enough where candidates are few, where runs disagree, and where a posterior reaches a bound.
-"""
+"""Diagnostics of a calibration: scores, effective candidates, agreement of runs, bounds reached."""
 
 from __future__ import annotations
 
@@ -19,23 +16,27 @@ from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import counted
 from rocking.errors import InvalidOption
 
-#: A bound is reached if more than this share of the posterior, what lies beyond one end of an estimate's interval, is
-#: within the outermost part of the range, in the logarithm: then the interval ends where the bound is.
+#: An interval ends at a bound if more than this share of the posterior (the share beyond one end) is within the
+#: outermost part of the range, in the logarithm.
 _OUTERMOST: Final = 0.05
 
 
 @dataclass(frozen=True)
 class Scores:
-    """Measures of predicted probabilities against outcomes.
+    """Scores of predicted probabilities.
 
     Attributes
     ----------
     accuracy : float
-        Share of outcomes on the side of 1/2 that was predicted.
+        Share of outcomes predicted on the correct side of 1/2.
     log_loss : float
-        Mean of -log of the probability that was given to the outcome; infinite after a certainty that failed.
+        Mean of -log of the probability of the observed outcome, infinite for an outcome with probability zero.
     brier : float
         Mean squared difference between probability and outcome (Brier 1950).
+
+    See Also
+    --------
+    rocking.validate : compare predictions with tests.
 
     Examples
     --------
@@ -55,7 +56,7 @@ class Scores:
 
     @classmethod
     def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
-        """Score predicted probabilities of m outcomes, which are True or False."""
+        """Compute the scores of predicted probabilities of m outcomes (bool)."""
         given, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if given.shape != seen.shape or not given.size:
             raise InvalidOption(f"there must be one probability for each outcome, not {given.shape} and {seen.shape}")
@@ -69,21 +70,21 @@ class Scores:
 
 
 def log_losses(probabilities: Floats, observed: Flags) -> Floats:
-    """-log of the probability that was given to each outcome; infinite after a certainty that failed."""
+    """Compute -log of the probability of each observed outcome, infinite for probability zero."""
     with np.errstate(divide="ignore"):
         return np.asarray(-np.log(np.where(observed, probabilities, 1.0 - probabilities)))
 
 
 @dataclass(frozen=True)
 class BoundReached:
-    """An estimate whose interval ends at a bound.
+    """Estimate whose interval ends at a bound.
 
     Attributes
     ----------
     name, end : str
-        The estimate, and its bound: "lower" or "upper".
+        Estimate and bound, "lower" or "upper".
     bound, wider : float
-        The bound, and a wider one, in the parameter's unit.
+        Bound and suggested wider bound, in the parameter's unit.
     share : float
         Share of the posterior in the outermost 5 % of the range.
     """
@@ -107,18 +108,18 @@ class BoundReached:
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """How far a calibration can be trusted.
+    """Reliability of a calibration.
 
     Attributes
     ----------
     candidates : int
-        Blocks that were simulated under every motion.
+        Number of blocks simulated under every motion.
     effective : float
-        How many of them, effectively, tell what a typical population of the posterior does.
+        Effective number of candidates that represent a typical population of the posterior.
     agreement : mapping of str to float
-        R-hat of each estimate between independent runs: 1 where they agree, above 1.1 where they do not.
+        R-hat of each estimate between independent runs: 1 if they agree, above 1.1 if they disagree.
     bounds_reached : tuple of BoundReached
-        Estimates whose interval ends where a bound is.
+        Estimates whose interval ends at a bound.
     """
 
     candidates: int
@@ -128,7 +129,7 @@ class Diagnostics:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is to be known before the estimates are believed, a sentence each; none where all is well."""
+        """Warnings about the estimates, one sentence each."""
         notes = [f"{one}" for one in self.bounds_reached]
         apart = [f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > AGREEMENT]
         if apart:
@@ -148,7 +149,7 @@ class Diagnostics:
 
 
 def diagnosed(found: Search, posterior: Floats) -> Diagnostics:
-    """Look at a search, and at the draws of its posterior."""
+    """Compute the diagnostics of a search from the draws of its posterior."""
     space = found.evidence.candidates.space
     return Diagnostics(
         len(found.evidence.candidates.points),
@@ -159,7 +160,7 @@ def diagnosed(found: Search, posterior: Floats) -> Diagnostics:
 
 
 def bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
-    """Estimates whose interval ends where a bound is, from draws of the population's centre."""
+    """Return estimates whose interval ends at a bound, from draws of the population's centre."""
     found = []
     for name, values in space.named(centres).items():
         parameter = name.partition("_")[0]
@@ -175,7 +176,7 @@ def bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
         ]
         for end, bound, further, near in ends:
             share = float(near.mean())
-            # Nothing lies beyond a bound that no block can exceed.
+            # No block exceeds such a bound.
             if share > 0.05 and bound < math.log(HIGHEST[parameter]) - 1e-9:
                 found.append(BoundReached(name, end, math.exp(bound), further, share))
     return tuple(found)

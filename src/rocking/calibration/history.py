@@ -1,4 +1,4 @@
-"""Which block explains a measured rotation history: least squares for p, alpha and restitution."""
+"""Calibration from a measured rotation history: least squares for p, alpha and restitution."""
 
 from __future__ import annotations
 
@@ -36,38 +36,37 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Blocks that the search starts from.
+#: Number of blocks at the start of the search.
 _CANDIDATES: Final = 2048
 
-#: Shares of the history that are fitted one after the other, and how many of the best go on to each. Over a whole
-#: history the misfit has many local minima, since impacts drift out of phase; over the first arcs it has few.
+#: Successive shares of the history to fit, and number of best fits that continue. Over the whole history the misfit has
+#: many local minima because impacts drift out of phase, over the first arcs few.
 _STAGES: Final = ((0.15, 16), (0.3, 8), (0.6, 4), (1.0, 2))
 
-#: Then points around the best are tried, this many, so many standard errors wide.
+#: Number of points then tried around the optimum, and widths of the clouds in standard errors.
 _AROUND: Final = 64
 _WIDTHS: Final = (6.0, 3.0, 1.5)
 
 
-#: A sensitivity below this share of the largest counts as none.
+#: A sensitivity below this share of the largest counts as zero.
 _INSENSITIVE: Final = 1e-7
 
-#: Steps in the logarithms of the differences that standard errors are from: the first and least, simulations being good
-#: to about 1e-12, and the largest; and how often a step is refined.
+#: Smallest step in the logarithms for differences of simulations, which are accurate to about 1e-12.
 _STEP: Final = 1e-5
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One fitted number.
+    """Fitted parameter.
 
     Attributes
     ----------
     value : float
-        Its value, in the parameter's unit.
+        Estimate, in the parameter's unit.
     deviation : float
-        Its standard error.
+        Standard error.
     at_bound : bool
-        Whether the fit ran into a bound: widen it.
+        Whether the fit reached a bound, which should then be widened.
     """
 
     value: float
@@ -77,23 +76,27 @@ class Measured:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HistoryCalibration(Result):
-    """The block that explains a rotation history best.
+    """Block fitted to a rotation history, returned by `calibrate_history`.
 
-    Made by `calibrate_history`. Its figure has the measured rotation, that of the fitted block, and the residuals.
+    The figure shows the measured rotation, the fitted rotation, and the residuals.
 
     Attributes
     ----------
     block : Block
-        The block.
+        Fitted block.
     estimates : mapping of str to Measured
-        What was fitted: "p" (rad/s), "alpha" (rad), "restitution" (with "_plus" and "_minus" for a two-sided block),
+        Fitted parameters: "p" (rad/s), "alpha" (rad), "restitution" (with "_plus" and "_minus" for a two-sided block),
         "initial_rotation" (rad).
     covariance : ndarray, shape (k, k)
-        Of the logarithms of the estimates, in their order.
+        Covariance of the logarithms of the estimates.
     times, residuals : ndarray, shape (n,)
-        Times of the samples, s, and measured less simulated rotation, rad.
+        Times of the samples, s, and measured minus simulated rotation, rad.
     response : Response
-        The simulation.
+        Simulation of the fitted block.
+
+    See Also
+    --------
+    rocking.calibrate_history : fit a block to a rotation history.
     """
 
     block: Block
@@ -167,44 +170,48 @@ def calibrate_history(
     seed: int = 0,
     progress: bool | None = None,
 ) -> HistoryCalibration:
-    """Find the block that explains a measured rotation history, free or forced.
+    """Fit a block to a measured rotation history, free or forced.
 
     Parameters
     ----------
     times : array_like, shape (n,)
-        Times of the samples, s, not negative and increasing; 0 is the release, or the start of the motion.
+        Times of the samples, s, nonnegative and increasing, from the release or the start of the motion.
     rotation : array_like, shape (n,)
-        Measured rotation, rad; positive leans to side +.
+        Measured rotation, rad, positive towards side +.
     motion : Motion, optional
-        The measured motion of the base; without one, the block was released and rocked freely.
+        Measured motion of the base. By default the block was released and rocked freely.
     model : {"nonlinear", "linear"}
         Equation of motion.
     p, alpha, restitution : float or pair of float
-        Known value; or lowest and highest thinkable value (rad/s; rad; -).
+        Known value, or lowest and highest plausible value (rad/s, rad, -).
     two_sided : bool
-        Whether unknown parameters may differ between the sides. By default they may not, other than in `calibrate`:
-        residuals of a history show where one number for both sides is too few.
+        Whether unknown parameters may differ between the sides. By default they may not, unlike in `calibrate`, because
+        residuals show whether one value suffices.
     initial_rotation : float, optional
-        Rotation at time 0, rad, where the block is held. By default fitted in a release test, and 0 under a motion.
+        Rotation of the held block at time 0, rad. By default fitted in a release test, and 0 under a motion.
     seed, progress : optional
         As for `calibrate`.
 
     Returns
     -------
     HistoryCalibration
-        The block, with standard errors.
+        Fitted block with standard errors.
 
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, there are too few samples, or the history does not determine a parameter.
+        If an argument is out of range, there are too few samples, or the history does not determine a parameter.
+
+    See Also
+    --------
+    rocking.calibrate : fit blocks to the outcomes of tests.
 
     Notes
     -----
-    Least squares in the logarithms of the parameters, by the derivatives of `Sensitivity.rotation`. The search starts
-    from 2048 blocks over the whole range; the best go through fits to 15, 30, 60 and 100 % of the history. Standard
-    errors are from the curvature at the optimum, and allow for residuals that are correlated in time, yet not for a
-    specimen that is no rigid plane block.
+    The method is least squares in the logarithms of the parameters, with derivatives from `Sensitivity.rotation`. The
+    search starts from 2048 blocks over the whole range and fits the best ones to 15, 30, 60 and 100 % of the history.
+    Standard errors follow from the curvature at the optimum. They allow for residuals correlated in time, but not for a
+    specimen that is not a rigid plane block.
 
     Examples
     --------
@@ -237,7 +244,7 @@ def calibrate_history(
 
 
 def _checked(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
-    """Return times and rotations of a history, as arrays of their own."""
+    """Return checked copies of the times and rotations of a history."""
     at, measured = (
         np.array(checks.numbers(values, name, InvalidOption))
         for values, name in ((times, "times"), (rotation, "rotation"))
@@ -255,7 +262,7 @@ def _checked(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class _Unknown:
-    """A number to be found, between two bounds; `sign` is that of its value."""
+    """Unknown parameter between two bounds, with the `sign` of its value."""
 
     name: str
     low: float
@@ -265,7 +272,7 @@ class _Unknown:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """A history, what is settled of the block by name, and what is to be found."""
+    """History, known parameters of the block by name, and unknown parameters."""
 
     times: Floats
     rotation: Floats
@@ -275,18 +282,18 @@ class _Problem:
     unknowns: tuple[_Unknown, ...]
 
     def first(self, share: float) -> int:
-        """Count the samples until this share of all rocking is over, measured by the integral of |rotation|."""
+        """Return the number of samples up to this share of the integral of |rotation|."""
         past = np.cumsum(np.abs(self.rotation) * np.gradient(self.times))
         return int(np.searchsorted(past, share * past[-1])) + 1
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
-        """Lower and upper ends of the logarithms of the unknowns."""
+        """Logarithms of the lower and upper bounds of the unknowns."""
         low, high = np.log([[unknown.low, unknown.high] for unknown in self.unknowns]).T
         return low, high
 
     def values(self, logs: Floats) -> dict[str, float]:
-        """Every number by name, settled or not."""
+        """Return all parameters by name, known and unknown."""
         found = {one.name: one.sign * math.exp(log) for one, log in zip(self.unknowns, logs, strict=True)}
         return {**self.settled, **found}
 
@@ -302,13 +309,13 @@ class _Problem:
         return simulate(self.block(logs), self.motion, model=self.model, duration=end, initial_rotation=start)
 
     def residuals(self, logs: Floats, count: int) -> Floats:
-        """Measured less simulated rotation of the first samples; an overturned block stays at pi/2."""
+        """Compute measured minus simulated rotation of the first samples, with overturned blocks at pi/2."""
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
         return self.rotation[:count] - response.rotation(np.minimum(times, response.duration))
 
     def derivatives(self, logs: Floats, count: int) -> Floats:
-        """Differentiate the residuals by the logarithms, shape (count, k)."""
+        """Compute the Jacobian of the residuals in the logarithms, shape (count, k)."""
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
         fallen = times > response.duration
@@ -318,12 +325,12 @@ class _Problem:
         return found
 
     def error(self, logs: Floats, count: int) -> float:
-        """Return the sum of the squared residuals of the first samples."""
+        """Compute the sum of the squared residuals of the first samples."""
         return float((self.residuals(logs, count) ** 2).sum())
 
 
 def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[str, float], list[_Unknown]]:
-    """Tell what is known of a block from what is to be found."""
+    """Separate the known parameters of a block from the unknown ones."""
     settled, unknowns = {}, []
     for name, value in given.items():
         if is_known(value):
@@ -336,7 +343,7 @@ def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[st
 
 
 def _released_from(rotation: Floats) -> _Unknown:
-    """Rotation at the release, near that of the first sample."""
+    """Return the unknown initial rotation, bounded around the first sample."""
     first = float(rotation[0])
     if abs(first) < 0.05 * np.abs(rotation).max():
         text = "a release test must start at the rotation it is released from; give {}"
@@ -345,7 +352,7 @@ def _released_from(rotation: Floats) -> _Unknown:
 
 
 def _best(problem: _Problem, rng: np.random.Generator, progress: bool | None) -> Floats:
-    """Logarithms of the unknowns at the least sum of squares over the whole history."""
+    """Find the logarithms of the unknowns with the least squares over the whole history."""
     from scipy.stats import qmc
 
     low, high = problem.bounds
@@ -376,7 +383,7 @@ def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
 
 
 def _shaken(problem: _Problem, found: Floats, width: float, rng: np.random.Generator) -> Floats:
-    """Look around an optimum, so many standard errors wide: a forced response can be rugged on that scale."""
+    """Search within `width` standard errors of an optimum, because a forced response can be rugged on that scale."""
     whole = len(problem.times)
     covariance = _covariance(problem, found, problem.residuals(found, whole))
     around = found + width * rng.multivariate_normal(np.zeros(len(found)), covariance, _AROUND, method="cholesky")
@@ -399,7 +406,7 @@ def _result(problem: _Problem, logs: Floats) -> HistoryCalibration:
 
 
 def _covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
-    """Covariance of the logarithms: inverse curvature times the residuals' variance, allowing for their correlation."""
+    """Compute the covariance of the logarithms: inverse curvature times variance of the autocorrelated residuals."""
     variance = float((residuals**2).sum()) / (len(residuals) - len(logs)) * _integrated_autocorrelation(residuals)
     slopes = _slopes(problem, logs, math.sqrt(variance))
     sizes = np.linalg.norm(slopes, axis=0)
@@ -429,7 +436,7 @@ def _slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats:
 
 
 def _integrated_autocorrelation(residuals: Floats) -> float:
-    """1 + 2 times the sum of the autocorrelations up to the first that is not positive."""
+    """Compute 1 + 2 times the sum of the autocorrelations up to the first nonpositive one."""
     size = 2 * len(residuals)
     power = np.abs(np.fft.rfft(residuals, size)) ** 2
     correlation = np.fft.irfft(power, size)[: len(residuals)]

@@ -1,4 +1,4 @@
-"""What a calibration from outcomes found, and what it predicts."""
+"""Results of a calibration from outcomes, and their predictions."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _DRAWS: Final = 256
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter of the population of blocks.
+    """Parameter of the population of blocks.
 
     Attributes
     ----------
@@ -68,14 +68,18 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """Predictions for tests that were left out of the fit.
+    """Predictions of tests that were left out of the fit.
 
     Attributes
     ----------
     probabilities : ndarray, shape (repeats, m)
-        Probability of overturning for each test, from the fit to the folds without it.
+        Probability of overturning in each test, from the fit to the other folds.
     repeats : tuple of Scores
         Scores of each repeat.
+
+    See Also
+    --------
+    rocking.validate : compute standard errors and the reliability diagram of the predictions.
     """
 
     probabilities: Floats
@@ -94,29 +98,34 @@ class Validation:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Result):
-    """Blocks that explain which motions overturned a specimen, and their predictions; from `calibrate`.
+    """Ensemble of blocks fitted to the outcomes of tests, returned by `calibrate`.
 
-    Its table "ensemble" has a row for each block: parameters of both sides, weight, and the equation of motion;
-    `rocking fragility --ensemble` and its like read it. Its figure has the outcomes against the fitted probability of
-    every test, and the ensemble of blocks.
+    The table "ensemble" contains parameters of both sides, weight, and equation of motion of each block. Commands such
+    as `rocking fragility --ensemble` read this table. The figure shows the ensemble, and outcomes against fitted
+    probabilities.
 
     Attributes
     ----------
     blocks : Blocks
-        Ensemble of plausible blocks, n of them.
+        Ensemble of n plausible blocks.
     weights : ndarray, shape (n,)
-        Their weights; they sum to 1.
+        Weights of the blocks, with sum 1.
     estimates : mapping of str to Estimate
-        The population's parameters: "p" (rad/s), "restitution", and "alpha" (rad), of a two-sided block "alpha_plus"
-        and "alpha_minus".
+        Parameters of the population: "p" (rad/s), "restitution", and "alpha" (rad), or for a two-sided block
+        "alpha_plus" and "alpha_minus".
     draws : mapping of str to ndarray, shape (d,)
-        Draws of the posterior of the population's centre, by the same names.
+        Posterior draws of the population's centre, by the same names.
     probabilities, observed : ndarray, shape (m,)
-        Fitted probability of overturning under each motion of the calibration, and the observed outcome (bool).
+        Fitted probability of overturning under each motion, and observed outcome (bool).
     model, lapse, seed : str, float, int
         As for `calibrate`.
     diagnostics : Diagnostics
-        Effective candidates, agreement of runs, bounds that the posterior reaches; its `notes` are in the summary.
+        Effective candidates, agreement of runs, and bounds reached. Its `notes` are part of the summary.
+
+    See Also
+    --------
+    rocking.calibrate : fit blocks to the outcomes of tests.
+    rocking.validate : compare predictions with tests.
     """
 
     TABLES = ("ensemble",)
@@ -135,13 +144,13 @@ class Calibration(Result):
 
     @property
     def scores(self) -> Scores:
-        """Scores on the motions of the calibration itself: too good by nature, see `cross_validate`."""
+        """Scores on the calibration's own motions, which are optimistic (see `cross_validate`)."""
         return Scores.of(self.probabilities, self.observed)
 
     def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
-        """Probability that each of m motions overturns the specimen, shape (m,).
+        """Compute the probability of overturning under m motions, shape (m,).
 
-        It is the weighted share of the ensemble that overturns, within the lapse of 0 and 1.
+        The weighted share of the ensemble that overturns is bounded away from 0 and 1 by the lapse.
         """
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
@@ -163,8 +172,8 @@ class Calibration(Result):
         Parameters
         ----------
         groups : sequence, optional
-            One label for each motion: tests with the same label are left out together, as they should be where one
-            source motion was scaled several times.
+            Labels of the motions. Tests with one label, such as scaled versions of one source motion, are left out
+            together.
         folds, repeats : int
             Number of parts, and of random divisions into parts.
         seed : int
@@ -180,7 +189,7 @@ class Calibration(Result):
         Raises
         ------
         InvalidOption
-            If there are fewer groups than folds, or labels do not match the motions.
+            If there are fewer groups than folds, or the labels do not match the motions.
         """
         labels = group_labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
@@ -197,18 +206,18 @@ class Calibration(Result):
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
     def fragility(self, motions: Motions, *, model: Model | None = None, **options: Any) -> Fragility:
-        """Fit the specimen's fragility by `rocking.fragility`: the weighted ensemble, by default in its own model.
+        """Compute the specimen's fragility with `rocking.fragility`, for the ensemble and by default in its model.
 
-        The uncertainty of the block, and its dispersion from test to test, widen the curve; its band is that of the
-        motions. The lapse of `predict` is left out, because a weak motion does not overturn what it cannot lift.
+        The uncertainty of the block and its dispersion between tests widen the curve. The band represents the motions.
+        The lapse of `predict` is ignored, because a motion too weak for uplift does not overturn the block.
         """
         return fragility(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
     def spectrum(self, motions: Motions, *, model: Model | None = None, **options: Any) -> RockingSpectrum:
-        """Peak rotation of the specimen, and of larger and smaller ones of its shape, as `rocking.rocking_spectrum`.
+        """Compute peak rotations of the specimen and of similar blocks of other sizes with `rocking.rocking_spectrum`.
 
-        The ensemble's median is moved to each p, by default half to twice its own, in the calibrated model; fractiles
-        are those of the motions and of the ensemble's weight together.
+        The ensemble's median is moved to each p, by default from half to twice its value, in the calibrated model.
+        Fractiles combine the motions and the weights of the ensemble.
         """
         return rocking_spectrum(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
@@ -261,7 +270,7 @@ class Calibration(Result):
         )
 
     def _parameter(self, name: str) -> Parameter:
-        """One parameter for a figure: of both sides where they may differ."""
+        """Return one parameter for a figure, for both sides if they may differ."""
         from rocking.plot.curves import Parameter
 
         estimates = [one for key, one in self.estimates.items() if key.partition("_")[0] == name]
@@ -278,7 +287,7 @@ class Calibration(Result):
 def overturned_under(
     blocks: Bodies, motions: Motions, model: Model, threads: int | None, progress: bool | None
 ) -> NDArray[np.float32]:
-    """1 where a block overturns under a motion, else 0, and 0.5 where the simulation was given up; shape (n, m)."""
+    """Return 1 for overturning, 0 for none, 0.5 for an abandoned simulation, shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
     note_missing(simulated.unfinished.values)
     known = simulated.overturned.astype(np.float32).where(~simulated.unfinished, np.float32(0.5))
@@ -286,13 +295,13 @@ def overturned_under(
 
 
 def chances_of(share: Floats, effective: float, lapse: float) -> Floats:
-    """Probabilities of recorded outcomes, from a share of so many effective blocks; a known block counts as certain."""
+    """Compute probabilities of recorded outcomes from a share of effective blocks, certain for a known block."""
     expected = share if math.isinf(effective) else expected_share(share, effective)
-    return np.clip(with_outliers(expected, lapse), 0.0, 1.0)  # a sum of weights may be a rounding above 1
+    return np.clip(with_outliers(expected, lapse), 0.0, 1.0)  # rounding can make a sum of weights exceed 1
 
 
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
-    """Give each group a number from 0; without groups each motion is its own."""
+    """Return the group of each motion, numbered from 0. By default each motion is a group."""
     labels = groups_of(range(count) if groups is None else groups, "groups", count)
     checks.whole(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
@@ -314,30 +323,30 @@ def calibrate(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Calibration:
-    """Find the blocks that explain which motions overturned a specimen and which did not.
+    """Fit blocks to the outcomes (overturned or not) of a specimen under several motions.
 
     Parameters
     ----------
     motions : sequence of Motion or mapping of str to Motion
-        m motions, each of which the specimen met at rest.
+        m motions, each applied to the specimen at rest.
     overturned : array_like of bool, shape (m,)
-        Whether it overturned.
+        Whether the specimen overturned.
     model : {"nonlinear", "linear"}
-        Equation of motion; the linear one is faster and serves slender specimens.
+        Equation of motion. The linear model is faster and suitable for slender specimens.
     p, alpha, restitution : float or pair of float
-        A number, or a pair of equal ones, is known, on both sides and in every test; a pair is the lowest and highest
-        thinkable value on either side (rad/s; rad; -), with a prior that is even in the logarithm. A body of known size
-        has p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then follows from the
-        slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963), and of two sides from those of a rectangle whose centre of
-        mass is off the middle, whose p is that of the rectangle.
+        Known value on both sides in every test (a number, or a pair of equal numbers), or lowest and highest plausible
+        value on either side (rad/s, rad, -) with a log-uniform prior. A body of known size has p =
+        ``Block(width=..., height=...).p``. The restitution "housner" is computed from the slenderness as 1 - 1.5
+        sin(alpha)^2 (Housner 1963). For two sides it comes from a rectangle with an eccentric centre of mass and these
+        slendernesses, and p is the rectangle's.
     two_sided : bool
-        Whether the slendernesses of the two sides may differ, by a factor of 3 at most. By default they may, other than
-        in `calibrate_history`: hardly any specimen leans alike to both sides, and outcomes alone would not show it.
+        Whether the slendernesses of the two sides may differ, by a factor of at most 3. By default they may, unlike in
+        `calibrate_history`, because few specimens are symmetric and outcomes alone would not reveal this.
     lapse : float
-        Chance that an outcome is not that of a rocking block at all.
+        Probability that an outcome does not come from a rocking block.
     candidates : int
-        Approximate number of blocks that are simulated under every distinct motion; up to twice as many while runs
-        disagree, or while few of them represent a typical population.
+        Approximate number of blocks simulated under every distinct motion, up to twice as many if runs disagree or few
+        represent a typical population.
     ensemble : int
         Largest number of blocks for predictions.
     seed : int
@@ -348,23 +357,29 @@ def calibrate(
     Returns
     -------
     Calibration
-        Ensemble of blocks with weights, estimates, predictions for other motions.
+        Weighted ensemble of blocks, estimates, and predictions for other motions.
 
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, everything is known, the numbers of motions and outcomes differ, or all
-        outcomes are the same (they bound the block from one side only).
+        If an argument is out of range, all parameters are known, the numbers of motions and outcomes differ, or all
+        outcomes are equal (these bound the block from one side only).
+
+    See Also
+    --------
+    rocking.calibrate_history : fit a block to a rotation history.
+    rocking.read_tests : read tests from a table.
+    rocking.validate : compare predictions with tests.
 
     Notes
     -----
-    Each test is taken to have its own block, drawn from a population that is lognormal in p, alpha, restitution and in
-    the ratio of the sides' slendernesses. The posterior over populations is drawn by sequential Monte Carlo (Del Moral,
-    Doucet and Jasra 2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs each fill the
-    bounds evenly, then try blocks where their own fits are good. A candidate weighs what the density of candidates
-    lacks, so that the prior does not change (deterministic mixture; Owen and Zhou 2000).
+    The block of each test is drawn from a population that is lognormal in p, alpha, restitution and the ratio of the
+    slendernesses. The posterior over populations is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra
+    2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs fill the bounds evenly, then
+    add blocks near their own best fits. Weights inverse to the density of candidates preserve the prior (deterministic
+    mixture, Owen and Zhou 2000).
 
-    Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
+    Two mirrored blocks often explain the outcomes equally well. The estimates of each side are then wide, but the
     predictions are not.
 
     Examples
@@ -412,11 +427,11 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
     centres, dispersions = unpacked(populations)
     sides = dispersions[:, : len(space.unknown)].copy()
     if space.two_sided:
-        # The side's logarithm is that of the mean plus or minus half that of the ratio.
+        # The mean's logarithm plus or minus half the ratio's.
         sided = space.unknown.index(SIDED)
         sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersions[:, -1])
     dispersion = dict(zip(space.unknown, sides.mean(axis=0).tolist(), strict=True))
-    central = 0.9  # of the posterior between an estimate's lower and upper end
+    central = 0.9  # posterior share between the lower and upper end of an estimate
     tails = (0.5, 0.5 * (1.0 - central), 0.5 * (1.0 + central))
     estimates = {}
     for name, values in space.named(centres).items():
@@ -426,7 +441,7 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
 
 
 def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
-    """Outcomes as an array that nobody can change: yes or no, one for each motion, and not all the same."""
+    """Return outcomes (yes or no) as a read-only array, one for each motion and not all equal."""
     if np.ma.is_masked(overturned):
         raise InvalidOption("{} must be given for each motion, but some are masked", "overturned", value=overturned)
     values = np.asarray(overturned)

@@ -1,10 +1,9 @@
-"""The posterior over populations, drawn by sequential Monte Carlo, and the search for candidates to draw it from.
+"""Sequential Monte Carlo for the posterior over populations, and the search for its candidates.
 
-The likelihood of a population comes from blocks that were simulated near it. So what decides whether all regions of the
-posterior are found is where blocks were tried. Independent runs look everywhere, and then compare: each run fills the
-space evenly, then tries blocks where its own fits say: first where they are fair, at last where they are best. A narrow
-region lies within a wider one that is better than the rest, and so on down to it; going for the best at once would miss
-it. Runs share nothing until they are compared.
+The likelihood of a population comes from blocks simulated near it, so the candidates determine whether all regions of
+the posterior are found. Independent runs therefore search the whole space, share nothing, and are compared at the end.
+Each run fills the space evenly, then adds blocks near its own fits, first near fair ones, finally near the best,
+because a narrow region lies within a wider one that is better than the rest.
 """
 
 from __future__ import annotations
@@ -26,47 +25,47 @@ from rocking.core.progress import Progress
 from rocking.core.threads import cores
 from rocking.kernels import population as kernel
 
-#: Prior of the logarithm of a dispersion from test to test: its standard deviation.
+#: Prior standard deviation of the logarithm of a dispersion from test to test.
 _DISPERSION_LOG_DEVIATION: Final = 0.6
 
-#: Populations that are weighed at once: bounds the memory.
+#: Number of populations weighted at once, which bounds the memory.
 _BATCH: Final = 64
 
 
-#: Blocks are drawn from a guide with its dispersions wider by a factor.
+#: Factor on the dispersions of a guide to draw blocks.
 PROPOSAL_WIDTH: Final = 1.2
 
-#: A share that n simulated blocks estimate is itself uncertain: Jeffreys' prior, Beta(1/2, 1/2).
+#: Jeffreys' prior, Beta(1/2, 1/2), of a share estimated from n simulated blocks.
 _JEFFREYS: Final = 0.5
 
 
 def unpacked(populations: Floats) -> tuple[Floats, Floats]:
-    """Centres and dispersions, shape (c, k) each."""
+    """Return centres and dispersions, shape (c, k) each."""
     k = populations.shape[1] // 2
     return populations[:, :k], np.exp(populations[:, k:])
 
 
 def with_dispersions(space: Space, centres: Floats, rng: np.random.Generator) -> Floats:
-    """Give each centre dispersions from their prior."""
+    """Draw dispersions from the prior for each centre."""
     scores = rng.standard_normal(centres.shape)
     return np.hstack([centres, np.log(space.dispersions) + _DISPERSION_LOG_DEVIATION * scores])
 
 
 def log_prior_of_dispersions(space: Space, populations: Floats) -> Floats:
-    """Logarithm of the prior of the dispersions, up to a constant, shape (c,)."""
+    """Compute the log-prior of the dispersions up to a constant, shape (c,)."""
     k = populations.shape[1] // 2
     scores = (populations[:, k:] - np.log(space.dispersions)) / _DISPERSION_LOG_DEVIATION
     return np.asarray(-0.5 * (scores**2).sum(axis=1))
 
 
 def drawn(populations: Floats, widened: float, count: int, rng: np.random.Generator) -> Floats:
-    """Draw points from populations in turn, their dispersion times `widened`; shape (count, k)."""
+    """Draw points from populations in turn, with dispersions times `widened`, shape (count, k)."""
     centre, dispersion = unpacked(populations[np.arange(count) % len(populations)])
     return centre + widened * dispersion * rng.standard_normal(centre.shape)
 
 
 def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
-    """Logarithm of the density at points of what `drawn` draws, shape (n,)."""
+    """Compute the log-density of the distribution of `drawn` at points, shape (n,)."""
     centre, dispersion = unpacked(populations)
     middle = centre.mean(axis=0)
     centre, from_middle = centre - middle, points - middle
@@ -81,7 +80,7 @@ def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Blocks that were tried: coordinates (n, k), and 1 where one overturned, else 0, (n, m)."""
+    """Simulated blocks: coordinates (n, k), and overturning (1 or 0) under each motion, (n, m)."""
 
     space: Space
     points: Floats
@@ -91,7 +90,7 @@ class Candidates:
 
     @classmethod
     def pooled(cls, runs: Sequence[Candidates]) -> Candidates:
-        """Put candidates together."""
+        """Concatenate candidates."""
         return cls(
             runs[0].space,
             np.concatenate([run.points for run in runs]),
@@ -106,11 +105,11 @@ class Candidates:
 
     @cached_property
     def log_weights(self) -> Floats:
-        """Logarithm of how much of the space each stands for: dense regions weigh less (Owen and Zhou 2000)."""
+        """Compute the log-volume that each candidate represents, smaller in dense regions (Owen and Zhou 2000)."""
         return -self.log_density(self.points)
 
     def log_density(self, points: Floats) -> Floats:
-        """Logarithm of the number of candidates per volume at points in the space, shape (c,)."""
+        """Compute the log-density of candidates per volume at points in the space, shape (c,)."""
         parts = [np.full(len(points), np.log(self.evenly / self.space.volume))]
         parts += [np.log(count) + log_density(guide, PROPOSAL_WIDTH, points) for count, guide in self.guides]
         return np.asarray(np.logaddexp.reduce(parts))
@@ -118,7 +117,7 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Observed outcomes of m motions (m,), and those of n candidates under them, with the lapse."""
+    """Observed outcomes of m motions (m,), outcomes of n candidates under them, and the lapse."""
 
     candidates: Candidates
     observed: Flags
@@ -126,11 +125,11 @@ class Evidence:
     threads: int | None = None
 
     def of_tests(self, tests: Flags) -> Evidence:
-        """Evidence of some of the tests alone."""
+        """Return the evidence of some of the tests."""
         return replace(self, candidates=self.candidates.of_tests(tests), observed=self.observed[tests])
 
     def weights(self, populations: Floats) -> NDArray[np.float32]:
-        """Share of each population that each candidate stands for, shape (c, n); rows sum to 1."""
+        """Compute the share of each population that each candidate represents, shape (c, n), with row sums 1."""
         weights = self._factors(populations) @ self._powers
         weights -= weights.max(axis=1, keepdims=True)
         np.exp(weights, out=weights)
@@ -138,29 +137,29 @@ class Evidence:
         return weights
 
     def mean_weights(self, populations: Floats) -> Floats:
-        """Weights of the candidates, shape (n,), averaged over populations."""
+        """Compute weights of the candidates averaged over populations, shape (n,)."""
         batches = np.split(populations, range(_BATCH, len(populations), _BATCH))
         parts = [self.weights(batch).sum(axis=0, dtype=np.float64) for batch in batches]
         return np.asarray(np.sum(parts, axis=0) / len(populations))
 
     def probabilities(self, populations: Floats) -> Floats:
-        """Probability of overturning for each population and motion, shape (c, m)."""
+        """Compute the probability of overturning for each population and motion, shape (c, m)."""
         found, effective = self._shares(populations)
         return with_outliers(expected_share(found, effective[:, None]), self.lapse)
 
     def effective(self, populations: Floats) -> Floats:
-        """Effective number of candidates that speak for each population, shape (c,)."""
+        """Compute the effective number of candidates that represent each population, shape (c,)."""
         return self._shares(populations)[1]
 
     def log_likelihoods(self, populations: Floats) -> Floats:
-        """Log-likelihood of each population, shape (c,)."""
+        """Compute the log-likelihood of each population, shape (c,)."""
         if not len(populations):
             return np.zeros(0)
         chances = with_outliers(self._shares(populations)[0], self.lapse)
         return np.asarray(np.log(np.where(self.observed, chances, 1.0 - chances)).sum(axis=1))
 
     def _shares(self, populations: Floats) -> tuple[Floats, Floats]:
-        """Share of each population that overturns, shape (c, m), and the effective number of candidates behind it."""
+        """Compute the share of each population that overturns, shape (c, m), and its effective number of candidates."""
         overturned, powers, factors = self.candidates.overturned, self._powers, self._factors(populations)
         found = np.empty((len(populations), overturned.shape[1]), np.float32)
         effective = np.empty(len(populations))
@@ -173,11 +172,11 @@ class Evidence:
         starts = range(0, len(populations), each)
         with ThreadPoolExecutor(max(len(starts), 1)) as pool:
             list(pool.map(weigh, starts, (start + each for start in starts)))
-        # Rounding may take a share of all just above 1.
+        # Rounding can make a share exceed 1.
         return np.minimum(found, 1.0, dtype=np.float64), effective
 
     def _factors(self, populations: Floats) -> NDArray[np.float32]:
-        """Factors, shape (c, 2 k + 1), of `_powers` in the logarithm of a candidate's weight."""
+        """Return factors, shape (c, 2 k + 1), of `_powers` in the logarithm of a candidate's weight."""
         centre, dispersion = unpacked(populations)
         precision = dispersion**-2
         from_middle = precision * (centre - self._middle)
@@ -185,7 +184,7 @@ class Evidence:
 
     @cached_property
     def _powers(self) -> NDArray[np.float32]:
-        """Coordinates of the candidates from their middle, their squares and their weights, shape (2 k + 1, n)."""
+        """Return centred coordinates, their squares and the weights of the candidates, shape (2 k + 1, n)."""
         points = self.candidates.points - self._middle
         powers = np.vstack([points.T, points.T**2, self.candidates.log_weights])
         return np.ascontiguousarray(powers, dtype=np.float32)
@@ -196,38 +195,36 @@ class Evidence:
 
 
 def expected_share(share: Floats, effective: ArrayLike) -> Floats:
-    """Mean of a share that was found with so many effective blocks: a prediction from one block is no certainty."""
+    """Compute the mean of a share estimated from this many effective blocks."""
     count = np.asarray(effective)
     return np.asarray((count * share + _JEFFREYS) / (count + 2.0 * _JEFFREYS))
 
 
 def with_outliers(probabilities: Floats, lapse: float) -> Floats:
-    """Probabilities of recorded outcomes, from those of the rocking block."""
+    """Compute probabilities of recorded outcomes from those of the rocking block."""
     return lapse + (1.0 - 2.0 * lapse) * probabilities
 
 
-#: Independent runs.
+#: Number of independent runs.
 RUNS: Final = 2
 
-#: A run's candidates come in parts of equal size: two that fill the space, then one for each exponent of the likelihood
-#: that guides it. While the runs disagree, or too few candidates speak for what they found, they go on, `_MORE` times
-#: at most.
+#: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the guiding likelihood. The
+#: search continues at most `_MORE` times if runs disagree or too few candidates are effective.
 _FILLING: Final = 2
 _EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
 _MORE: Final = 2
 
-#: Draws from a posterior, and rounds of moves after each step of their tempering: where they guide the search, and
-#: where they are compared.
+#: Draws from a posterior, and rounds of moves after each tempering step, for the search and the comparison.
 _PROPOSAL: Final = (256, 2)
 _COMPARED: Final = (256, 4)
 
-#: Runs agree where R-hat is below this: their means then differ by less than two thirds of a standard deviation.
+#: Largest R-hat of agreeing runs: their means differ by less than two thirds of a standard deviation.
 AGREEMENT: Final = 1.1
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is asked: which populations of the space explain what was observed, and what a block does (`tried`)."""
+    """Calibration problem: parameter space, observed outcomes, and simulation of blocks (`tried`)."""
 
     space: Space
     observed: Flags
@@ -236,16 +233,16 @@ class Problem:
     threads: int | None = None
 
     def evidence(self, candidates: Candidates) -> Evidence:
-        """Compare candidates with what was observed."""
+        """Combine candidates with the observed outcomes."""
         return Evidence(candidates, self.observed, self.lapse, self.threads)
 
     def filling(self, count: int, rng: np.random.Generator) -> Candidates:
-        """Try blocks that fill the space evenly."""
+        """Simulate blocks that fill the space evenly."""
         points = self.space.quasi_random(count, rng)
         return Candidates(self.space, points, self.tried(points), count)
 
     def propose(self, candidates: Candidates, exponent: float, count: int, rng: np.random.Generator) -> Candidates:
-        """Try blocks where populations fit, too: the lower the exponent of the likelihood, the wider around."""
+        """Also simulate blocks near fitted populations, wider for a lower exponent of the likelihood."""
         populations = posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent, progress=False)
         points = drawn(populations, PROPOSAL_WIDTH, count, rng)
         points = points[self.space.contains(points)]
@@ -255,7 +252,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What the runs found: all their candidates, those of each, and populations drawn from those of each run alone."""
+    """Candidates of all runs together and of each run, and populations drawn from each run alone."""
 
     evidence: Evidence
     runs: tuple[Candidates, ...]
@@ -263,7 +260,7 @@ class Search:
 
     @property
     def effective(self) -> float:
-        """Effective number of candidates that speak for a typical population."""
+        """Effective number of candidates that represent a typical population."""
         return float(np.median(self.evidence.effective(np.vstack(self.posteriors))))
 
     @property
@@ -274,7 +271,7 @@ class Search:
 
 
 def search(problem: Problem, candidates: int, rng: np.random.Generator) -> Search:
-    """Try about so many candidates; up to twice as many while runs disagree or too few speak for what they found."""
+    """Simulate about this many candidates, up to twice as many while runs disagree or few represent the posterior."""
     part = max(candidates // (RUNS * (_FILLING + len(_EXPONENTS))), 1)
     streams = rng.spawn(RUNS)
     runs: Sequence[Candidates] = [problem.filling(_FILLING * part, stream) for stream in streams]
@@ -282,7 +279,7 @@ def search(problem: Problem, candidates: int, rng: np.random.Generator) -> Searc
     for _ in range(_MORE):
         if max(found.agreement.values()) >= AGREEMENT:
             exponents = 0.1, 0.3, 1.0
-        elif found.effective < 100.0:  # a lone block that happens to fit would make a population look excellent
+        elif found.effective < 100.0:  # a single block that happens to fit would make a population look excellent
             exponents = 1.0, 1.0, 1.0
         else:
             break
@@ -297,7 +294,7 @@ def _compared(
     part: int,
     streams: Sequence[np.random.Generator],
 ) -> Search:
-    """Let every run try blocks where its own fits say, and compare what they find."""
+    """Let every run add blocks near its own fits, and compare the runs."""
     longer, posteriors = [], []
     for run, rng in zip(runs, streams, strict=True):
         for exponent in exponents:
@@ -308,7 +305,7 @@ def _compared(
 
 
 def r_hat(runs: Floats) -> float:
-    """R-hat of the ranks, or distances from the middle, of draws (runs, draws); 1 where runs agree."""
+    """Compute R-hat of the ranks, or distances from the middle, of draws (runs, draws)."""
     from scipy.special import ndtri
     from scipy.stats import rankdata
 
@@ -329,10 +326,11 @@ def posterior(
     exponent: float = 1.0,
     progress: bool | None = None,
 ) -> Floats:
-    """Draw populations from the posterior, shape (count, 2 k); with an exponent of the likelihood, from a wider one.
+    """Draw populations from the posterior, shape (count, 2 k), or from a tempered one if an exponent is set.
 
-    Sequential Monte Carlo (Del Moral, Doucet and Jasra 2006): particles start with their centres at candidates, and
-    each step keeps half of them effective, resamples, and moves them by differences of others (differential evolution).
+    Sequential Monte Carlo (Del Moral, Doucet and Jasra 2006): the centres of the particles start at candidates. Each
+    step keeps half of the particles effective, resamples them, and moves them by differences of others (differential
+    evolution).
     """
     space, points = evidence.candidates.space, evidence.candidates.points
     centres = points[rng.choice(len(points), min(4 * count, len(points)), replace=False)]
@@ -352,7 +350,7 @@ def posterior(
 
 
 def _log_densities(evidence: Evidence, exponent: float, populations: Floats) -> tuple[Floats, Floats]:
-    """Logarithms of the densities from which particles start, and of the posterior."""
+    """Compute log-densities of the initial distribution of the particles and of the posterior."""
     candidates, centres = evidence.candidates, populations[:, : populations.shape[1] // 2]
     inside = candidates.space.contains(centres)
     end = log_prior_of_dispersions(candidates.space, populations)
@@ -372,7 +370,7 @@ def _move(
     end: Floats,
     rng: np.random.Generator,
 ) -> None:
-    """Move one half of the particles by differences within the other half, then the other way round."""
+    """Move one half of the particles by differences within the other half, then vice versa."""
     shuffled = rng.permutation(len(particles))
     half = len(particles) // 2
     for movers, guides in ((shuffled[:half], shuffled[half:]), (shuffled[half:], shuffled[:half])):
@@ -386,7 +384,7 @@ def _move(
 
 
 def systematic(weights: Floats, count: int, rng: np.random.Generator) -> Integers:
-    """Draw indices in proportion to weights that sum to 1, as evenly as can be."""
+    """Draw indices in proportion to weights with sum 1, as evenly as possible (systematic resampling)."""
     steps = np.cumsum(weights)
     return np.searchsorted(steps / steps[-1], (np.arange(count) + rng.random()) / count).astype(np.int64)
 
@@ -394,9 +392,9 @@ def systematic(weights: Floats, count: int, rng: np.random.Generator) -> Integer
 def _differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats:
     first, second = (rng.integers(len(guides), size=count) for _ in range(2))
     size = guides.shape[1]
-    # 2.38/sqrt(2 d) suits a normal posterior (ter Braak 2006); whole differences jump between optima.
+    # 2.38/sqrt(2 d) suits a normal posterior (ter Braak 2006). Whole differences jump between optima.
     scale = np.where(rng.random(count) < 0.1, 1.0, 2.38 / np.sqrt(2.0 * size))
-    # The jitter keeps moves from living in the particles' span.
+    # Jitter lets the moves leave the span of the particles.
     return scale[:, None] * (guides[first] - guides[second]) + 1e-3 * rng.standard_normal((count, size))
 
 
@@ -406,7 +404,7 @@ def _tempered(likelihood: Floats, step: float) -> Floats:
 
 
 def _step(likelihood: Floats, most: float) -> float:
-    """Growth of the exponent that keeps half of the particles effective, by bisection."""
+    """Find by bisection the increase of the exponent that keeps half of the particles effective."""
 
     def too_few(step: float) -> bool:
         return 1.0 / float((_tempered(likelihood, step) ** 2).sum()) / len(likelihood) < 0.5

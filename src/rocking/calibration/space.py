@@ -1,4 +1,4 @@
-"""Where plausible blocks are looked for, and what became of those that were tried."""
+"""Parameter space of plausible blocks, and its coordinates."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ PARAMETERS: Final = ("p", "alpha", "restitution")
 
 _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "initial": "rad"}
 
-#: What a block allows.
+#: Largest values of a block's parameters.
 HIGHEST: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
 
-#: The sides of a rigid body differ in slenderness, as much as the pivots' distances from the centre of mass. Their p
-#: and restitutions differ by terms of second order in it, which outcomes do not tell.
+#: The sides of a rigid body differ in slenderness as much as the pivots in distance from the centre of mass. Their p
+#: and restitution differ only to second order, which outcomes do not reveal.
 SIDED: Final = "alpha"
 
 
-#: Restitution that follows from the slenderness (Housner 1963), where it is positive; of two sides, from those of a
-#: rectangle whose centre of mass is off the middle. Then p is that of the rectangle, and the sides' own differ from it.
+#: Restitution from the slenderness (Housner 1963), where positive. For two sides it comes from a rectangle with an
+#: eccentric centre of mass. Then p is the rectangle's and differs from the sides' values.
 HOUSNER: Final = "housner"
 _HOUSNER_ENDS: Final = math.asin(math.sqrt(2.0 / 3.0))
 
 
-#: What to say where nothing is left to be found.
+#: Message for a problem without unknowns.
 EVERYTHING_IS_KNOWN: Final = (
     "everything is known of the block, so that nothing is to be found: give a pair (lowest, highest) for what is not "
     "known, or ask what the known block does by simulate, and how probably it overturns by fragility"
@@ -44,15 +44,15 @@ EVERYTHING_IS_KNOWN: Final = (
 
 Range = tuple[float, float]
 
-#: What is known of a parameter: its value, or its bounds; of a restitution also that Housner's rule holds.
+#: Knowledge of a parameter: its value, its bounds, or for a restitution Housner's rule.
 Knowledge = float | Range | Literal["housner"]
 
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Blocks in logarithmic coordinates: unknown ones of p, slenderness (mean of both sides) and restitution.
+    """Space of logarithms of the unknown parameters: p, slenderness (mean of both sides) and restitution.
 
-    Their bounds have the logarithms `lower` and `upper`; a restitution that is neither unknown nor known follows from
+    `lower` and `upper` are the logarithms of the bounds. A restitution that is neither unknown nor known follows from
     the slenderness. The last coordinate of a two-sided block is the logarithm of the ratio of its slendernesses.
     """
 
@@ -64,7 +64,7 @@ class Space:
 
     @classmethod
     def of(cls, p: Knowledge, alpha: Knowledge, restitution: Knowledge, *, two_sided: bool) -> Space:
-        """Space between bounds, of what is not known."""
+        """Create the space of the unknown parameters."""
         bounds, known = {}, {}
         for name, given in zip(PARAMETERS, (p, alpha, restitution), strict=True):
             if isinstance(given, str):
@@ -85,7 +85,7 @@ class Space:
         lower, upper = np.log(list(bounds.values())).T
         ratio = 0.0
         if two_sided and SIDED in bounds:
-            # No wider than the bounds of a side let it be: else a box around narrow bounds would be all but empty.
+            # Narrow bounds limit the ratio. Otherwise their box would be almost empty.
             ratio = min(math.log(3.0), math.log(bounds[SIDED][1] / bounds[SIDED][0]))
         return cls(tuple(bounds), known, lower, upper, ratio)
 
@@ -96,7 +96,7 @@ class Space:
 
     @property
     def dispersions(self) -> Floats:
-        """Median of the prior of the dispersion along each coordinate, shape (k,)."""
+        """Prior median of the dispersion along each coordinate, shape (k,)."""
         return np.full(len(self.unknown) + self.two_sided, 0.10)
 
     @property
@@ -106,7 +106,7 @@ class Space:
         return np.concatenate([self.lower, np.negative(ratio)]), np.concatenate([self.upper, ratio])
 
     def quasi_random(self, count: int, rng: np.random.Generator) -> Floats:
-        """Points that fill the space evenly: those of a scrambled Halton sequence that lie in it."""
+        """Return points of a scrambled Halton sequence that lie in the space, which they fill evenly."""
         from scipy.stats import qmc
 
         low, high = self.box
@@ -119,7 +119,7 @@ class Space:
 
     @cached_property
     def volume(self) -> float:
-        """Volume of the space, from the share of its box that it fills."""
+        """Volume of the space, from its share of the box."""
         from scipy.stats import qmc
 
         low, high = self.box
@@ -127,14 +127,14 @@ class Space:
         return float(np.mean(self.contains(points)) * np.prod(high - low))
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:
-        """Whether points lie in the box and each of their sides keeps to its bounds."""
+        """Return whether points lie in the box and each of their sides within its bounds."""
         low, high = self.box
         logs = self._log_sides(points)
         inside = np.all((logs >= self.lower) & (logs <= self.upper), axis=(1, 2))
         return np.asarray(inside & np.all((points >= low) & (points <= high), axis=1))
 
     def sides(self, points: Floats) -> dict[str, Floats]:
-        """Values of p, alpha and restitution by name, of side + and side -; shape (n, 2) each."""
+        """Return p, alpha and restitution by name, for side + and side -, shape (n, 2) each."""
         found = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
         values = found | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
         if "restitution" not in values and self.two_sided:
@@ -145,7 +145,7 @@ class Space:
         return values
 
     def named(self, points: Floats) -> dict[str, Floats]:
-        """Values of the unknown parameters by name, of each side where they differ; shape (n,) each."""
+        """Return the unknown parameters by name, for each side if they differ, shape (n,) each."""
         values = np.exp(self._log_sides(points))
         return {
             name + side: values[:, i, k]
@@ -154,13 +154,13 @@ class Space:
         }
 
     def blocks(self, points: Floats) -> Blocks:
-        """Blocks at points."""
+        """Return the blocks at points."""
         sides = self.sides(points)
-        # exp(log(1)) may be one unit in the last place above 1.
+        # exp(log(1)) may exceed 1 by one unit in the last place.
         return Blocks(sides["p"], sides["alpha"], np.minimum(sides["restitution"], 1.0))
 
     def _log_sides(self, points: Floats) -> Floats:
-        """Logarithms of the unknown parameters on each side, shape (n, 2, f)."""
+        """Return logarithms of the unknown parameters on each side, shape (n, 2, f)."""
         f = len(self.unknown)
         half = np.zeros((len(points), f))
         if self.two_sided:
@@ -169,19 +169,19 @@ class Space:
 
 
 def unit_of(estimate: str) -> str:
-    """Return the unit of an estimate: of a parameter, of either side, or of the initial rotation."""
+    """Return the unit of an estimate: a parameter (of either side) or the initial rotation."""
     return _UNITS[estimate.partition("_")[0]]
 
 
 def is_known(given: Any) -> bool:
-    """Whether a parameter has a value: a number, or a pair of equal ones."""
+    """Return whether a parameter has a value: a number, or a pair of equal numbers."""
     if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
         return True
     return len(given) == 2 and all(np.ndim(end) == 0 for end in given) and bool(given[0] == given[1])
 
 
 def known_value(value: object, name: str) -> float:
-    """Return the value of a known parameter, in the range that blocks allow."""
+    """Return the value of a known parameter, within the range allowed for blocks."""
     known = checks.positive(value, name, InvalidOption, unit_of(name))
     if known > HIGHEST[name]:
         raise InvalidOption(f"{{}} must be at most {HIGHEST[name]:g}, not {known:g}", name, value=known)
@@ -189,7 +189,7 @@ def known_value(value: object, name: str) -> float:
 
 
 def value_range(pair: Any, name: str, highest: float) -> Range:
-    """Return the two ends of a range, increasing numbers between 0 and `highest`."""
+    """Return the ends of a range, increasing numbers between 0 and `highest`."""
     try:
         low, high = (checks.number(value, f"each of {name}", InvalidOption) for value in pair)
     except (TypeError, ValueError):

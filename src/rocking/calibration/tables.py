@@ -1,4 +1,4 @@
-"""Tables that analyses read: tests and what was observed in them, rotation histories, ensembles of blocks."""
+"""Input tables of analyses: tests with observed outcomes, rotation histories, ensembles of blocks."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """Blocks that stand for one that is not quite known, their weights, and the equation of motion they are for."""
+    """Weighted ensemble of blocks that represents an uncertain block, and its equation of motion."""
 
     blocks: Blocks
     weights: Floats
@@ -46,7 +46,7 @@ class Ensemble:
 
 @dataclass(frozen=True)
 class _Table:
-    """Names of the columns of a file, and line number and cells by those names of each row."""
+    """Column names of a file, and line number and cells by column name of each row."""
 
     path: Path
     columns: tuple[str, ...]
@@ -62,7 +62,7 @@ class _Table:
         return tuple(self.convert(line, row[column].lower(), read, what) for line, row in self.rows)
 
     def convert(self, line: int, text: str, how: Callable[[str], Any], what: str) -> Any:
-        """Return a cell read in some way; an error says the line and what it should be."""
+        """Convert a cell, or raise an error with its line and the expected kind of value."""
         try:
             return how(text)
         except (ValueError, KeyError):
@@ -76,7 +76,7 @@ class _Table:
 def read_calibration(
     path: Path, *, channel: str | None, dt: float | None, units: str | None
 ) -> list[ShakeTest] | History:
-    """Read a table of tests, as `read_tests`, or of a history: `time_s`, and `rotation_rad` or `rotation_deg`."""
+    """Read tests (see `read_tests`) or a history with columns `time_s` and `rotation_rad` or `rotation_deg`."""
     table = read_table(path)
     if {"motion", "overturned"} <= set(table.columns):
         return _tests_of(table, channel=channel, dt=dt, units=units)
@@ -92,7 +92,7 @@ def read_calibration(
 
 
 def read_ensemble(path: Path) -> Ensemble:
-    """Read what `Calibration.to_csv` writes."""
+    """Read the ensemble that `Calibration.to_csv` writes."""
     table = read_table(path)
     columns = [
         [named(f"{name}_{side}", unit) for side in ("plus", "minus")]
@@ -115,7 +115,7 @@ def read_ensemble(path: Path) -> Ensemble:
 
 
 def read_table(path: Path, name: Callable[[str], str] = str) -> _Table:
-    """Read a CSV table whose header, by `name`, has each column once."""
+    """Read a CSV table with distinct columns, whose header cells are converted by `name`."""
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
@@ -138,7 +138,7 @@ def read_table(path: Path, name: Callable[[str], str] = str) -> _Table:
 
 
 def _tests_of(table: _Table, **about: Any) -> list[ShakeTest]:
-    """Return the tests of a table with these columns; an error has the line."""
+    """Return the tests of a table with these columns."""
     specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
     if len(specimens) > 1:
         raise table.error(f"the tests are of {counted(len(specimens), 'specimen')}: give each a table of its own")
@@ -148,7 +148,7 @@ def _tests_of(table: _Table, **about: Any) -> list[ShakeTest]:
 
 
 def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
-    """Read the motion of each row, scaled, with its vertical; its own channel, dt_s and units come first."""
+    """Read each row's motion, scaled and with its vertical. The row's channel, dt_s and units take precedence."""
     several = len({row["motion"] for _, row in table.rows}) > 1
     read: dict[tuple[object, ...], Motion] = {}
     motions = []
@@ -163,7 +163,7 @@ def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Mo
                 read[key] = _motion_of(table.path, name, vertical, several=several and not any(own), **about)
             motions.append(read[key] if scale == 1.0 else read[key].scaled(scale))
         except RockingError as error:
-            where = str(error).removesuffix(str(error.message))  # the record's file, before the table's
+            where = str(error).removesuffix(str(error.message))  # file of the record, before the table
             raise table.error(
                 where + error.message.template, *error.message.arguments, line=line, value=error.value
             ) from error
@@ -171,7 +171,7 @@ def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Mo
 
 
 def _motion_of(table: Path, name: str, vertical: str, *, several: bool, **about: Any) -> Motion:
-    """Read a motion with its vertical component, where one is named; a pulse is written as commands take it."""
+    """Read a record or pulse (in command syntax) with its optional vertical component."""
     record = _beside(table, name)
     upwards = _beside(table, vertical) if vertical else None
     if record != name or name.partition(":")[0] not in FAMILIES:
@@ -181,7 +181,7 @@ def _motion_of(table: Path, name: str, vertical: str, *, several: bool, **about:
 
 
 def _beside(table: Path, name: str) -> str:
-    """Name a file relative to a table's folder, where there is one there."""
+    """Return the path of a file relative to the table's folder if it exists there."""
     beside = table.parent / name
     return str(beside) if is_there(beside) else name
 
@@ -196,28 +196,34 @@ def _finite(text: str) -> float:
 def read_tests(
     path: str | Path, *, channel: str | None = None, dt: float | None = None, units: str | None = None
 ) -> list[ShakeTest]:
-    r"""Read tests of a specimen from a CSV table, one in each row.
+    r"""Read tests of a specimen from a CSV table, one per row.
 
     Parameters
     ----------
     path : str or pathlib.Path
-        Table with a header. Its column motion names a record file (relative to the table) or a shipped record, or is a
-        pulse, as "one-sine:amplitude=0.2g,frequency=2Hz"; scale multiplies it; vertical names its vertical component, a
-        file or a channel; channel, dt_s (step, s) and units are for files that do not say them. What was observed is in
-        overturned (1 or 0, yes or no, true or false). The columns name and group are those of `ShakeTest`. Columns of
-        other names are left aside, but a column specimen must name one specimen throughout.
+        Table with a header. Column "motion" contains a record file (relative to the table), a shipped record, or a
+        pulse such as "one-sine:amplitude=0.2g,frequency=2Hz", and "overturned" the outcome (1 or 0, yes or no, true or
+        false). Optional columns are "scale" (factor on the motion), "vertical" (file or channel of the vertical
+        component), "channel", "dt_s" (step, s) and "units" (for files that do not state them), "name" and "group" (see
+        `ShakeTest`). A column "specimen" must contain one specimen throughout. Other columns are ignored.
     channel, dt, units : optional
-        As for `rocking.read`, of rows that name none themselves.
+        As for `rocking.read`, for rows that do not state them.
 
     Returns
     -------
     list of ShakeTest
-        In the order of the rows.
+        Tests in the order of the rows.
 
     Raises
     ------
     UnreadableRecord
-        If the table or a motion cannot be read, a column is missing, or a cell is wrong; the line is that of the table.
+        If the table or a motion cannot be read, a column is missing, or a cell is invalid. The line refers to the
+        table.
+
+    See Also
+    --------
+    rocking.validate : compare predictions with tests.
+    rocking.calibrate : fit blocks to the outcomes of tests.
 
     Examples
     --------
@@ -239,9 +245,9 @@ def read_observed(
 ) -> dict[str, Any]:
     """Read a table of observed outcomes as arguments of `fit_fragility`.
 
-    It has a column overturned (with a column trials: how many of them), and either an intensity (`HEADINGS`) or a
-    motion, as in `read_tests`. A column group holds labels of outcomes that belong together; those under one motion do
-    in any case, as do groups that have a motion in common. A row without a label belongs to no group.
+    The table has a column "overturned" (a count with a column "trials"), and either an intensity (`HEADINGS`) or a
+    motion (see `read_tests`). Column "group" labels outcomes that belong together. Outcomes under one motion, and
+    groups with a common motion, always do. A row without label belongs to no group.
     """
     table = read_table(path, heading_of)
     columns = table.columns
@@ -268,7 +274,7 @@ def _against_intensity(table: _Table, heading: str, measure: Measure) -> dict[st
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
         raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
-    if measure.name not in ("pga", kind):  # the one that is taken if none is named
+    if measure.name not in ("pga", kind):  # "pga" is the default
         raise InvalidOption(
             f"{{}} is {measure.name}, but the outcomes are given by {kind}: leave it out",
             "measure",
@@ -288,7 +294,7 @@ def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, A
 
 
 def _clusters(table: _Table, families: Mapping[str, int]) -> list[int]:
-    """One number for all rows that share a motion (or a multiple of it) or a group, perhaps through others."""
+    """Return the cluster of each row: a common motion (or multiple) or group, even indirectly, joins rows."""
     clusters = [*range(len(table.rows))]
     first: dict[tuple[str, str | int], int] = {}
     for k, (_, row) in enumerate(table.rows):

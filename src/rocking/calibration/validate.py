@@ -1,4 +1,4 @@
-"""Predictions of tests on a shake table judged against what was observed: scores and reliability."""
+"""Comparison of predictions with shake-table tests: scores and reliability."""
 
 from __future__ import annotations
 
@@ -29,25 +29,30 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: What can predict the tests of a specimen.
+#: Sources of predictions.
 Source = Calibration | Validation | Bodies | Body | Sequence[Body]
 
 
 @dataclass(frozen=True)
 class ShakeTest:
-    """One test: the motion that a specimen at rest was subjected to, and what was observed.
+    """Test of a specimen at rest: applied motion and observed outcome.
 
     Parameters
     ----------
     motion : Motion
-        Motion of what the specimen stood on: measured, or else commanded.
+        Motion of the base of the specimen, preferably measured, otherwise commanded.
     overturned : bool
-        Whether it overturned.
+        Whether the specimen overturned.
     name : str
-        Name of the test; by default that of the motion.
+        Name of the test, by default of the motion.
     group : str
-        Tests that belong together, as those with one command or one source motion: standard errors allow for it. By
-        default those under the same motion do.
+        Label of tests that belong together, such as tests with one command or source motion. Standard errors allow for
+        groups. By default tests under one motion form a group.
+
+    See Also
+    --------
+    rocking.read_tests : read tests from a table.
+    rocking.validate : compare predictions with tests.
 
     Examples
     --------
@@ -78,7 +83,7 @@ class ShakeTest:
 
 @dataclass(frozen=True)
 class JudgedTest:
-    """What was predicted of one test, and what was observed.
+    """Prediction and observed outcome of one test.
 
     Attributes
     ----------
@@ -87,7 +92,7 @@ class JudgedTest:
     overturned : bool
         Whether the specimen overturned.
     probability : float
-        Predicted probability of that.
+        Predicted probability of overturning.
     """
 
     name: str
@@ -98,15 +103,15 @@ class JudgedTest:
 
 @dataclass(frozen=True)
 class Score:
-    """Mean score of predictions, the smaller the better, and its standard error.
+    """Mean score of predictions (smaller is better) and its standard error.
 
     Attributes
     ----------
     value, error : float
-        Mean over the tests and its standard error; NaN with a single cluster of tests, or an infinite score.
+        Mean over the tests and its standard error, which is NaN for a single cluster or an infinite score.
     skill, skill_error : float
-        1 less the score over that of the base rate of the same tests, and its standard error: 1 where predictions are
-        perfect, 0 where the base rate is as good, NaN where the base rate itself is perfect.
+        1 minus the ratio of the score to the base rate's score on the same tests, and its standard error. The skill is
+        1 for perfect predictions, 0 for the base rate, and NaN if the base rate is perfect.
     tests, clusters : int
         Number of tests, and of clusters of tests that belong together.
     """
@@ -121,16 +126,16 @@ class Score:
 
 @dataclass(frozen=True)
 class ShareInBin:
-    """An observed share of tests, and the band that it stays in where predictions are right.
+    """Observed share of overturning in a bin, and its consistency band.
 
     Attributes
     ----------
     lower, upper : float
         Ends of the bin.
     tests : int
-        Number of tests that the share is of.
+        Number of tests in the bin.
     predicted, observed : float
-        Shares that overturn.
+        Predicted and observed shares that overturn.
     band_lower, band_upper : float
         Ends of the central 90 % of the shares in simulations from the predictions (Broecker and Smith 2007).
     """
@@ -146,22 +151,26 @@ class ShareInBin:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModelValidation(Result):
-    """Predictions judged against tests; from `validate`.
+    """Comparison of predictions with tests, returned by `validate`.
 
-    Its table has a row for each test. Its figure is the reliability diagram with consistency bands.
+    The table has a row for each test. The figure is the reliability diagram with consistency bands.
 
     Attributes
     ----------
     tests : tuple of JudgedTest
         Predictions and observations.
     brier, log_loss : Score
-        Mean squared difference between probability and outcome; mean of -log of the probability of the outcome.
+        Mean squared difference between probability and outcome; mean of -log of the outcome's probability.
     reliability : tuple of ShareInBin
-        Shares that overturned, in bins of the predicted probability that hold tests.
+        Shares that overturned, in the nonempty bins of the predicted probability.
     reliability_chance : float
-        Chance of a reliability term of the Brier score as large or larger where the predictions are right.
+        Probability, if the predictions are correct, of a reliability term of the Brier score at least this large.
     description, model : str
-        What predicted, and by which equation of motion.
+        Source of the predictions, and equation of motion.
+
+    See Also
+    --------
+    rocking.validate : compare predictions with tests.
     """
 
     TABLES = ("tests",)
@@ -176,12 +185,12 @@ class ModelValidation(Result):
 
     @property
     def scores(self) -> Scores:
-        """Accuracy, log loss and Brier score, as of a calibration."""
+        """Accuracy, log loss and Brier score, as for a calibration."""
         return Scores.of([test.probability for test in self.tests], [test.overturned for test in self.tests])
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is to be known before the scores are believed, a sentence each."""
+        """Warnings about the scores, one sentence each."""
         notes = []
         fell = sum(test.overturned for test in self.tests)
         if fell in (0, len(self.tests)):
@@ -245,43 +254,48 @@ def validate(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> ModelValidation:
-    """Judge what blocks predict of tests against what was observed in them.
+    """Compare the predictions of blocks with the outcomes of tests.
 
     Parameters
     ----------
     tests : sequence of ShakeTest
-        m tests; `read_tests` reads them from a table.
+        m tests, for example from `read_tests`.
     blocks : Block, Blocks, RestrainedBlock, sequence of one kind, Calibration or Validation
-        One block that is taken as known; n of them, draws of what is not known of the specimen, or differs from test to
-        test; a calibration; or the result of its `cross_validate` of the same tests, in the order of the calibration.
+        Known block, n draws of a block that is uncertain or varies between tests, calibration, or result of its
+        `cross_validate` on the same tests in the same order.
     weights : array_like, optional
-        Weight of each of several blocks; by default all alike.
+        Weights of several blocks, equal by default.
     model : {"nonlinear", "linear"}, optional
-        Equation of motion; by default that of a calibration, else the nonlinear one.
+        Equation of motion, by default the model of a calibration, otherwise nonlinear.
     lapse : float, optional
-        Chance that an outcome is not that of a rocking block at all; by default that of a calibration, else 0.
+        Probability that an outcome does not come from a rocking block, by default from a calibration, otherwise 0.
     bins : int
-        Bins of the reliability diagram, of equal width.
+        Number of bins of the reliability diagram, of equal width.
     simulations, seed : int
-        Draws from the predictions, for bands and their chance, and their seed; each test has a block of its own.
+        Number of independent draws from the predictions for the bands and `reliability_chance`, and their seed.
     threads, progress : optional
         As for `simulate_many`.
 
     Returns
     -------
     ModelValidation
-        Scores with standard errors, reliability diagram, and each test.
+        Scores with standard errors, reliability diagram, and individual tests.
 
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or there is no test.
+        If an argument is out of range, or there are no tests.
+
+    See Also
+    --------
+    rocking.read_tests : read tests from a table.
+    rocking.calibrate : fit blocks to the outcomes of tests.
 
     Notes
     -----
-    The share of n blocks that overturn is itself uncertain; the probability is its mean by Jeffreys' prior, unless one
-    block is taken as known. Standard errors are those of the jackknife that leaves out clusters: tests of one group,
-    else of one motion. The base rate of the skill comes from the same tests, which favours it.
+    The share of n blocks that overturn is uncertain, so the probability is its mean under Jeffreys' prior, except for a
+    known block. Standard errors come from a jackknife over clusters: tests of one group, or else of one motion. The
+    base rate of the skill comes from the same tests, which favours the base rate.
 
     References
     ----------
@@ -331,7 +345,7 @@ def validate(
         else:
             description, how = pooled(blocks, weights), model or "nonlinear"
             bodies = bodies_of(blocks)
-            slenderness_of(bodies)  # refused before the work
+            slenderness_of(bodies)  # checked before the simulations
             shares = normalised_weights(weights, len(bodies)) / len(bodies)
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
         fell = overturned_under(bodies, distinct, how, threads, progress)
@@ -339,7 +353,7 @@ def validate(
     outcomes = rng.random((simulations, len(given))) < probabilities
     places = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
     term = miscalibration(probabilities, np.vstack([observed, outcomes]), places)
-    # Sums of the same numbers in another order differ in their last digits.
+    # Summation order changes the last digits.
     larger = np.count_nonzero(term[1:] >= term[0] - 1e-9 * abs(term[0]))
     rows = zip(numbered([test.name for test in given]), given, probabilities.tolist(), strict=True)
     return ModelValidation(
@@ -354,7 +368,7 @@ def validate(
 
 
 def _left_out(source: Validation, count: int, weights: object, lapse: float | None) -> Floats:
-    """Probabilities of the tests of a calibration while they were left out."""
+    """Return the predicted probabilities of left-out tests of a calibration."""
     if weights is not None or lapse is not None:
         name = "lapse" if weights is None else "weights"
         raise InvalidOption("predictions of tests that were left out take no {}: leave it out", name)
@@ -369,7 +383,7 @@ def _left_out(source: Validation, count: int, weights: object, lapse: float | No
 
 
 def score_of(each: Floats, observed: Flags, base: Callable[[float], float], clusters: Integers) -> Score:
-    """Mean of scores (m,), against the mean score `base` of the share that overturned, of which it is a function."""
+    """Compute mean score and skill against the base rate, whose score is `base` of the share that overturned."""
 
     def mean(chosen: Integers) -> float:
         return float(each[chosen].mean())
@@ -383,7 +397,7 @@ def score_of(each: Floats, observed: Flags, base: Callable[[float], float], clus
 
 
 def _jackknife(statistic: Callable[[Integers], float], clusters: Integers) -> float:
-    """Find the standard error of a statistic of tests, from what it is without each of the clusters."""
+    """Compute the standard error of a statistic of tests by leaving out each cluster."""
     each = np.unique(clusters)
     if len(each) < 2:
         return math.nan
@@ -398,7 +412,7 @@ def _entropy(share: float) -> float:
 
 
 def miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Floats:
-    """Reliability term of the Brier score (Murphy 1973) of outcomes (s, m), with probabilities and bins (m,)."""
+    """Compute the reliability term of the Brier score (Murphy 1973) of outcomes (s, m) in bins (m,)."""
     counts = np.bincount(bins)
     member = (bins[:, None] == np.arange(len(counts))).astype(np.float64)
     excess = (observed - probabilities) @ member
@@ -406,14 +420,14 @@ def miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Fl
 
 
 def _bin(k: int, bins: int, chosen: Flags, probabilities: Floats, observed: Flags, drawn: Flags) -> ShareInBin:
-    """Share of the tests in bin k, and the band of simulated shares: at most 5 % of them lie beyond each end."""
+    """Return the share of the tests in bin k, and the band of simulated shares with at most 5 % beyond each end."""
     band = np.quantile(drawn[:, chosen].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
     shares = float(probabilities[chosen].mean()), float(observed[chosen].mean())
     return ShareInBin(k / bins, (k + 1) / bins, int(chosen.sum()), *shares, *band)
 
 
 def _with_error(value: float, error: float) -> tuple[str, str]:
-    """Value and standard error as text, to two digits of the error."""
+    """Return value and standard error as text, to two digits of the error."""
     if not (math.isfinite(value) and math.isfinite(error)):
         if math.isinf(value):
             return ("infinite" if value > 0.0 else "-infinite"), "-"

@@ -1,1 +1,1 @@
-"""What every other part uses: checks, numbers with units, results, tables and files, progress, threads."""
+"""Shared foundation: checks, numbers with units, results, tables and files, progress, threads."""

@@ -1,4 +1,4 @@
-"""Names for the arrays that the package passes about."""
+"""Array types of the package, and helpers for arrays."""
 
 from collections.abc import Iterator
 
@@ -11,22 +11,22 @@ Flags = NDArray[np.bool_]
 
 
 def as_asked(values: Floats) -> Floats:
-    """Return an array, or where it has no dimension the number in it: a number for a number, an array for an array."""
+    """Return an array, or its number if it has no dimension."""
     answer: Floats = values[()]
     return answer
 
 
 def without_dust(values: ArrayLike, size: float) -> Floats:
-    """Return values, and zeros in place of those that are only rounding beside a size."""
+    """Return values with zeros in place of those at the rounding level of a size."""
     return np.where(np.abs(values) > 2.0**-40 * size, values, 0.0)
 
 
 def evenly(count: int, most: int) -> list[int]:
-    """Return positions of at most so many of a number of things, evenly from the first to the last."""
+    """Return at most `most` of `count` positions, evenly from the first to the last."""
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
 
 
 def ranges(count: int, size: int) -> Iterator[slice]:
-    """Yield ranges of at most a size that cover a number of things: for calls of kernels, which no interrupt ends."""
+    """Yield ranges of at most `size` that cover `count` items, because kernel calls cannot be interrupted."""
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))

@@ -1,4 +1,4 @@
-"""Brackets of changes, halved: one until it is narrow, or many of which each middle takes long to know."""
+"""Bisection: of one bracket until it is narrow, or of many at once with slow evaluations of the middles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rocking.core.arrays import Flags, Floats
 def bisected(
     low: float, high: float, holds: Callable[[float], bool], *, width: float = 0.0, halvings: float = math.inf
 ) -> tuple[float, float]:
-    """Return a bracket of where something begins to hold: at most so wide, halved so often, or as narrow as can be."""
+    """Return a bracket of where a condition begins to hold, limited by width, number of halvings or resolution."""
     while high - low > width and halvings > 0:
         between = 0.5 * (low + high)
         if not low < between < high:
@@ -24,17 +24,17 @@ def bisected(
 
 
 def middle(low: Floats, high: Floats) -> Floats:
-    """Return the numbers halfway between two ends."""
+    """Return the midpoints of brackets."""
     return 0.5 * (low + high)
 
 
 def is_wide(low: Floats, high: Floats, tolerance: Floats | float) -> Flags:
-    """Return which brackets are wider than this share of their upper end, and hold a number between their ends."""
+    """Return which brackets are wider than this fraction of their upper end and contain a number between their ends."""
     between = middle(low, high)
     return np.asarray((high - low > tolerance * high) & (between > low) & (between < high))
 
 
 def halved(low: Floats, high: Floats, in_upper: Flags, in_lower: Flags) -> tuple[Floats, Floats]:
-    """Return brackets cut at their middle, where it is known whether the change lies above it or below it."""
+    """Return brackets cut at their middle, on the side that contains the change if known."""
     between = middle(low, high)
     return np.where(in_upper, between, low), np.where(in_lower, between, high)

@@ -1,7 +1,7 @@
-"""Checks of arguments, the same for every part of the package; each is told which error to raise.
+"""Checks of arguments, each with the type of error to raise.
 
-A number is any real number of Python's or NumPy's, or an array of no dimension that holds one. Text and truth values
-are not, though ``float`` takes them: "0.2" is more often a mistake than a wish.
+A number is any real number of Python or NumPy, or an array without dimensions. Text and truth values are rejected
+although ``float`` accepts them, because a text such as "0.2" is usually a mistake.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from numpy.typing import ArrayLike
 from rocking.core.arrays import Floats
 from rocking.errors import RockingError, literal
 
-#: Characters of a value in a message.
+#: Largest number of characters of a value in a message.
 _SHOWN: Final = 60
 
 
 class Error(Protocol):
-    """What makes an error of a sentence, the names of arguments in it, and the value that is refused."""
+    """Constructor of an error from a message, the argument names in it, and the rejected value."""
 
     def __call__(self, message: str, *arguments: str, value: object = None) -> RockingError:
         """Return the error."""
 
 
 def number(value: object, name: str, error: Error) -> float:
-    """Return `value` as a float, or raise `error` unless it is one real number (perhaps not finite)."""
+    """Return `value` as a float, or raise `error` unless it is one real number (possibly not finite)."""
     result = _real(value)
     if result is None:
         raise error(f"{{}} must be a number, not {shown(value)}", name, value=value)
@@ -63,7 +63,7 @@ def positive(
 
 
 def within(value: object, name: str, error: Error, low: float, high: float, unit: str = "") -> float:
-    """Return `value` as a float, or raise `error` unless it is a number from `low` to `high`, both included."""
+    """Return `value` as a float, or raise `error` unless it is a number from `low` to `high` inclusive."""
     result = _real(value)
     if result is None or not low <= result <= high:
         raise error(f"{{}} must be a number from {low:g} to {high:g}{_in(unit)}, not {shown(value)}", name, value=value)
@@ -79,14 +79,14 @@ def share(value: object, name: str, error: Error, below: float = 1.0) -> float:
 
 
 def flag(value: object, name: str, error: Error) -> bool:
-    """Return `value` as a bool, or raise `error` unless it is True or False, of Python's or NumPy's."""
+    """Return `value` as a bool, or raise `error` unless it is True or False of Python or NumPy."""
     if not isinstance(value, bool | np.bool_):
         raise error(f"{{}} must be True or False, not {shown(value)}", name, value=value)
     return bool(value)
 
 
 def whole(value: object, name: str, error: Error, least: int, most: int | None = None) -> int:
-    """Return `value` as an int, or raise `error` unless it is a whole number of a whole type within its bounds."""
+    """Return `value` as an int, or raise `error` unless it has an integer type and is within its bounds."""
     single = _single(value)
     usable = isinstance(single, Integral) and not isinstance(single, bool)
     if not usable or not least <= single or not (most is None or single <= most):
@@ -103,7 +103,7 @@ def text(value: object, name: str, error: Error) -> str:
 
 
 def path(value: object, name: str, error: Error) -> Path:
-    """Return `value` as a path, or raise `error` unless it is one, or text."""
+    """Return `value` as a path, or raise `error` unless it is a path or text."""
     if not isinstance(value, (str, PathLike)):
         raise error(f"{{}} must be text or a path, not {shown(value)}", name, value=value)
     return Path(value)
@@ -117,7 +117,7 @@ def one_of(value: object, name: str, error: Error, choices: Sequence[str]) -> st
 
 
 def mapping(value: object, name: str, error: Error, example: str) -> Mapping[Any, Any]:
-    """Return `value`, or raise `error` unless it is a mapping with an entry or more."""
+    """Return `value`, or raise `error` unless it is a nonempty mapping."""
     if not isinstance(value, Mapping) or not value:
         raise error(
             f"{{}} must be a mapping with one entry or more, as {example}, not {shown(value)}", name, value=value
@@ -126,14 +126,14 @@ def mapping(value: object, name: str, error: Error, example: str) -> Mapping[Any
 
 
 def several(value: object, name: str, error: Error) -> list[Any]:
-    """Return what `value` holds, one after the other, or raise `error` where it is text, a mapping or no collection."""
+    """Return the items of `value`, or raise `error` if it is text, a mapping or not a collection."""
     if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
         raise error(f"{{}} must be a list, not {shown(value)}", name, value=value)
     return [*value]
 
 
 def grid_size(sizes: Mapping[str, int], error: Error, most: int = 10_000_000) -> None:
-    """Raise `error` if the product of the sizes of a grid's axes, by name, is above `most`."""
+    """Raise `error` if the product of the sizes of a grid's axes, by name, exceeds `most`."""
     points = math.prod(sizes.values())
     if points > most:
         axes = " x ".join(f"{size} {name}" for name, size in sizes.items())
@@ -141,7 +141,7 @@ def grid_size(sizes: Mapping[str, int], error: Error, most: int = 10_000_000) ->
 
 
 def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
-    """Return real numbers (perhaps not finite) as an array of their shape, or raise `error`."""
+    """Return real numbers (possibly not finite) as an array of the same shape, or raise `error`."""
     if np.ma.is_masked(values):
         raise error("{} must be numbers throughout, but some are masked", name, value=values)
     try:
@@ -156,7 +156,7 @@ def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
 
 
 def answers_or_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
-    """Return real numbers, or truth values as 1 and 0, as `numbers` does."""
+    """Return real numbers, or truth values as 1 and 0, like `numbers`."""
     if np.ma.is_masked(values):
         raise error("{} must be given throughout, but some are masked", name, value=values)
     given = np.asarray(values)
@@ -180,7 +180,7 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
 
 
 def axis(values: ArrayLike, name: str, error: Error) -> Floats:
-    """Return finite numbers of an axis, of any sign, in increasing order, or raise `error`; one number is an axis."""
+    """Return finite, increasing numbers of an axis (one or more, of any sign), or raise `error`."""
     found = np.atleast_1d(numbers(values, name, error))
     if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found)) or np.any(np.diff(found) <= 0.0):
         raise error("{} must be increasing finite numbers", name, value=values)
@@ -188,19 +188,19 @@ def axis(values: ArrayLike, name: str, error: Error) -> Floats:
 
 
 def shown(value: object) -> str:
-    """Return a value as a message shows it: in one line that is not too long."""
+    """Return a value for a message, in one line of limited length."""
     text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())
     return literal(text if len(text) <= _SHOWN else f"{text[: _SHOWN - 10]}...{text[-7:]}")
 
 
 def nearest(name: str, known: Iterable[str], likeness: float = 0.6) -> str | None:
-    """Return the known name that `name` is like, by this part of its letters at least; None where it is like none."""
+    """Return the known name that shares at least this fraction of its letters with `name`, or None."""
     close = difflib.get_close_matches(name, [*known], n=1, cutoff=likeness)
     return close[0] if close else None
 
 
 def meant(name: str, known: Iterable[str], otherwise: str = "", likeness: float = 0.6) -> str:
-    """Return the end of a sentence that refuses an unknown name: the one that may be meant, or else what else helps."""
+    """Return the end of a message about an unknown name: a similar known name, or another hint."""
     found = nearest(name, known, likeness)
     if found is None:
         return otherwise
@@ -208,19 +208,19 @@ def meant(name: str, known: Iterable[str], otherwise: str = "", likeness: float 
 
 
 def hint_of_degrees(angle: float) -> str:
-    """Return the end of a sentence that refuses an angle, rad, where it would make sense in degrees; else nothing."""
+    """Return a hint for a message if a rejected angle, rad, is plausible in degrees, else an empty text."""
     if not 0.5 * math.pi <= abs(angle) < 90.0:
         return ""
     return f"; if it is in degrees, give math.radians({angle:g})"
 
 
 def hint_of_percent(factor: float) -> str:
-    """Return the end of a sentence that refuses a factor of at most 1 where it would make sense in per cent."""
+    """Return a hint for a message if a rejected factor (at most 1) is plausible in per cent, else an empty text."""
     return f"; if it is in per cent, give {factor / 100.0:g}" if 2.0 < factor <= 100.0 else ""
 
 
 def _real(value: object) -> float | None:
-    """Value as a float (infinite where it is too large for one), or None if it is not one real number."""
+    """Return a float (infinite if too large), or None for anything but one real number."""
     single = _single(value)
     if not isinstance(single, Real) or isinstance(single, bool):
         return None
@@ -231,7 +231,7 @@ def _real(value: object) -> float | None:
 
 
 def _single(value: object) -> Any:
-    """Value, or what an array of no dimension holds."""
+    """Return the value, or the item of an array without dimensions."""
     return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
 
 

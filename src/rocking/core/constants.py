@@ -1,11 +1,11 @@
-"""Constants that every layer shares, and the equations of motion that can be solved."""
+"""Shared constants, and the equations of motion."""
 
 from typing import Final, Literal
 
-#: Standard acceleration of gravity, m/s^2; readers and blocks use the same value.
+#: Standard acceleration of gravity of readers and blocks, m/s^2.
 STANDARD_GRAVITY: Final = 9.80665
 
-#: Highest degree of a motion's pieces: an arc's series takes two powers more.
+#: Highest degree of a motion's pieces. The series of an arc exceeds it by two.
 HIGHEST_DEGREE: Final = 20
 
 #: Version of the package.

@@ -1,4 +1,4 @@
-"""What is written to stderr beside the result: a bar for work that takes long; notes."""
+"""Output on stderr: progress bar of long computations, and notes."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from rocking.errors import Message, OutsideFit, Spelling, as_argument
 if TYPE_CHECKING:
     import rich.progress
 
-#: Work that is over sooner than this shows no bar, s.
+#: Shortest time before a bar is shown, s.
 _PATIENCE: Final = 1.0
 
-#: Who reads notes: a person at a terminal, everybody, nobody.
+#: Audience of notes: a person at a terminal, everybody, nobody.
 Audience = Literal["terminal", "everybody", "nobody"]
 
 
 @dataclass(frozen=True)
 class _Listener:
-    """Who reads notes, how names of arguments are written for them, and which notes they have seen."""
+    """Audience of notes, spelling of argument names for it, and notes already shown."""
 
     audience: Audience = "terminal"
     spelling: Spelling = as_argument
@@ -37,13 +37,13 @@ _listener = _Listener()
 
 
 def spelled(message: Message) -> str:
-    """Return a message with names of arguments as the present reader knows them: on the command line its options."""
+    """Return a message with argument names for the present reader, options on the command line."""
     return message.text(_listener.spelling)
 
 
 def note(message: Message | str) -> None:
-    """Print a sentence on stderr, on a line of its own, for those whom `notes_for` has chosen."""
-    # The template of a sentence in which no argument is named has no places to fill.
+    """Print a sentence on a line of stderr for the audience chosen by `notes_for`."""
+    # The template of a sentence without argument names has no placeholders.
     whole = message if isinstance(message, Message) else Message(message)
     if _listener.seen is not None:
         if whole in _listener.seen:
@@ -55,7 +55,7 @@ def note(message: Message | str) -> None:
 
 @contextlib.contextmanager
 def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[None]:
-    """Choose who reads notes while a command runs, and how arguments are named; each note is given once."""
+    """Set audience of notes and spelling of arguments while a command runs, and show each note once."""
     global _listener
 
     def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
@@ -77,10 +77,10 @@ def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[
 
 
 class Progress:
-    """Progress bar on stderr with the rate and the time left, drawn once the work has taken a second.
+    """Progress bar on stderr with rate and remaining time, shown after one second.
 
-    It is shown only if stderr is a terminal, unless `show` says otherwise; steps that were `done` before do not count
-    for the rate.
+    The bar appears only on a terminal unless `show` is set. Steps that were already `done` do not count towards the
+    rate.
     """
 
     def __init__(self, what: str, total: int, *, show: bool | None = None, done: int = 0) -> None:
@@ -100,13 +100,13 @@ class Progress:
             self._bar.stop()
 
     def note(self, text: str) -> None:
-        """Show a few words behind what is being done."""
+        """Show a few words after the description of the task."""
         self.what = f"{self.what.partition(',')[0]}, {text}"
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], description=self.what)
 
     def advance(self, steps: int = 1) -> None:
-        """Count steps that are done."""
+        """Add completed steps."""
         self.done += steps
         if not self._show or time.monotonic() - self._start < _PATIENCE:
             return

@@ -1,4 +1,4 @@
-"""Results: text, plain values, tables made from one list of columns, figures; analyses add a labelled dataset."""
+"""Base classes of results: text, plain values, tables, figures and labelled datasets."""
 
 from __future__ import annotations
 
@@ -34,23 +34,23 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Rows of a table for people.
+#: Rows of a table for display.
 _SHOWN = 12
 
 
 class Row(NamedTuple):
-    """One statement: a line of a summary, or an entry of a dictionary.
+    """Line of a summary, or entry of a dictionary.
 
     Attributes
     ----------
     name : str
-        Words in a summary, the name of a quantity in a dictionary.
+        Words in a summary, name of a quantity in a dictionary.
     value : object
-        Its value; in a summary a text with the digits that are known.
+        Value, in a summary as text with the significant digits.
     unit : str
-        Unit of the value, "1" where it has none.
+        Unit of the value, "1" if dimensionless.
     note : str
-        What a summary adds, with the mark that separates it from the value.
+        Addition in a summary, with the mark that separates it from the value.
 
     Examples
     --------
@@ -70,22 +70,22 @@ class Row(NamedTuple):
 
 
 def text_of(rows: Iterable[Row], width: int) -> str:
-    """Return rows as lines: names in a column of so many letters, then value, unit and note."""
+    """Return rows as lines: names in a column of this width, then value, unit and note."""
     return "\n".join(f"{row.name:<{width}}{row.text}" for row in rows)
 
 
 def dictionary_of(rows: Iterable[Row]) -> dict[str, Any]:
-    """Return rows as plain values by name, units in the names; None for what is not a finite number."""
+    """Return rows as plain values by name with unit, with None for numbers that are not finite."""
     return {named(row.name, row.unit): plain(row.value) for row in rows}
 
 
 class Result(ABC):
-    """Base class of everything that simulations and analyses return.
+    """Base class of all results of simulations and analyses.
 
     Attributes
     ----------
     TABLES : collection of str
-        Names of the tables, the default one first; empty where the result has none.
+        Names of the tables, the default one first.
     """
 
     TABLES: ClassVar[Collection[str]] = ()
@@ -95,16 +95,16 @@ class Result(ABC):
 
     @abstractmethod
     def summary(self) -> str:
-        """Return the result in words: lines of text and tables."""
+        """Return the result as text: lines and tables."""
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as plain values by name; units are in the names, or SI."""
+        """Return the result as plain values by name, with units in the names or SI."""
 
     def to_json(self, path: str | Path) -> None:
-        """Write the values of `to_dict` as JSON to a file, whole or not at all; NaN and infinity are null.
+        """Write the values of `to_dict` to a JSON file, with null for NaN and infinity, completely or not at all.
 
-        `OutputError` if the file cannot be written.
+        Raises `OutputError` if the file cannot be written.
         """
         write_text(path, to_json(self.to_dict()) + "\n")
 
@@ -113,9 +113,9 @@ class Result(ABC):
         raise NotImplementedError(table)
 
     def to_dataframe(self, table: str | None = None) -> pd.DataFrame:
-        """Return one of the tables (`TABLES`), by default the first, as a data frame with units in its columns' names.
+        """Return a table (one of `TABLES`, by default the first) as a data frame with units in the column names.
 
-        `InvalidOption` if there is no such table.
+        Raises `InvalidOption` if the table does not exist.
         """
         names = [*self.TABLES]
         if not names:
@@ -123,11 +123,14 @@ class Result(ABC):
         return frame_of(self._columns(checks.one_of(table or names[0], "table", InvalidOption, names)))
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
-        """Write a table of `to_dataframe` as text columns with a header, as `to_json`; "inf" stands for infinity."""
+        """Write a table of `to_dataframe` to a CSV file, with "inf" for infinity, like `to_json`."""
         write_csv(path, self.to_dataframe(table), digits=self._FORMAT)
 
     def to_excel(self, path: str | Path) -> None:
-        """Write all tables as the sheets of a workbook (.xlsx), as `to_json`; `InvalidOption` without openpyxl."""
+        """Write all tables as sheets of a workbook (.xlsx), like `to_json`.
+
+        Raises `InvalidOption` without openpyxl.
+        """
         write_excel(path, {table: self.to_dataframe(table) for table in self.TABLES or [""]})
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -136,21 +139,21 @@ class Result(ABC):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Axes for the main panel alone; by default a new figure has all panels.
+            Axes for the main panel alone, by default a new figure with all panels.
         title : str
-            Title; by default it describes what is drawn.
+            Title, by default a description of the result.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
 
         Returns
         -------
         matplotlib.figure.Figure
-            The new figure, or that of `ax`.
+            New figure, or the figure of `ax`.
 
         Raises
         ------
         InvalidOption
-            If the result has no figure, the size is not two positive numbers, or `ax` are no axes.
+            If the result has no figure, the size is not two positive numbers, or `ax` is not an Axes object.
         """
         raise InvalidOption(f"a {type(self).__name__} has no figure; use summary or to_dict")
 
@@ -168,7 +171,7 @@ class Result(ABC):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DatasetResult(Result):
-    """Result whose numbers are a dataset with labels, `data`.
+    """Result with a labelled dataset, `data`.
 
     Attributes
     ----------
@@ -177,7 +180,7 @@ class DatasetResult(Result):
     TABLES : mapping of str to tuple of str
         Tables, the default one first, and the variables of each.
     POOLED : tuple of str
-        Dimensions over which some of the numbers were taken together: a part of one of them has no numbers of its own.
+        Dimensions over which some numbers are aggregated. These numbers do not apply to a part of a dimension.
     """
 
     TABLES: ClassVar[Mapping[str, tuple[str, ...]]]
@@ -186,22 +189,23 @@ class DatasetResult(Result):
     data: xr.Dataset
 
     def select(self, **labels: Any) -> Self:
-        """Return the part at some labels of its dimensions, which are all kept.
+        """Return the part at some labels of its dimensions, all of which are kept.
 
         Parameters
         ----------
         **labels : object
-            Label or labels for each dimension, as ``alpha=0.2`` or ``alpha=[0.1, 0.2]``; the nearest of numbers.
+            Label or labels for each dimension, such as ``alpha=0.2`` or ``alpha=[0.1, 0.2]``. Numbers select the
+            nearest.
 
         Returns
         -------
         same type
-            The result there.
+            Selected part.
 
         Raises
         ------
         InvalidOption
-            If there is no such dimension or label, or numbers over all of that dimension stand in the result.
+            If a dimension or label does not exist, or the result contains numbers aggregated over that dimension.
         """
         for name in labels.keys() & {*self.POOLED}:
             raise InvalidOption(
@@ -225,7 +229,7 @@ class DatasetResult(Result):
 
     @staticmethod
     def _kept_of(data: xr.Dataset) -> xr.Dataset:
-        """Return the data of a part without what belongs to another part."""
+        """Return the data of a part without variables that belong to another part."""
         return data
 
     def _columns(self, table: str) -> list[Column]:
@@ -235,7 +239,7 @@ class DatasetResult(Result):
         return self.data[[*self.TABLES[name]]]
 
     def to_netcdf(self, path: str | Path) -> None:
-        """Write `data` to a NetCDF file, as `to_json`."""
+        """Write `data` to a NetCDF file, like `to_json`."""
         write_netcdf(path, self.data)
 
     def __repr__(self) -> str:
@@ -248,12 +252,12 @@ class DatasetResult(Result):
 
 
 def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: str = "") -> tuple[Any, Any, Any]:
-    """Return a variable of a dataset: its dimensions, its values, and its unit and meaning where there are any."""
+    """Return a variable of a dataset: dimensions, values, and optional unit and meaning."""
     return dims, values, {name: said for name, said in (("units", unit), ("long_name", meaning)) if said}
 
 
 def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Table of at most a dozen rows, evenly from the first to the last; it says so where there are more."""
+    """Return a table of at most a dozen rows, evenly from first to last, with a remark if there are more."""
     chosen = evenly(len(rows), _SHOWN)
     table = text_table(header, [rows[k] for k in chosen])
     return table if len(chosen) == len(rows) else f"{table}\n({len(chosen)} of {len(rows)} rows)"

@@ -1,4 +1,4 @@
-"""Results as people and machines read them: text tables, names with units, plain values for JSON."""
+"""Output of results: text tables, names with units, plain values for JSON, files."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 #: Wider than any table, so that none is wrapped or cut.
 _WIDTH: Final = 100_000
 
-#: Rounding of a number that some operations made.
+#: Rounding of a number after a few operations.
 _ROUNDING: Final = 2.0**-50
 
-#: Letters of a name that nobody else has.
+#: Number of letters of a unique name.
 _HASH: Final = 8
 
-#: A number with a decimal comma, and maybe a unit.
+#: Number with a decimal comma and an optional unit.
 _WITH_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*[a-zA-Z°/%]*)")
 
 
 class Column(NamedTuple):
-    """One column of a table, from which files, data frames and text are made.
+    """Column of a table, the source of files, data frames and text.
 
     Attributes
     ----------
@@ -49,9 +49,9 @@ class Column(NamedTuple):
     values : array_like
         One value for each row.
     unit : str
-        Unit of the values, "1" where they have none; part of the column's name in files.
+        Unit of the values, part of the column's name in files, or "1".
     label : str
-        Heading in texts for people; empty where only files have the column.
+        Heading in displayed text, empty for columns in files only.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Column(NamedTuple):
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Columns of text at least two spaces apart: numbers, to five digits, on the right, texts on the left."""
+    """Format columns at least two spaces apart: numbers, to five digits, on the right, texts on the left."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -84,7 +84,7 @@ def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def cell(entry: Any) -> str:
-    """Entry of a table as text: numbers to five digits, infinity and NaN as words."""
+    """Format an entry of a table: numbers to five digits, infinity and NaN as words."""
     if isinstance(entry, (bool, np.bool_)):
         return "yes" if entry else "no"
     if isinstance(entry, (float, np.floating)):
@@ -93,7 +93,7 @@ def cell(entry: Any) -> str:
 
 
 def counted(number: float, noun: str) -> str:
-    """Return a number and its noun, as 1 polarity, 3 polarities or 0.5 years."""
+    """Return a number and its noun, such as 1 polarity, 3 polarities or 0.5 years."""
     if number == 1:
         return f"1 {noun}"
     text = f"{number:g}" if isinstance(number, float) else f"{number}"
@@ -101,7 +101,7 @@ def counted(number: float, noun: str) -> str:
 
 
 def within(value: float, bounds: tuple[float, float], text: Callable[[float], str]) -> str:
-    """Write a number or, outside of bounds, the one that it passes, behind < or >."""
+    """Format a number or, if it is out of bounds, the bound after < or >."""
     low, high = bounds
     sign = "< " if value < low else "> " if value > high else ""
     return sign + text(min(max(value, low), high))
@@ -110,7 +110,7 @@ def within(value: float, bounds: tuple[float, float], text: Callable[[float], st
 def known_digits(
     value: float, interval: tuple[float, float], bounds: tuple[float, float] = (0.0, math.inf)
 ) -> tuple[str, str]:
-    """Value and ends of its interval as text, to the digits that the interval leaves, and two at least; or bounds."""
+    """Format a value and its interval to the digits that the interval supports, at least two, or as bounds."""
     low, high = interval
     width = high - low
     # Two digits of the width.
@@ -126,23 +126,23 @@ def known_digits(
 
 
 def range_text(values: Floats) -> str:
-    """Lowest and highest of some numbers, or the one that they all are."""
+    """Format the lowest and highest of some numbers, or their common value."""
     low, high = float(np.min(values)), float(np.max(values))
     return f"{low:.5g}" if low == high else f"from {low:.5g} to {high:.5g}"
 
 
 def named(quantity: str, unit: str) -> str:
-    """Name of a column or a field with its unit: the one rule for all files that the package writes."""
+    """Return the name of a column or field with its unit, for all files that the package writes."""
     return quantity if unit == "1" else f"{quantity}_{unit.replace('/', '_').replace('^', '')}"
 
 
 def as_written(text: str) -> str:
-    """Write a text so that a figure shows it as it is: a dollar in a name begins no formula."""
+    """Escape a text for a figure, so that a dollar sign in a name does not begin a formula."""
     return text.replace("$", r"\$")
 
 
 def decimal(value: float) -> float:
-    """Return a number without the rounding in its last digit, so that it is written as people write it."""
+    """Return a number without the rounding in its last digit, for display."""
     written = float(f"{value:.12g}")
     return written if abs(written - value) <= _ROUNDING * abs(value) else value
 
@@ -161,7 +161,7 @@ def records_of(columns: Sequence[Column]) -> list[dict[str, Any]]:
 
 
 def text_of_columns(columns: Sequence[Column]) -> str:
-    """Return the columns that have a label as a table for people."""
+    """Format the columns that have a label as a table."""
     labelled = [column for column in columns if column.label]
     rows = zip(*(column.values for column in labelled), strict=True)
     return text_table([column.label for column in labelled], [*rows])
@@ -169,7 +169,7 @@ def text_of_columns(columns: Sequence[Column]) -> str:
 
 def columns_of(part: xr.Dataset) -> list[Column]:
     """Return dimensions, coordinates and variables of a dataset as columns, with a row for each point."""
-    # A dimension alone, without labels, only counts the rows.
+    # A dimension without labels only numbers the rows.
     rows = [] if len(part.dims) == 1 and not part.coords else [*part.dims]
     frame = part.to_dataframe().reset_index()
     names = dict.fromkeys([*rows, *part.coords, *part.data_vars])
@@ -177,7 +177,7 @@ def columns_of(part: xr.Dataset) -> list[Column]:
 
 
 def columns_with_skipped(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> list[Column]:
-    """Return rows of records as columns, with a row for each record that could not be read and the reason."""
+    """Return records as columns, with additional rows for unreadable records and the reason."""
     import pandas as pd
 
     skipped = [{"record": record, "verdict": f"skipped: {reason}"} for record, reason in unread.items()]
@@ -190,9 +190,9 @@ def columns_with_skipped(rows: Sequence[Mapping[str, Any]], unread: Mapping[str,
 
 
 def csv_rows(text: str) -> list[tuple[int, list[str]]]:
-    r"""Return line number and cells of each row of a CSV table that holds any.
+    r"""Return line number and cells of each nonempty row of a CSV table.
 
-    Where semicolons are between the columns of the first one, a comma is the decimal sign, and becomes a point.
+    If semicolons separate the columns of the first row, a comma is the decimal sign and becomes a point.
 
     Examples
     --------
@@ -214,13 +214,13 @@ def _with_point(cell: str) -> str:
 
 
 def rows_of(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
-    """Rows of a structured array as mappings."""
+    """Return the rows of a structured array as mappings."""
     names = table.dtype.names or ()
     return [dict(zip(names, row.tolist(), strict=True)) for row in table]
 
 
 def plain(value: Any) -> Any:
-    """Value that JSON knows: lists for arrays, null for NaN and infinity."""
+    """Return a value that JSON supports: lists for arrays, null for NaN and infinity."""
     if isinstance(value, Mapping):
         return {key: plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
@@ -239,17 +239,17 @@ def to_json(result: Mapping[str, Any]) -> str:
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a path to write to, beside a file, which it then becomes: whole, on the disk, or not at all.
+    """Yield a temporary path that replaces the file on success: complete, on the disk, or not at all.
 
-    What is no file but can be written to (a device, a pipe) is given itself. Where it cannot be written, an
-    `OutputError` says why, and what was there before is left as it is.
+    Devices and pipes are written directly. If writing fails, an `OutputError` contains the reason, and the previous
+    content is unchanged.
     """
     wanted = checks.path(path, "path of a file", OutputError)
     try:
         if wanted.exists() and not wanted.is_file() and not wanted.is_dir():
             yield wanted
             return
-        target = wanted.resolve()  # a link is kept, and what it leads to is replaced
+        target = wanted.resolve()  # a link remains, and its target is replaced
         if not target.parent.is_dir():
             raise OutputError(
                 f"cannot be written: there is no folder {target.parent}; make it, or choose another", path=str(path)
@@ -272,23 +272,23 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
+    """Write a text file, completely or not at all."""
     write_bytes(path, text.encode())
 
 
 def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
-    """Write a file, whole or not at all."""
+    """Write a binary file, completely or not at all."""
     with whole_file(path) as beside:
         beside.write_bytes(content)
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, *, index: bool = False, digits: str | None = "%.15g") -> None:
-    """Write a data frame as text columns with a header, whole or not at all."""
+    """Write a data frame as CSV with a header, completely or not at all."""
     write_text(path, frame.to_csv(index=index, float_format=digits, lineterminator="\n"))
 
 
 def write_excel(path: str | Path, sheets: Mapping[str, pd.DataFrame]) -> None:
-    """Write data frames as the sheets of a workbook, whole or not at all."""
+    """Write data frames as sheets of a workbook, completely or not at all."""
     import pandas as pd
 
     content = io.BytesIO()
@@ -302,14 +302,14 @@ def write_excel(path: str | Path, sheets: Mapping[str, pd.DataFrame]) -> None:
 
 
 def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
-    """Write a dataset to a NetCDF file, whole or not at all."""
-    # In memory first: HDF5 ends the process where it meets a full disk.
+    """Write a dataset to a NetCDF file, completely or not at all."""
+    # In memory first, because HDF5 ends the process on a full disk.
     content: Any = dataset.to_netcdf(engine="h5netcdf")
     write_bytes(path, content)
 
 
 def write_figure(path: str | Path, figure: Figure, **options: Any) -> None:
-    """Write a figure in the format of the file's suffix, whole or not at all; options are those of its ``savefig``."""
+    """Write a figure in the suffix's format, completely or not at all, with options of its ``savefig``."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format=Path(path).suffix.removeprefix("."), **options)
     write_bytes(path, drawn.getvalue())

@@ -1,4 +1,4 @@
-"""Work on many items in threads, of which nothing is left to do when it is interrupted."""
+"""Parallel work on many items in threads that stops cleanly when interrupted."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from typing import Final, TypeVar
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 
-#: Items that are handed out ahead of the oldest result that is not done, for each thread.
+#: Items per thread that are submitted ahead of the oldest pending result.
 AHEAD: Final = 16
 
 
 def cores() -> int:
-    """Count the cores that this process may use."""
+    """Count the cores available to this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -29,11 +29,11 @@ def in_threads(
     threads: int | None = None,
     cancelled: threading.Event | None = None,
 ) -> Iterator[Found]:
-    """Results of some work on each item, in their order; by default in a thread for every core.
+    """Yield the results of some work on each item, in order, by default with one thread per core.
 
-    Items are taken as they are needed, some for each thread ahead of the results. Of several errors that of the first
-    item is raised. When this is left early, as by an interrupt, `cancelled` is set for the work in hand, which is
-    waited for, and the rest is left undone.
+    Items are consumed as needed, some per thread ahead of the results. The first of several failed items determines the
+    error. On an early exit, for example an interrupt, `cancelled` is set, running work is awaited, and other work is
+    discarded.
     """
     count = min(cores() if threads is None else threads, len(items) if isinstance(items, Sized) else 2**16)
     if count < 2:

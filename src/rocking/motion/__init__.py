@@ -1,4 +1,4 @@
-"""Ground motions: piecewise polynomials in time."""
+"""Ground motions as piecewise polynomials in time."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""How a motion was made: its family, its formula's numbers, its source."""
+"""Description of a motion: family, parameters of the formula, origin of a record."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SCALED: Final = re.compile(r"(scaled by \S+) to .*")
 
 @dataclass(frozen=True)
 class Origin:
-    """What a record file, or the catalogue of shipped records, says of a motion; empty where it says nothing.
+    """Facts about a motion from its record file or the catalogue, empty if not stated.
 
     Attributes
     ----------
@@ -28,14 +28,13 @@ class Origin:
     channel, number : str, int or None
         Name of the component ("90 Deg", "Up", "HNE", ...) and its number in the file.
     azimuth : float or None
-        Direction of positive acceleration, degrees clockwise from north; None if vertical or unknown.
+        Direction of positive acceleration, degrees clockwise from north, or None if vertical or unknown.
     units, heading_units : str
-        Units of the numbers in the file, as it spells them, and units that the heading of a text table names.
+        Units of the numbers in the file, as spelled there, and units in the heading of a text table.
     start : float or None
-        Instant of the first sample by the file's own clock, s; None where that is not known, or the motion was delayed
-        or cut.
+        Instant of the first sample by the file's clock, s, or None if unknown, delayed or cut.
     reversed : bool
-        Whether the motion is the opposite of what `channel` says; `azimuth` is that of the motion.
+        Whether the motion (and `azimuth`) is opposite to `channel`.
     """
 
     format: str = ""
@@ -58,25 +57,29 @@ class Origin:
 
 @dataclass(frozen=True)
 class Description:
-    """How a motion was made.
+    """Description of the origin of a motion.
 
     Attributes
     ----------
     family : str
-        Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... After a delay or processing it says so
-        ("delayed sine", "processed record"), since the formula of `text` then no longer starts at time zero.
+        Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... A delay or processing is included
+        ("delayed sine", "processed record"), because the formula of `text` then no longer starts at time zero.
     parameters : mapping of str to float
-        Numbers of the formula in SI units and radians, for instance amplitude, frequency, phase and cycles of a sine.
-        Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it negative).
+        Parameters of the formula in SI units and radians, for example amplitude, frequency, phase and cycles of a sine.
+        Scaling multiplies parameters with names that start with "amplitude" (possibly to negative values).
     text : str
-        The formula, or the record's source and terms, in words.
+        Formula, or source and terms of the record, in words.
     origin : Origin, optional
-        What is known of a record, as data; `text` says it in words.
+        Facts about a record, which `text` contains in words.
 
     Raises
     ------
     InvalidMotion
-        If family or text is no text, or a parameter is not a number.
+        If `family` or `text` is not text, or a parameter is not a number.
+
+    See Also
+    --------
+    rocking.Motion : ground motion.
 
     Examples
     --------
@@ -105,11 +108,11 @@ class Description:
 
     @property
     def numbers(self) -> str:
-        """Parameters as people read them: "amplitude 3, frequency 2"."""
+        """Parameters as readable text: "amplitude 3, frequency 2"."""
         return ", ".join(f"{name} {value:.5g}" for name, value in self.parameters.items())
 
     def scaled(self, factor: float) -> Description:
-        """Return the description of the motion times a factor, which multiplies its amplitudes."""
+        """Return the description of the motion times a factor, which multiplies the amplitudes."""
         parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
         origin = self.origin
         if origin is not None and factor < 0.0:
@@ -118,14 +121,14 @@ class Description:
         return replace(self, parameters=parameters, origin=origin)
 
     def changed(self, how: str) -> Description:
-        """Return the description of a motion that was changed ("delayed", "processed"), which its family names once."""
+        """Return the description of a changed motion, with the change ("delayed", "processed") once in its family."""
         family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
         origin = None if self.origin is None else replace(self.origin, start=None)
         return replace(self, family=family, origin=origin)
 
 
 def begins_later(first: Description, second: Description, step: float | None) -> float:
-    """Return how much later the second of two records begins, s, by the clock of their files."""
+    """Return the delay of the second of two records, s, by the clock of their files."""
     one, other = (each.origin or Origin() for each in (first, second))
     if one.start is None or other.start is None or one.format != other.format:
         return 0.0
@@ -134,6 +137,6 @@ def begins_later(first: Description, second: Description, step: float | None) ->
 
 
 def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
-    """Return the name of a motion, and of its vertical one, with what was done to it but not what it was scaled to."""
+    """Return the name of a motion and its vertical component with processing but without scaling."""
     both = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))

@@ -17,12 +17,12 @@ from rocking.core.tables import named
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 
-#: Damping of a spectral acceleration, if none is named.
+#: Default damping of a spectral acceleration.
 DAMPING: Final = 0.05
 
 
 def checked_damping(value: object, error: checks.Error) -> float:
-    """Return a fraction of critical damping, or raise `error`."""
+    """Return a damping ratio, or raise `error`."""
     ratio = checks.number(value, "damping", error)
     if not 0.0 <= ratio < 1.0:
         raise error(f"{{}} must be a fraction of critical from 0 to below 1, not {ratio:g}", "damping", value=value)
@@ -30,24 +30,24 @@ def checked_damping(value: object, error: checks.Error) -> float:
 
 
 class Measured:
-    """What follows from the pieces of a motion; all of it is about the horizontal component."""
+    """Kinematics and intensity measures of the horizontal component."""
 
     breakpoints: Floats
     coefficients: Floats
 
     @property
     def duration(self) -> float:
-        """Time of the last breakpoint, s; the acceleration is zero after it."""
+        """Time of the last breakpoint, s, after which the acceleration is zero."""
         return float(self.breakpoints[-1])
 
     @property
     def samples(self) -> tuple[Floats, Floats]:
-        """Times (s) and accelerations (m/s^2) at the breakpoints; at a jump, the acceleration after it."""
+        """Times (s) and accelerations (m/s^2) at the breakpoints, with the value after a jump."""
         return piecewise.samples(self)
 
     @property
     def jumps(self) -> bool:
-        """Whether the acceleration jumps from a piece to the next, beyond rounding; ends of the motion do not count."""
+        """Whether the acceleration jumps between pieces, beyond rounding."""
         return piecewise.jumps(self)
 
     def _widths(self) -> Floats:
@@ -62,20 +62,20 @@ class Measured:
         return piecewise.antiderivative(self._widths(), self._velocity())
 
     def acceleration(self, time: ArrayLike) -> Any:
-        """Return the ground acceleration at times (s), m/s^2, shaped like `time`; zero outside the motion."""
+        """Return the ground acceleration at times (s), m/s^2, shaped like `time` and zero outside the motion."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self.coefficients, at)
         result = np.where((at < 0.0) | (at > self.duration), 0.0, result)
         return result if result.ndim else float(result)
 
     def velocity(self, time: ArrayLike) -> Any:
-        """Return the ground velocity from rest, m/s, as `acceleration`; constant after the end of the motion."""
+        """Return the ground velocity at times (s), m/s, from rest, constant after the end of the motion."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self._velocity(), at)
         return result if result.ndim else float(result)
 
     def displacement(self, time: ArrayLike) -> Any:
-        """Return the ground displacement from rest, m, as `acceleration`; after the end at the last velocity."""
+        """Return the ground displacement at times (s), m, from rest, with the last velocity after the end."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self._displacement(), at)
         result = result + self.velocity(self.duration) * np.maximum(at - self.duration, 0.0)
@@ -83,24 +83,24 @@ class Measured:
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """Lowest and highest acceleration, m/s^2, with their signs: the exact extrema of the pieces."""
+        """Exact lowest and highest acceleration with their signs, m/s^2."""
         return -piecewise.highest(self._widths(), -self.coefficients), piecewise.highest(
             self._widths(), self.coefficients
         )
 
     @property
     def pga(self) -> float:
-        """Peak ground acceleration, m/s^2: the exact extremum of the pieces."""
+        """Exact peak ground acceleration, m/s^2."""
         return piecewise.largest_magnitude(self._widths(), self.coefficients)
 
     @property
     def pgv(self) -> float:
-        """Peak ground velocity, m/s: the exact extremum of the exact integral, from rest."""
+        """Exact peak ground velocity from rest, m/s."""
         return piecewise.largest_magnitude(self._widths(), self._velocity())
 
     @property
     def pgd(self) -> float:
-        """Peak ground displacement up to the motion's end, m: the exact extremum of the exact integral."""
+        """Exact peak ground displacement until the end of the motion, m."""
         return piecewise.largest_magnitude(self._widths(), self._displacement())
 
     @property
@@ -110,19 +110,19 @@ class Measured:
 
     @property
     def cumulative_absolute_velocity(self) -> float:
-        """Integral of the absolute acceleration, m/s; exact, changes of sign within a piece are located."""
+        """Exact integral of the absolute acceleration, m/s, with sign changes located within pieces."""
         widths = self._widths()
         integral = self._velocity()[:, np.newaxis, :]
         roots = piecewise.root_candidates(widths, self.coefficients)
         cuts = np.hstack([np.zeros((len(widths), 1)), roots, widths[:, np.newaxis]])
-        # Between two cuts the sign is constant; the integral's own start value would only cost digits.
+        # The sign is constant between cuts. Adding the integral's start value would only lose digits.
         integral[..., 0] = 0.0
         return float(np.sum(np.abs(np.diff(piecewise.value(integral, cuts), axis=1))))
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
-        """Return the time between two fractions of the Arias intensity, s; NaN if the intensity is zero.
+        """Return the time between two fractions of the Arias intensity, s, or NaN if the intensity is zero.
 
-        `InvalidMotion` if not ``0 <= start < end <= 1``.
+        Raises `InvalidMotion` unless ``0 <= start < end <= 1``.
         """
         start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
         if not 0.0 <= start < end <= 1.0:
@@ -132,10 +132,10 @@ class Measured:
         return last - first
 
     def spectral_acceleration(self, period: ArrayLike, damping: float = DAMPING) -> Any:
-        """Pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement, m/s^2.
+        """Compute the pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement.
 
-        The linear oscillator starts from rest and is followed through the motion and the first extremum after it, by
-        the Taylor series of the exact solution on each piece; extrema between samples are located.
+        Taylor series of the exact solution on each piece follow the linear oscillator from rest until the first
+        extremum after the end of the ground motion. Extrema between samples are located.
 
         Parameters
         ----------
@@ -147,15 +147,15 @@ class Measured:
         Returns
         -------
         float or ndarray
-            m/s^2, shaped like `period`.
+            Pseudo-spectral acceleration, m/s^2, shaped like `period`.
 
         Raises
         ------
         InvalidMotion
-            If a period is not positive and finite or below a millionth of the duration (use `pga` there), or the
-            damping is out of range.
+            If a period is not positive and finite, or below a millionth of the duration (use `pga`), or the damping is
+            out of range.
         """
-        from rocking.kernels import oscillator  # the library: loaded only where it is used
+        from rocking.kernels import oscillator  # imported on first use because it loads the library
 
         periods = checks.numbers(period, "period of a spectral acceleration", InvalidMotion)
         if not np.all(np.isfinite(periods) & (periods > 0.0)):
@@ -174,7 +174,7 @@ class Measured:
         return result if result.ndim else float(result)
 
     def measures(self, periods: Sequence[float] = ()) -> dict[str, float]:
-        """Return intensity measures in SI units by name; each name ends in its unit.
+        """Return intensity measures in SI units by name, which ends in the unit.
 
         Spectral accelerations (5 % damping) are added for `periods`, s.
         """
@@ -194,7 +194,7 @@ class Measured:
 
 
 def significant_span(motion: Measured, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
-    """Return the times, s, at which the Arias intensity reaches two fractions of itself; NaN if it is zero."""
+    """Return the times, s, at two fractions of the total Arias intensity, or NaN if zero."""
     cumulated = np.append(0.0, np.cumsum(_energy(motion.coefficients, np.diff(motion.breakpoints))))
     if cumulated[-1] == 0.0:
         return math.nan, math.nan
@@ -202,7 +202,7 @@ def significant_span(motion: Measured, start: float = 0.05, end: float = 0.95) -
 
 
 def _energy(coefficients: Floats, span: Floats) -> Floats:
-    """Integral of the squared polynomial from 0 to `span`: Gauss's rule with degree + 1 points is exact."""
+    """Integrate the squared polynomial from 0 to `span`, exactly, by Gauss's rule with degree + 1 points."""
     nodes, weights = np.polynomial.legendre.leggauss(coefficients.shape[-1])
     values = piecewise.value(coefficients[..., np.newaxis, :], 0.5 * span[..., np.newaxis] * (nodes + 1.0))
     energy: Floats = 0.5 * span * (values**2 @ weights)
@@ -210,7 +210,7 @@ def _energy(coefficients: Floats, span: Floats) -> Floats:
 
 
 def _time_at(motion: Measured, cumulated: Floats, fraction: float) -> float:
-    """First time at which the energy reaches a fraction of the whole, by bisection within its piece."""
+    """Find by bisection within a piece the first time at a fraction of the total energy."""
     wanted = fraction * cumulated[-1]
     piece = max(int(np.searchsorted(cumulated, wanted, side="left")) - 1, 0)
     start, end = motion.breakpoints[piece : piece + 2]

@@ -1,4 +1,4 @@
-"""Ground motions: a ground acceleration, horizontal and maybe vertical, that is a piecewise polynomial in time."""
+"""Ground motion: piecewise polynomial horizontal and optional vertical acceleration."""
 
 from __future__ import annotations
 
@@ -26,39 +26,45 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Motion(Processable):
-    """A ground acceleration that is a polynomial on each of its pieces, and zero outside ``[0, duration]``.
+    """Piecewise polynomial ground acceleration, zero outside ``[0, duration]``.
 
-    Pieces may jump. A record is piecewise linear, exactly; a pulse is approximated to 1e-15 of its amplitude. Motions
-    are usually made by `from_samples`, `from_points`, `rocking.pulses`, `rocking.records` or `rocking.read`.
+    Pieces may jump. Records are exactly piecewise linear, and pulses are approximated to 1e-15 of their amplitude.
+    Usual constructors are `from_samples`, `from_points`, `rocking.pulses`, `rocking.records` and `rocking.read`.
 
     Parameters
     ----------
     breakpoints : array_like, shape (n + 1,)
-        Ends of the pieces, s; strictly increasing, the first is 0.
+        Ends of the pieces, s, strictly increasing from 0.
     coefficients : array_like, shape (n, degree + 1)
         m/s^2, m/s^3, ...: the acceleration on piece k is ``sum_j coefficients[k, j] * (t - breakpoints[k])**j``.
     name : str
         Short name for tables and figures.
     description : Description
-        How the motion was made.
+        Origin of the motion.
     history : tuple of str
-        What was done to it since, one sentence each.
+        Later changes to the motion, one sentence each.
     error : float
-        Bound on the difference from the motion that `description` describes, m/s^2, beyond the rounding of
-        breakpoints and coefficients; 0 where the pieces are the motion itself (records).
+        Bound on the difference from the motion in `description`, m/s^2, beyond rounding of breakpoints and
+        coefficients, or 0 if the pieces are the motion itself (records).
     vertical : Motion, optional
-        Vertical ground acceleration over the same time, positive upwards; see `with_vertical`.
+        Vertical ground acceleration over the same time, positive upwards (see `with_vertical`).
 
     Attributes
     ----------
     step : float or None
-        Sampling step if all pieces are straight lines and equally long, s.
+        Sampling step, s, if all pieces are straight lines of equal length.
 
     Raises
     ------
     InvalidMotion
-        If the arrays do not describe a piecewise polynomial, its degree is above 20, or a number is beyond all sense
-        (accelerations of 1e30 m/s^2, also where a piece would last 1e-9 s; durations below 1e-9 s or above 1e15 s).
+        If the arrays do not describe a piecewise polynomial, its degree is above 20, or a number exceeds the supported
+        range (accelerations up to 1e30 m/s^2, also over a piece extended to 1e-9 s, durations from 1e-9 to 1e15 s).
+
+    See Also
+    --------
+    rocking.read : read a motion from a record file.
+    rocking.records.load : load a shipped record.
+    rocking.Measure : intensity measure for scaling.
 
     Examples
     --------
@@ -100,7 +106,7 @@ class Motion(Processable):
         object.__setattr__(self, "step", piecewise.even_step(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Through the constructor, which makes the arrays read-only again.
+        # The constructor makes the arrays read-only again.
         return Motion, tuple(getattr(self, each.name) for each in fields(self) if each.init)
 
     @classmethod
@@ -112,26 +118,30 @@ class Motion(Processable):
         name: str = "samples",
         description: Description | None = None,
     ) -> Motion:
-        """Motion that is linear between evenly spaced samples.
+        """Create a motion that is linear between evenly spaced samples.
 
         Parameters
         ----------
         acceleration : array_like, shape (n,)
-            Ground acceleration, m/s^2, n >= 2; the first sample is at time 0.
+            Ground acceleration, m/s^2, n >= 2, from time 0.
         dt : float
             Sampling step, s, from 1e-9 to 1e9.
         name, description : str, Description, optional
-            As of `Motion`.
+            As for `Motion`.
 
         Returns
         -------
         Motion
-            Of n - 1 pieces.
+            Motion with n - 1 pieces.
 
         Raises
         ------
         InvalidMotion
-            If there are fewer than two samples, one of them is not finite, or `dt` is not a number in its range.
+            If there are fewer than two samples, a sample is not finite, or `dt` is not a number within its range.
+
+        See Also
+        --------
+        rocking.Motion.from_points : create a motion from uneven samples.
 
         Examples
         --------
@@ -153,9 +163,9 @@ class Motion(Processable):
         name: str = "points",
         description: Description | None = None,
     ) -> Motion:
-        """Create the motion that is linear between points at uneven times, s; otherwise as `from_samples`.
+        """Create a motion that is linear between points at uneven times, s, like `from_samples`.
 
-        Times must increase strictly; the motion's time is counted from the first.
+        Times must increase strictly. The first one becomes 0.
         """
         samples = piecewise.checked_samples(acceleration)
         instants = piecewise.checked_times(times, len(samples))
@@ -166,18 +176,19 @@ class Motion(Processable):
 
     @property
     def end(self) -> float:
-        """Time from which the ground no longer moves, s: that of the last breakpoint of both components."""
+        """Time of the last breakpoint of both components, s."""
         return self.duration if self.vertical is None else max(self.duration, self.vertical.duration)
 
     @property
     def label(self) -> str:
-        """Name, with what was done to the motion in a few words and its vertical component, for titles."""
+        """Name with brief processing and vertical component, for titles."""
         return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
 
     def scaled(self, factor: float) -> Motion:
-        """Return the motion times a factor; a negative one reverses the horizontal component alone.
+        """Return the motion times a factor.
 
-        `InvalidMotion` if the factor is not a finite number, or the motion would become stronger than any may be.
+        A negative factor reverses only the horizontal component. Raises `InvalidMotion` if the factor is not finite, or
+        the scaled motion would exceed the supported range.
         """
         by = checks.finite(factor, "factor", InvalidMotion)
         return self._times(by, FACTOR.scaling(by, by))
@@ -188,22 +199,26 @@ class Motion(Processable):
         Parameters
         ----------
         level : float
-            Wanted level, SI units: accelerations in m/s^2, not g; half a g is ``0.5 * 9.80665``. `history` says both.
+            Target level, SI units: accelerations in m/s^2, not g (0.5 g is ``0.5 * 9.80665``). `history` contains both.
         measure : {"pga", "pgv", "factor"} or Measure
-            Peak acceleration (m/s^2), peak velocity (m/s), a factor on the motion as for `scaled`, or a spectral
-            acceleration (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
+            Peak acceleration (m/s^2), peak velocity (m/s), factor as for `scaled`, or spectral acceleration (m/s^2) as
+            ``rocking.Measure("sa", period=1.0)``.
 
         Returns
         -------
         Motion
-            Both components, by one factor.
+            Both components times the same factor.
 
         Raises
         ------
         InvalidMotion
-            If `level` is not positive, the motion is zero throughout, or it would become stronger than any may be.
+            If `level` is not positive, the motion is zero, or the scaled motion would exceed the supported range.
         InvalidOption
-            If it is not a measure of a motion alone.
+            If `measure` is not a measure of a motion alone.
+
+        See Also
+        --------
+        rocking.Measure : intensity measure.
         """
         wanted = Measure.of(measure, among=SCALES)
         if wanted.name == "factor":
@@ -213,13 +228,13 @@ class Motion(Processable):
         return self._times(factor, wanted.scaling(goal, factor))
 
     def with_vertical(self, vertical: Motion | None) -> Motion:
-        """Return the motion with a vertical component, which changes the weight of what stands on the ground.
+        """Return the motion with a vertical component, which changes the effective gravity.
 
-        It is scaled, delayed, processed and added with the horizontal component; reversing the polarity leaves it as it
-        is. A record whose channel is called "Down" or "DWN" is turned round.
+        Scaling, delay, processing and addition apply to both components, reversal only to the horizontal one. A record
+        with a channel named "Down" or "DWN" is inverted.
 
-        `vertical` is in m/s^2, positive upwards, and starts at the same time; None removes the component.
-        `InvalidMotion` if it is no motion, or has a vertical component itself.
+        `vertical` (m/s^2, positive upwards) starts at the same time. None removes the component. Raises `InvalidMotion`
+        if `vertical` is not a motion, or itself has a vertical component.
         """
         origin = vertical.description.origin if isinstance(vertical, Motion) else None
         if vertical is not None and origin is not None and origin.downwards:
@@ -227,9 +242,9 @@ class Motion(Processable):
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the ground acceleration in g over time, and below it the vertical one; arguments as of `Result.plot`.
+        """Draw the ground acceleration in g over time, and the vertical one below, with parameters of `Result.plot`.
 
-        In `ax` the horizontal acceleration is drawn alone. The title is by default the motion's label.
+        In `ax` only the horizontal acceleration is drawn. The default title is the label of the motion.
         """
         from rocking.plot.curves import motion_figure
 
@@ -244,10 +259,10 @@ class Motion(Processable):
         )
 
     def drawing_times(self, start: float, end: float) -> Floats:
-        """Return times (s) at which to draw a stretch: ends, breakpoints, and between them where pieces are curved.
+        """Return times (s) for drawing an interval: its ends, breakpoints, and additional points on curved pieces.
 
-        Breakpoints are those of both components. Where the motion jumps there are two times, one just before; its end
-        is a jump to zero.
+        Breakpoints of both components are included, and times just before jumps. The end of the motion is a jump to
+        zero.
         """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:
@@ -262,7 +277,7 @@ class Motion(Processable):
         return f"<Motion: {self}>"
 
     def __str__(self) -> str:
-        """Return name, duration, step, peak acceleration and what was done to the motion, in one line."""
+        """Return name, duration, step, peak acceleration and changes in one line."""
         step = "" if self.step is None else f" in steps of {self.step:.5g} s"
         parts = [f"{self.name}, {self.duration:.5g} s{step}, {_peak(self)}", *self.history]
         if self.vertical is not None:
@@ -270,13 +285,13 @@ class Motion(Processable):
         return "; ".join(parts)
 
     def __mul__(self, factor: float) -> Motion:
-        """Return the motion times a factor, as `scaled`."""
+        """Return the motion times a factor, like `scaled`."""
         return self.scaled(factor) if isinstance(factor, (int, float, np.number)) else NotImplemented
 
     __rmul__ = __mul__
 
     def __neg__(self) -> Motion:
-        """Return the motion with its polarity reversed."""
+        """Return the motion with reversed polarity."""
         return self._times(-1.0, "polarity reversed")
 
     def __add__(self, other: Motion) -> Motion:
@@ -297,7 +312,7 @@ class Motion(Processable):
         )
 
     def _times(self, factor: float, done: str) -> Motion:
-        """Return both components times a factor, the vertical one by its size."""
+        """Return both components times a factor, the vertical one times its absolute value."""
         vertical = self.vertical
         if vertical is not None and abs(factor) != 1.0:
             vertical = vertical._times(abs(factor), done)
@@ -320,10 +335,10 @@ def _peak(motion: Motion) -> str:
 
 
 def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float = STANDARD_GRAVITY) -> Floats:
-    """Stretches of time in which a resting block would be lifted: start and end of each, s, in order, shape (n, 2).
+    """Return intervals in which a resting block would be lifted: start and end of each, s, in order, shape (n, 2).
 
-    The thresholds (m/s^2) lift it to side + where -a passes the first, and to side - where a passes the second, as
-    `Block.uplift_thresholds` gives them; a vertical acceleration adds to the gravity (m/s^2) under which they hold.
+    The block is lifted to side + if -a exceeds the first threshold (m/s^2), and to side - if a exceeds the second (see
+    `Block.uplift_thresholds`). Vertical acceleration adds to the gravity (m/s^2) for which the thresholds hold.
     """
     plus, minus = thresholds
     towards_plus, towards_minus = _push(motion, -plus / gravity), _push(motion, minus / gravity)
@@ -339,10 +354,10 @@ def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float 
 def lifting_factors(
     motion: Motion, thresholds: ArrayLike, gravity: float = STANDARD_GRAVITY, own: ArrayLike | None = None
 ) -> Floats:
-    """Lowest factors on both components of a motion from which on it lifts blocks from rest, shape (n,); or infinity.
+    """Compute the smallest factors on both components that lift blocks from rest, shape (n,), or infinity.
 
-    The thresholds, pairs as `exceedances` takes one, have shape (n, 2), and so has what the weight makes of them, by
-    default all: a vertical motion changes that alone. They are infinite where a block rocks to one side.
+    The thresholds, shape (n, 2), are pairs as for `exceedances`. `own` is the part due to the weight, by default all,
+    which alone changes with a vertical motion. Thresholds are infinite on sides without rocking.
     """
     pairs = np.asarray(thresholds, dtype=np.float64)
     weighing = pairs if own is None else np.asarray(own, dtype=np.float64)
@@ -366,19 +381,19 @@ def lifting_factors(
 
 
 def _push(motion: Motion, threshold_over_g: float) -> Motion:
-    """Return the horizontal motion less what the vertical one adds to a threshold."""
+    """Return the horizontal motion minus the contribution of the vertical motion to a threshold."""
     alone = motion.with_vertical(None)
     return alone if motion.vertical is None else alone + motion.vertical.scaled(-threshold_over_g)
 
 
 def _reaching(motion: Motion, level: float) -> Flags:
-    """Which pieces may be of this magnitude somewhere: of a record with few strong pulses, few."""
+    """Return which pieces may reach this magnitude, often few."""
     bounds = piecewise.bounds(np.diff(motion.breakpoints), motion.coefficients)
     return np.asarray(bounds >= level * (1.0 - 1e-12))
 
 
 def _crossings(motion: Motion, level: float, pieces: Flags) -> Floats:
-    """Find times, s, among which are all those at which the motion passes a level inside one of the pieces."""
+    """Return a superset of the times, s, at which the motion crosses a level inside a piece."""
     widths = np.diff(motion.breakpoints)[pieces]
     shifted = motion.coefficients[pieces]
     shifted[:, 0] -= level

@@ -1,6 +1,6 @@
-"""Algebra of piecewise polynomials, vectorised over the pieces; and the arrays that make them, checked.
+"""Algebra of piecewise polynomials, vectorised over the pieces, and validation of their arrays.
 
-Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x counted from the piece's start.
+Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, with x measured from the start of the piece.
 """
 
 import functools
@@ -15,24 +15,24 @@ from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import HIGHEST_DEGREE
 from rocking.errors import InvalidMotion
 
-#: Pieces that meet within this part of the largest value do not jump.
+#: Pieces that meet within this fraction of the largest value do not jump.
 _JUMP: Final = 1e-12
-#: Even breakpoints are off their grid by no more than this part of the duration, some units in its last place.
+#: Largest distance of even breakpoints from their grid divided by the duration, some units in the last place.
 _ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 
-#: Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take, and for
-#: the solvers: beyond 1e42 m/s^2 they divide for ever.
+#: Far above any ground motion, but small enough that squares and integrals in measures do not overflow, and that the
+#: solvers terminate (up to 1e42 m/s^2).
 STRONGEST: Final = 1e30
 _LONGEST: Final = 1e15
 
 TOO_STRONG: Final = f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale"
 
-#: Far below any ground motion; pieces may be shorter, but must not change faster than over this time.
+#: Far below any ground motion. Pieces may be shorter, but not change faster than over this time.
 SHORTEST: Final = 1e-9
 
 
 class Piecewise(Protocol):
-    """What is a polynomial on each of its pieces: a motion, or what becomes one."""
+    """Protocol of a piecewise polynomial: a motion, or an intermediate result."""
 
     @property
     def breakpoints(self) -> Floats:
@@ -44,14 +44,14 @@ class Piecewise(Protocol):
 
 
 class Pieces(NamedTuple):
-    """A piecewise polynomial and nothing else."""
+    """Piecewise polynomial without further data."""
 
     breakpoints: Floats
     coefficients: Floats
 
 
 def even_step(pieces: Piecewise) -> float | None:
-    """Length of the pieces if they are equally long and straight lines, else None."""
+    """Return the length of straight pieces of equal length, else None."""
     breakpoints, coefficients = pieces.breakpoints, pieces.coefficients
     if coefficients.shape[1] < 2 or np.any(coefficients[:, 2:]):
         return None
@@ -61,25 +61,25 @@ def even_step(pieces: Piecewise) -> float | None:
 
 
 def jumps(pieces: Piecewise) -> bool:
-    """Whether a piece starts off the end of the one before, beyond rounding."""
+    """Return whether a piece starts off the end of the previous one, beyond rounding."""
     return bool(np.any(jumps_after(pieces)[:-1]))
 
 
 def jumps_after(pieces: Piecewise) -> Flags:
-    """Whether what follows each piece starts off its end, beyond rounding: the next piece, or zero after the last."""
+    """Return which pieces end in a jump, beyond rounding (the last one to zero)."""
     widths, coefficients = np.diff(pieces.breakpoints), pieces.coefficients
     gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - value(coefficients, widths))
     return gaps > _JUMP * largest_magnitude(widths, coefficients)
 
 
 def samples(pieces: Piecewise) -> tuple[Floats, Floats]:
-    """Return times (s) and values at the breakpoints; at a jump, the value after it."""
+    """Return times (s) and values at the breakpoints, with the value after a jump."""
     last = value(pieces.coefficients[-1], np.diff(pieces.breakpoints)[-1])
     return pieces.breakpoints, np.append(pieces.coefficients[:, 0], last)
 
 
 def value(coefficients: Floats, x: Floats) -> Floats:
-    """Value of each polynomial (last axis of `coefficients`: powers) at `x`, by Horner's rule."""
+    """Evaluate each polynomial (last axis of `coefficients`: powers) at `x` by Horner's rule."""
     result = coefficients[..., -1] + 0.0 * x
     for j in range(coefficients.shape[-1] - 2, -1, -1):
         result *= x
@@ -88,31 +88,31 @@ def value(coefficients: Floats, x: Floats) -> Floats:
 
 
 def at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floats:
-    """Value at `time`, clipped to the span of the breakpoints; at a jump, the value after it."""
+    """Return the value at `time`, clipped to the span of the breakpoints, with the value after a jump."""
     inside = np.clip(time, breakpoints[0], breakpoints[-1])
     piece = np.minimum(np.searchsorted(breakpoints, inside, side="right"), len(coefficients)) - 1
     return value(coefficients[piece], inside - breakpoints[piece])
 
 
 def even_times(count: int, step: float) -> Floats:
-    """Return the times of even samples (infinite where they overflow)."""
+    """Return the times of even samples (infinite on overflow)."""
     with np.errstate(over="ignore"):
         return np.arange(count, dtype=np.float64) * step
 
 
 def linear(times: Floats, samples: Floats) -> Floats:
-    """Coefficients of the pieces that join the samples by straight lines (not finite where they overflow)."""
+    """Return coefficients of the straight lines between the samples (not finite on overflow)."""
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         return np.column_stack([samples[:-1], np.diff(samples) / np.diff(times)])
 
 
 def derivative(coefficients: Floats) -> Floats:
-    """Coefficients of the derivative of each piece."""
+    """Return the coefficients of the derivative of each piece."""
     return coefficients[:, 1:] * np.arange(1.0, coefficients.shape[1])
 
 
 def antiderivative(widths: Floats, coefficients: Floats) -> Floats:
-    """Coefficients of the continuous antiderivative that starts at zero."""
+    """Return the coefficients of the continuous antiderivative that starts at zero."""
     powers = np.arange(1.0, coefficients.shape[1] + 1)
     integral = np.hstack([np.zeros((len(coefficients), 1)), coefficients / powers])
     integral[1:, 0] = np.cumsum(value(integral, widths))[:-1]
@@ -120,7 +120,7 @@ def antiderivative(widths: Floats, coefficients: Floats) -> Floats:
 
 
 def moved(coefficients: Floats, shift: Floats) -> Floats:
-    """Coefficients about ``x = shift`` of each piece (repeated synthetic division)."""
+    """Return the coefficients of each piece about ``x = shift`` (repeated synthetic division)."""
     result = coefficients.copy()
     last = result.shape[1] - 1
     for i in range(last):
@@ -130,11 +130,11 @@ def moved(coefficients: Floats, shift: Floats) -> Floats:
 
 
 def moved_exactly(coefficients: Floats, shift: Floats) -> Floats:
-    """Coefficients about ``x = shift`` of each piece: Horner's rule, with the error of each operation."""
+    """Return coefficients of each piece about ``x = shift`` by Horner's rule with the error of each operation."""
     by, nothing = shift[:, np.newaxis], np.zeros((len(shift), 1))
     result = errors = np.zeros_like(coefficients)
     for k in range(coefficients.shape[1] - 1, -1, -1):
-        # What there is so far, times x + shift; and the next coefficient.
+        # Partial result times x + shift, plus the next coefficient.
         before = np.hstack([coefficients[:, k : k + 1], result[:, :-1]])
         product, of_product = exact_product(by, result)
         result, of_sum = exact_sum(product, before)
@@ -143,7 +143,7 @@ def moved_exactly(coefficients: Floats, shift: Floats) -> Floats:
 
 
 def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: int) -> Floats:
-    """Coefficients on the pieces of `finer`, which has all the breakpoints and may end later (zero there)."""
+    """Return coefficients on the pieces of `finer`, which contains all breakpoints (zero after the end)."""
     piece = np.minimum(np.searchsorted(breakpoints, finer[:-1], side="right"), len(coefficients)) - 1
     shift = finer[:-1] - breakpoints[piece]
     cut = shift > 0.0
@@ -155,7 +155,7 @@ def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: i
 
 
 def together(one: Piecewise, other: Piecewise) -> tuple[Floats, tuple[Floats, Floats]]:
-    """Breakpoints of both, and the coefficients of each between them, of one degree."""
+    """Return common breakpoints, and the coefficients of each between them, of equal degree."""
     columns = max(one.coefficients.shape[1], other.coefficients.shape[1])
     if np.array_equal(one.breakpoints, other.breakpoints):
         breakpoints = one.breakpoints
@@ -166,9 +166,9 @@ def together(one: Piecewise, other: Piecewise) -> tuple[Floats, tuple[Floats, Fl
 
 
 def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
-    """Points of each piece among which are all its roots; shape (pieces, degree), sorted along each row.
+    """Return a superset of the roots of each piece, shape (pieces, degree), sorted along each row.
 
-    Rows are filled up with points that are not roots, which do no harm where callers look for extrema.
+    Rows are padded with points that are not roots, which is harmless in a search for extrema.
     """
     degree = coefficients.shape[1] - 1
     if degree == 0:
@@ -199,7 +199,7 @@ def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
 
 
 def _significant_degrees(pieces: Floats) -> Integers:
-    """Degree of each piece; a leading coefficient far below rounding would put roots at infinity and harm others."""
+    """Return the degree of each piece without leading coefficients far below rounding, which distort the roots."""
     sizes = np.abs(pieces)
     significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
     last = pieces.shape[1] - 1 - np.argmax(significant[:, ::-1], axis=1)
@@ -207,7 +207,7 @@ def _significant_degrees(pieces: Floats) -> Integers:
 
 
 def _control_points(widths: Floats, coefficients: Floats) -> Floats:
-    """Bernstein coefficients of each piece: they enclose its values."""
+    """Return the Bernstein coefficients of each piece, which enclose its values."""
     columns = coefficients.shape[1]
     control: Floats = (coefficients * widths[:, np.newaxis] ** np.arange(float(columns))) @ _bernstein_shares(columns)
     return control
@@ -215,12 +215,12 @@ def _control_points(widths: Floats, coefficients: Floats) -> Floats:
 
 @functools.cache
 def _bernstein_shares(columns: int) -> Floats:
-    """Share of each power in each Bernstein coefficient."""
+    """Return the share of each power in each Bernstein coefficient."""
     return np.array([[math.comb(i, j) / math.comb(columns - 1, j) for i in range(columns)] for j in range(columns)])
 
 
 def bounds(widths: Floats, coefficients: Floats) -> Floats:
-    """Upper bound on the magnitude of each piece: of straight ones at their ends, else by Bernstein coefficients."""
+    """Return an upper bound on each piece's magnitude, from the ends (straight) or Bernstein coefficients."""
     if coefficients.shape[1] <= 2:
         return np.maximum(np.abs(coefficients[:, 0]), np.abs(value(coefficients, widths)))
     result: Floats = np.max(np.abs(_control_points(widths, coefficients)), axis=1)
@@ -228,7 +228,7 @@ def bounds(widths: Floats, coefficients: Floats) -> Floats:
 
 
 def highest(widths: Floats, coefficients: Floats) -> float:
-    """Highest value over all pieces, at their ends or at their interior extrema."""
+    """Return the highest value over all pieces."""
     best = max(float(np.max(coefficients[:, 0])), float(np.max(value(coefficients, widths))))
     if coefficients.shape[1] <= 2:
         return best
@@ -241,19 +241,19 @@ def highest(widths: Floats, coefficients: Floats) -> float:
 
 
 def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
-    """Largest absolute value over all pieces, at their ends or at their interior extrema."""
+    """Return the largest absolute value over all pieces."""
     return max(highest(widths, coefficients), highest(widths, -coefficients))
 
 
 def from_quadrant(quarters: Floats, rest: Floats) -> tuple[Floats, Floats]:
-    """Sine and cosine of a whole number of quarter turns and the rest of an angle, rad."""
+    """Compute sine and cosine of quarter turns plus the rest of an angle, rad."""
     sine, cosine = np.sin(rest), np.cos(rest)
     quadrant = np.mod(quarters, 4.0).astype(np.int64)
     return np.choose(quadrant, [sine, cosine, -sine, -cosine]), np.choose(quadrant, [cosine, -sine, -cosine, sine])
 
 
 def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
-    """Breakpoints and coefficients of a motion as own, read-only arrays."""
+    """Return checked breakpoints and coefficients of a motion as read-only copies."""
     ends = _floats(breakpoints, "breakpoints", 1)
     of_samples = ": of samples make a motion with Motion.from_samples(acceleration, dt)"
     rows = _floats(coefficients, "coefficients", 2, of_samples)
@@ -294,7 +294,7 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
 
 
 def checked_samples(acceleration: ArrayLike) -> Floats:
-    """Accelerations, at least two and all finite."""
+    """Return accelerations, at least two and all finite."""
     values = _floats(acceleration, "accelerations", 1)
     if len(values) < 2:
         raise InvalidMotion(f"a motion needs at least two samples, not {len(values)}")
@@ -313,7 +313,7 @@ def checked_step(dt: float) -> float:
 
 
 def checked_times(times: ArrayLike, count: int) -> Floats:
-    """Return the times of so many samples, s."""
+    """Return the times of this many samples, s."""
     values = _floats(times, "times", 1)
     if len(values) != count:
         raise InvalidMotion(f"there are {len(values)} {{}} but {count} accelerations: give one for each", "times")
@@ -331,14 +331,14 @@ def _floats(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Fl
 
 
 def exact_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Sum and its rounding error (Knuth 1969)."""
+    """Return a sum and its rounding error (Knuth 1969)."""
     total = a + b
     of_b = total - a
     return total, (a - (total - of_b)) + (b - of_b)
 
 
 def exact_product(a: float | Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Product and its rounding error (Dekker 1971)."""
+    """Return a product and its rounding error (Dekker 1971)."""
     product = a * b
     a_high, a_low = _halves(a)
     b_high, b_low = _halves(b)
@@ -346,7 +346,7 @@ def exact_product(a: float | Floats, b: Floats) -> tuple[Floats, Floats]:
 
 
 def exact_quotient(a: Floats, rest: Floats, divisor: float) -> tuple[Floats, Floats]:
-    """Quotient of ``a + rest``, and what it lacks."""
+    """Return the quotient of ``a + rest`` and its error."""
     quotient = a / divisor
     product, error = exact_product(divisor, quotient)
     return quotient, ((a - product) - error + rest) / divisor

@@ -1,4 +1,4 @@
-"""Processing of a motion: trim, baseline, band-pass, resample, rotate, and filter through a building to a floor."""
+"""Processing of a motion: trim, baseline, band-pass, resample, rotate, and floor motion."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ _DEGREE: Final = 9
 
 
 class Processed(NamedTuple):
-    """Pieces after one step of processing, and what was done, for the motion's history."""
+    """Pieces after one processing step, and its description for the motion's history."""
 
     breakpoints: Floats
     coefficients: Floats
     done: str
 
 
-#: A step of processing.
+#: Processing step.
 _Step = Callable[[Piecewise], Processed]
 
 
 class Processable(Measured):
-    """What makes other motions of a motion; `Motion` is the only one."""
+    """Methods of `Motion` that derive other motions."""
 
     name: str
     description: Description
@@ -50,7 +50,7 @@ class Processable(Measured):
     step: float | None
 
     def _changed(self, how: str, done: str, **fields: Any) -> Self:
-        """Return the motion with other fields, and with what was done."""
+        """Return the motion with other fields and an extended history."""
         fields = {"description": self.description.changed(how), "history": (*self.history, done)} | fields
         return replace(self, **fields)  # type: ignore[type-var]
 
@@ -60,27 +60,27 @@ class Processable(Measured):
         return ", ".join(part for part in (self.name, *described, *self.history) if part)
 
     def rotated(self, other: Self, azimuth: float, *, recorded: tuple[float, float] | None = None) -> Self:
-        """Return the component along any azimuth of the horizontal motion whose two components are this and another.
+        """Return the component along any azimuth of a horizontal motion with two components.
 
         Parameters
         ----------
         other : Motion
-            Second horizontal component of the same place, which starts at the same time.
+            Second horizontal component at the same place and time.
         azimuth : float
-            Direction in which the result is positive, degrees clockwise from north.
+            Positive direction of the result, degrees clockwise from north.
         recorded : pair of float, optional
-            Azimuths of this component and the other, degrees clockwise from north; by default as their records say.
+            Azimuths of both components, degrees clockwise from north, by default from their records.
 
         Returns
         -------
         Motion
-            With the vertical component of either.
+            Component along `azimuth`, with the vertical component of either.
 
         Raises
         ------
         InvalidMotion
-            If an azimuth is not known or no number, both components lie nearly along one line, begin at different
-            times by the clock of their files, or each brings a vertical component of its own.
+            If an azimuth is unknown or not a number, the components are nearly parallel, begin at different times by
+            the clock of their files, or have different vertical components.
 
         Notes
         -----
@@ -115,7 +115,7 @@ class Processable(Measured):
         )
 
     def delayed(self, delay: float) -> Self:
-        """Return the motion after a time of no acceleration, s; ``processed(trim=...)`` cuts off an early part."""
+        """Return the motion after a time of zero acceleration, s. ``processed(trim=...)`` removes an early part."""
         wait = checks.positive(delay, "delay", InvalidMotion, "s")
         return self._changed(
             "delayed",
@@ -133,24 +133,24 @@ class Processable(Measured):
         period, damping : float
             Natural period of the building, s, and its fraction of critical damping.
         ringing : float, optional
-            Time for which the floor is followed after the motion, s; by default until a free oscillation has faded to a
+            Duration of the floor motion after the ground motion, s, by default until a free oscillation decays to a
             thousandth.
 
         Returns
         -------
         Motion
-            Polynomials of degree 9 on pieces of a quarter radian at most; the vertical component as it is.
+            Polynomials of degree 9 on pieces of at most a quarter radian, with unchanged vertical component.
 
         Raises
         ------
         InvalidMotion
-            If the period or the damping is out of its range, or there is no damping and no `ringing`.
+            If period or damping is out of range, or both damping and `ringing` are missing.
 
         Notes
         -----
-        In a building with one mode this is the motion of the floor where the mode's shape times its participation
-        factor is 1; ``ground + (floor + -ground) * 0.6`` is that of a floor where it is 0.6. What stands on the floor
-        does not act back on it. A fragility against measures of the floor has no hazard curve of the ground.
+        In a building with one mode, this is the motion of the floor where mode shape times participation factor is 1.
+        At 0.6 the motion is ``ground + (floor + -ground) * 0.6``. Contents do not act back on the floor. A hazard curve
+        of the ground does not apply to a fragility against floor measures.
         """
         breakpoints, coefficients, error = _floor_pieces(self, period, damping, ringing, self.error)
         done = f"on a floor of period {period:.6g} s, damping {damping:.6g}"
@@ -165,33 +165,33 @@ class Processable(Measured):
         order: int | None = None,
         resample: float | None = None,
     ) -> Self:
-        """Return a processed motion; the steps go in the order of the arguments, each noted in `history`.
+        """Return a processed motion, with steps in the order of the parameters and recorded in `history`.
 
         Parameters
         ----------
         trim : (start, end)
-            Part to keep, s; its start becomes time 0. For even samples the ends move to the nearest sample.
+            Part to keep, s, whose start becomes time 0. For even samples the ends move to the nearest sample.
         baseline : int
-            Degree of the polynomial in time that is fitted to the samples by least squares and subtracted.
+            Degree of the polynomial in time that is fitted by least squares and subtracted.
         band_pass : (low, high)
-            Corner frequencies of a Butterworth filter, Hz, run forwards and backwards (no phase shift) with
-            zeros added before and after and removed again; None leaves that side open.
+            Corner frequencies of a Butterworth filter, Hz, run forwards and backwards (no phase shift) with temporary
+            zeros before and after. None leaves that side open.
         order : int
-            Order of the filter in each direction, 4 by default; only with `band_pass`.
+            Order of the filter in each direction with `band_pass`, 4 by default.
         resample : float
-            New sampling step, s: the motion's values at its multiples, joined by straight lines. To a coarser step,
-            remove what lies above its Nyquist frequency with `band_pass`.
+            New sampling step, s: values at its multiples, joined by straight lines. For a coarser step, use `band_pass`
+            to remove content above its Nyquist frequency.
 
         Returns
         -------
         Motion
-            Of the same name, both components processed alike.
+            Motion with the same name, and both components processed alike.
 
         Raises
         ------
         InvalidMotion
-            If no step is named, an argument is not usable or out of place, or `baseline` or `band_pass` is applied
-            to a motion that is not linear between even samples, or jumps (resample it first, in a call of its own).
+            If no step is specified, an argument is invalid or out of place, or `baseline` or `band_pass` is applied to
+            a motion that jumps or is not linear between even samples (resample it in a previous call).
         """
         steps: list[_Step] = []
         kept = None if trim is None else _ends(self, *_pair(trim, "trim"))
@@ -208,7 +208,7 @@ class Processable(Measured):
             raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
         vertical = self.vertical
         if vertical is not None and kept is not None and kept[0] > vertical.duration - piecewise.SHORTEST:
-            vertical = None  # it is over by then
+            vertical = None  # the vertical motion has ended by then
         if vertical is not None:
             vertical = vertical._processed(kept, steps, self.step)
         return replace(self._processed(kept, steps), vertical=vertical)  # type: ignore[type-var]
@@ -217,7 +217,7 @@ class Processable(Measured):
         """Return the part between two times (s; even samples stay even on a finer `grid`), after these steps."""
         motion: Piecewise = self
         history = self.history
-        # What is made of samples is the motion from then on: the lines between them are exact.
+        # From this step on the motion is exactly the lines between the samples.
         error = 0.0 if steps else self.error
         if kept is not None:
             start, end = kept[0], min(kept[1], self.duration)
@@ -239,7 +239,7 @@ def _pair(values: tuple[T, T], what: str) -> tuple[T, T]:
 
 
 def _ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
-    """Return the ends (s) of the part to keep; those of even samples are moved to the nearest sample."""
+    """Return the ends (s) of the part to keep, at the nearest samples if these are even."""
     first = checks.finite(start, "start of the part to keep", InvalidMotion)
     last = checks.finite(end, "end of the part to keep", InvalidMotion)
     duration = float(motion.breakpoints[-1])
@@ -281,7 +281,7 @@ def _whole(ratio: float) -> int | None:
 
 
 def _baseline(motion: Piecewise, degree: int) -> Processed:
-    """Subtract the polynomial of the given degree that fits the samples best (least squares)."""
+    """Subtract the polynomial of this degree with the best least-squares fit to the samples."""
     step = _step(motion, "baseline")
     times, samples = piecewise.samples(motion)
     degree = checks.whole(degree, "degree of a baseline", InvalidMotion, 0, min(10, len(samples) - 1))
@@ -290,8 +290,8 @@ def _baseline(motion: Piecewise, degree: int) -> Processed:
 
 
 def _band_pass(motion: Piecewise, low: float | None, high: float | None, order: int) -> Processed:
-    """Filter with a Butterworth band-pass, forwards and backwards, and zeros at both ends (Converse and Brady 1992)."""
-    from scipy import signal  # half a second: loaded only where it is used
+    """Apply a Butterworth band-pass both ways with zeros at both ends (Converse and Brady 1992)."""
+    from scipy import signal  # imported on first use because it takes half a second
 
     step = _step(motion, "band_pass")
     nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
@@ -316,7 +316,7 @@ def _band_pass(motion: Piecewise, low: float | None, high: float | None, order: 
 
 
 def _resample(motion: Piecewise, step: float) -> Processed:
-    """Take the motion's values at the multiples of `step` (s) up to its end, joined by straight lines."""
+    """Sample the motion at the multiples of `step` (s) up to its end, joined by straight lines."""
     new = checks.positive(step, "new sampling step", InvalidMotion, "s")
     duration = float(motion.breakpoints[-1])
     count = math.floor(duration / new * (1.0 + 1e-12)) + 1
@@ -347,17 +347,17 @@ def _joined(samples: Floats, step: float, done: str) -> Processed:
 def _floor_pieces(
     motion: Piecewise, period: float, damping: float, ringing: float | None, error: float = 0.0
 ) -> tuple[Floats, Floats, float]:
-    """Absolute acceleration of an oscillator that starts at rest, and a bound on the error of its pieces, m/s^2.
+    """Compute the absolute acceleration of an oscillator from rest, and its error bound, m/s^2.
 
-    With u'' + 2 z w u' + w^2 u = -a(t) it is -(2 z w u' + w^2 u). On each piece u is the Taylor series of the exact
-    solution about its start, from the series of the solutions of the states (1, 0), (0, 1), and of the one at rest.
+    For u'' + 2 z w u' + w^2 u = -a(t) it is -(2 z w u' + w^2 u). On each piece u is the Taylor series of the exact
+    solution about its start, from the series of the solutions of the states (1, 0) and (0, 1) and of the one from rest.
     """
     end = float(motion.breakpoints[-1])
     time = checks.positive(period, "period", InvalidMotion, "s")
     rate, ratio = 2.0 * math.pi / time, checked_damping(damping, InvalidMotion)
     if ringing is None and ratio == 0.0:
         raise InvalidMotion("a floor without {} moves for ever: give {}, s", "damping", "ringing")
-    # Without a time, a free oscillation is followed until it has faded to a thousandth of itself.
+    # By default a free oscillation continues until it has decayed to a thousandth.
     after = -math.log(1e-3) / (ratio * rate) if ringing is None else ringing
     after = after if ringing is None else checks.within(ringing, "ringing", InvalidMotion, 0.0, 1e15, "s")
     step = _RADIANS / rate
@@ -384,12 +384,12 @@ def _floor_pieces(
     acceleration = -(2.0 * ratio * rate * slope[:, :columns] + rate**2 * solution[:, :columns])
     largest = float(np.max(np.abs(acceleration[:, 0]), initial=0.0))
     own = 4.0 * largest * _RADIANS**columns / math.factorial(columns)
-    grown = error * (2.0 / ratio if ratio > 0.0 else rate * (end + after))  # the sum of all that an error can do
+    grown = error * (2.0 / ratio if ratio > 0.0 else rate * (end + after))  # sum of all effects of an error
     return breakpoints, acceleration, own + grown
 
 
 def _series(given: Floats, rate: float, ratio: float, terms: int) -> Floats:
-    """Series of three solutions on each piece, shape (3, pieces, terms): of two free ones, and of that from rest."""
+    """Return series of two free solutions and of the one from rest on each piece, shape (3, pieces, terms)."""
     series = np.zeros((3, len(given), terms))
     series[0, :, 0] = series[1, :, 1] = 1.0
     for k in range(terms - 2):
@@ -404,7 +404,7 @@ def _at(series: Floats, x: Floats) -> Floats:
 
 
 def _marched(ends: Floats) -> Floats:
-    """Displacement and velocity at the start of every piece, shape (2, pieces), from what each makes of the states."""
+    """Compute displacement and velocity at the start of every piece, shape (2, pieces)."""
     found = np.empty((2, ends.shape[2]))
     u = v = 0.0
     for k, (a, b, c, d, e, f) in enumerate(ends.transpose(2, 0, 1).reshape(-1, 6).tolist()):
@@ -418,11 +418,11 @@ def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
     angle = np.asarray(degrees, dtype=np.float64)
     quarters = np.rint(angle / 90.0)
     sine, cosine = piecewise.from_quadrant(quarters, np.deg2rad(angle - 90.0 * quarters))
-    return sine + 0.0, cosine + 0.0  # no negative zeros
+    return sine + 0.0, cosine + 0.0  # avoids negative zeros
 
 
 def _recorded_azimuths(one: Processable, other: Processable, recorded: Any) -> tuple[float, float]:
-    """Return the azimuths of two components, as they are given, or else as their records say; or refuse them."""
+    """Return the azimuths of two components, specified or from their records."""
     if recorded is None:
         recorded = [(each.description.origin or Origin()).azimuth for each in (one, other)]
         if None in recorded:
@@ -447,7 +447,7 @@ def _recorded_azimuths(one: Processable, other: Processable, recorded: Any) -> t
 
 
 def shares(recorded: tuple[float, float], azimuth: float) -> tuple[float, float]:
-    """Return the factors on two components whose sum is the component along another azimuth."""
+    """Return the factors on two components for the component along another azimuth."""
     first, second = recorded
     sine, _ = sine_cosine([second - azimuth, azimuth - first, second - first])
     return float(sine[0] / sine[2]) + 0.0, float(sine[1] / sine[2]) + 0.0

@@ -1,4 +1,4 @@
-"""Intensity measures that motions are scaled to: what each one is of a motion, and the factor to a level of it."""
+"""Intensity measures of motions, and scale factors to their levels."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from rocking.core.tables import named
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.measures import DAMPING, Measured, checked_damping
 
-#: What an analysis may count motions by.
+#: Intensity measures of the analyses.
 IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
 MeasureName = Literal["factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
 
 INTENSITIES: Final[Sequence[str]] = get_args(IntensityName)
-#: Those of a motion alone.
+#: Measures of a motion alone.
 SCALES: Final = ("factor", "pga", "pgv", "sa")
 
-#: Unit and name in words.
+#: Unit, and name in words.
 _MEASURES: Final[dict[str, tuple[str, str]]] = {
     "factor": ("1", "factor of the motion"),
     "pga": ("m/s^2", "peak ground acceleration"),
@@ -37,22 +37,28 @@ _MEASURES: Final[dict[str, tuple[str, str]]] = {
 
 @dataclass(frozen=True)
 class Measure:
-    """How the intensity of a motion is measured.
+    """Intensity measure of a motion.
 
     Parameters
     ----------
     name : {"factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
-        Factor on the motion as it is; peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2); or
-        a block's own dimensionless ones: peak acceleration over the smallest that lifts it, and peak velocity over that
-        acceleration in the block's time. Of a free block they are PGA/(g tan alpha) and p PGV/(g tan alpha), in the
-        linear model with alpha for tan alpha; what restrains a block, or makes it lean, changes what lifts it.
+        Factor on the motion, peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2), or a
+        dimensionless measure of the block: "pga_ratio" is the peak acceleration divided by the uplift acceleration,
+        "pgv_ratio" the peak velocity divided by the uplift acceleration and the time scale 1/p. For a free block these
+        are PGA/(g tan alpha) and p PGV/(g tan alpha), in the linear model with alpha for tan alpha. Restraints and
+        leaning change the uplift acceleration.
     period, damping : float, optional
         Period of the oscillator of "sa", s, and its fraction of critical damping.
 
     Raises
     ------
     InvalidOption
-        If there is no such measure, or `period` or `damping` is missing, out of place or out of range.
+        If the measure is unknown, or `period` or `damping` is missing, out of place or out of range.
+
+    See Also
+    --------
+    rocking.Motion.scaled_to : scale a motion to a level of a measure.
+    rocking.compare_measures : compare the efficiency of measures.
 
     Examples
     --------
@@ -80,7 +86,7 @@ class Measure:
 
     @classmethod
     def of(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
-        """Return a measure, or the one of a name among those that make sense."""
+        """Return a measure, or the measure with an accepted name."""
         name = measure.name if isinstance(measure, Measure) else measure
         checks.one_of(name, "measure", InvalidOption, among)
         if isinstance(measure, Measure):
@@ -91,7 +97,7 @@ class Measure:
 
     @property
     def units(self) -> str:
-        """Units of the measure; "1" if it has none."""
+        """Units of the measure, or "1"."""
         return _MEASURES[self.name][0]
 
     @property
@@ -101,17 +107,17 @@ class Measure:
 
     @property
     def scale(self) -> float:
-        """Factor from SI units to those for people: accelerations in g."""
+        """Factor from SI units to display units: accelerations in g."""
         return 1.0 / STANDARD_GRAVITY if self.units == "m/s^2" else 1.0
 
     @property
     def quantity(self) -> str:
-        """Name in words, with the damping where it is not 5 %."""
+        """Name in words, with the damping unless it is 5 %."""
         return _MEASURES[self.name][1] + ("" if self.period is None else f" at {self._oscillator}")
 
     @property
     def short_name(self) -> str:
-        """Name for a table or a figure: PGA, PGV, SA(1 s), with the damping where it is not 5 %."""
+        """Name for a table or a figure: PGA, PGV, SA(1 s), with the damping unless it is 5 %."""
         if self.period is not None:
             return f"SA({self._oscillator})"
         return self.name.upper() if self.name in ("pga", "pgv") else self.quantity
@@ -122,32 +128,32 @@ class Measure:
 
     @property
     def label(self) -> str:
-        """Name and units for people."""
+        """Name and units for display."""
         return self.quantity + (f" ({self.shown_in})" if self.shown_in else "")
 
     @property
     def shown_in(self) -> str:
-        """Units for people; nothing if it has none."""
+        """Units for display, empty for a dimensionless measure."""
         return {"m/s^2": "g", "m/s": "m/s", "1": ""}[self.units]
 
     def shown(self, value: float) -> str:
-        """Return a value with its unit, to six digits; an acceleration in g, too."""
+        """Return a value with its unit, to six digits, and accelerations also in g."""
         if self.units == "m/s^2":
             return f"{value:.6g} m/s^2 ({value / STANDARD_GRAVITY:.4g} g)"
         return f"{value:.6g}" if self.units == "1" else f"{value:.6g} {self.units}"
 
     @property
     def of_motion(self) -> Literal["factor", "pga", "pgv", "sa"]:
-        """Name of the measure of the motion alone that this one counts."""
+        """Name of the underlying measure of the motion alone."""
         return {"pga_ratio": "pga", "pgv_ratio": "pgv"}.get(self.name, self.name)  # type: ignore[return-value]
 
     @property
     def alone(self) -> Measure:
-        """Measure of the motion alone that this one counts."""
+        """Underlying measure of the motion alone."""
         return self if self.of_motion == self.name else Measure(self.of_motion, self.period, self.damping)
 
     def value(self, motion: Measured) -> float:
-        """Return the measure of a motion alone, in SI units; 1 where levels are factors."""
+        """Return the measure of a motion alone, in SI units, or 1 if levels are factors."""
         if self.period is not None:
             return float(motion.spectral_acceleration(self.period, self.damping))
         if self.of_motion == "factor":
@@ -155,7 +161,7 @@ class Measure:
         return motion.pga if self.of_motion == "pga" else motion.pgv
 
     def positive(self, motion: Measured, name: str) -> float:
-        """Return `value`, but refuse a motion that is zero throughout, which the error calls `name`."""
+        """Return `value`, or raise an error for a motion `name` that is zero throughout."""
         value = self.value(motion)
         if not value > 0.0:
             raise InvalidMotion(f"{name} is zero throughout: it has no {self.quantity}, and cannot be scaled to one")
@@ -163,34 +169,34 @@ class Measure:
 
     @property
     def in_block_units(self) -> bool:
-        """Whether each block has a unit of its own."""
+        """Whether the measure has a separate unit for each block."""
         return self.name in ("pga_ratio", "pgv_ratio")
 
     def unit(self, lifting: Floats, p: Floats) -> Floats:
-        """Return what counts as 1 for each block (m/s^2 or m/s), from its uplift acceleration and its p, shape (n,).
+        """Return the unit for each block (m/s^2 or m/s) from its uplift acceleration and its p, shape (n,).
 
         The p of a block with two sides is the smaller one.
         """
         return lifting if self.name == "pga_ratio" else lifting / p
 
     def options(self) -> dict[str, float]:
-        """Return period (s) and damping of "sa"; empty for all other measures."""
+        """Return period (s) and damping of "sa", or nothing for other measures."""
         return {} if self.period is None else {"period": self.period, "damping": self.damping}
 
     def scaling(self, level: float, factor: float) -> str:
-        """Return the sentence for the history of a motion that a factor brought to a level (SI units)."""
+        """Return the history sentence of a motion that was scaled to a level (SI units)."""
         if self.name == "factor":
             return f"scaled by {factor:.6g}"
         oscillator = "" if self.period is None else f" at {self.period:.6g} s, damping {self.damping:.6g}"
         return f"scaled by {factor:.6g} to a {_MEASURES[self.name][1]} of {self.shown(level)}{oscillator}"
 
 
-#: Motions as they are, times a factor.
+#: Factor on unscaled motions.
 FACTOR: Final = Measure("factor")
 
 
 def intensities(values: ArrayLike) -> Floats:
-    """Return intensities at which a curve is asked for, as an array of their shape."""
+    """Return the intensities of a curve as an array of the same shape."""
     at = checks.numbers(values, "intensities", InvalidOption)
     if not np.all(at >= 0.0):
         raise InvalidOption("intensities must be numbers that are not negative")

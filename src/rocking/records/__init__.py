@@ -1,4 +1,4 @@
-"""Strong-motion records: those that ship with the package, and files in the usual formats."""
+"""Strong-motion records: shipped records, and files in the usual formats."""
 
 import lazy_loader
 

@@ -1,8 +1,8 @@
-"""Strong-motion records that ship with the package.
+"""Strong-motion records shipped with the package.
 
-Every channel of three stations: China Lake and Tower 2 in the 2019 Ridgecrest earthquake (M 7.1), and the free field of
-the Meloland overpass in El Centro in the 1979 Imperial Valley earthquake, whose 270 degree channel has a near-fault
-pulse. The values are exactly those published.
+It contains every channel of three stations: China Lake and Tower 2 in the 2019 Ridgecrest earthquake (M 7.1), and the
+free field of the Meloland overpass in El Centro in the 1979 Imperial Valley earthquake, whose 270 degree channel has a
+near-fault pulse. The values are exactly those published.
 """
 
 from __future__ import annotations
@@ -26,24 +26,28 @@ _FOLDER: Final = resources.files("rocking.records") / "data"
 
 @dataclass(frozen=True)
 class Record:
-    """Facts on a shipped record.
+    """Metadata of a shipped record.
 
     Attributes
     ----------
     name : str
-        Name that `load` takes.
+        Name for `load`.
     event, station : str
         Earthquake and place.
     direction : str
-        Degrees clockwise from north that positive acceleration points to, or "up".
+        Direction of positive acceleration, degrees clockwise from north, or "up".
     state : str
-        Whether it was corrected, and how.
+        Whether and how the record was corrected.
     step, samples : float, int
         Sampling step, s, and number of samples.
     units, denominator : str, int
-        Unit of the published numbers, which are whole multiples of one over the denominator.
+        Unit of the published numbers, which are integer multiples of 1/`denominator`.
     source, terms : str
-        Who recorded and processed it, and terms of use.
+        Institution that recorded and processed the motion, and terms of use.
+
+    See Also
+    --------
+    rocking.records.load : load a shipped record as a motion.
     """
 
     name: str
@@ -61,7 +65,7 @@ class Record:
 
     @property
     def title(self) -> str:
-        """Place and year of the event, station and direction, in few words."""
+        """Short title: place and year of the event, station and direction."""
         year = re.search(r"(?:19|20)\d{2}", self.event)
         place, *more = re.sub(r"^(?:[A-Z]{2}\.\w+|\d+) ", "", self.station).split(", ")
         crossing = [part.partition(" / ")[2] for part in more if " / " in part]
@@ -75,7 +79,11 @@ def names() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Those that `load` takes.
+        Names for `load` and `info`.
+
+    See Also
+    --------
+    rocking.records.load : load a shipped record as a motion.
 
     Examples
     --------
@@ -86,7 +94,7 @@ def names() -> tuple[str, ...]:
 
 
 def info(name: str) -> Record:
-    """Return the facts on a shipped record: event, station, direction, step, source and terms.
+    """Return the metadata of a shipped record: event, station, direction, step, source and terms.
 
     Parameters
     ----------
@@ -96,7 +104,11 @@ def info(name: str) -> Record:
     Returns
     -------
     Record
-        Without its samples.
+        Metadata, without the samples.
+
+    See Also
+    --------
+    rocking.records.load : load a shipped record as a motion.
 
     Examples
     --------
@@ -112,11 +124,11 @@ def info(name: str) -> Record:
 
 
 def load(name: str) -> Motion:
-    """Return a shipped record as a motion, linear between samples, values as published and in m/s^2.
+    """Load a shipped record as a motion, linear between samples, with the published values in m/s^2.
 
-    The Ridgecrest records are uncorrected: their mean is zero, but the instruments' baseline moves by some mm/s^2
-    during the shaking, which does not matter to a rocking block but makes the displacement drift by metres. To
-    remove it::
+    The Ridgecrest records are uncorrected. Their mean is zero, but the baseline of the instruments moves by some mm/s^2
+    during the shaking, so the displacement drifts by metres. This does not affect a rocking block. To remove the drift,
+    use::
 
         rocking.records.load("ridgecrest-clc-090").processed(baseline=0, band_pass=(0.05, None))
 
@@ -128,7 +140,12 @@ def load(name: str) -> Motion:
     Returns
     -------
     Motion
-        Its `description` has source and terms.
+        Ground motion, whose `description` contains source and terms.
+
+    See Also
+    --------
+    rocking.records.names : return the names of the shipped records.
+    rocking.read : read a motion from a record file.
 
     Examples
     --------

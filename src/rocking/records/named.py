@@ -1,4 +1,4 @@
-"""Motions as arguments, by name, from record files and folders; and lists of records and of channels."""
+"""Motions as arguments, by name or from record files, and lists of records and channels."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
 from rocking.records.formats.source import Request
 
-#: One motion, several, or several by names that replace their own.
+#: One motion, several, or a mapping from names to motions.
 Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
 
 
 def one_motion(motion: Motion | None) -> Motion | None:
-    """Return a motion (None is free rocking), or refuse what is none."""
+    """Return a motion (None is free rocking), or raise an error."""
     if motion is not None and not isinstance(motion, Motion):
         raise InvalidMotion(_refusal(motion))
     return motion
 
 
 def several_motions(motions: Motions) -> list[Motion]:
-    """Return one motion or several as a list; those of a mapping under its names."""
+    """Return one motion or several as a list, renamed by the keys of a mapping."""
     if isinstance(motions, Mapping):
         several = several_motions([*motions.values()])
         return [replace(motion, name=name) for name, motion in zip(motions, several, strict=True)]
@@ -50,7 +50,7 @@ def several_motions(motions: Motions) -> list[Motion]:
 
 
 def motions_by_name(motions: Motions) -> dict[str, Motion]:
-    """Return one motion or several by the names of a mapping, or else by their own."""
+    """Return motions by the names of a mapping, or else by their own."""
     several = several_motions(motions)
     if isinstance(motions, Mapping):
         return dict(motions)
@@ -58,12 +58,12 @@ def motions_by_name(motions: Motions) -> dict[str, Motion]:
 
 
 def names_of(motions: Sequence[Motion]) -> list[str]:
-    """Names of motions, numbered where several share one: a row of a table must say which it is."""
+    """Return distinct names of motions, numbered if necessary."""
     return numbered([motion.name for motion in motions])
 
 
 def numbered(given: Sequence[str]) -> list[str]:
-    """Names, numbered where several are the same, by numbers that make no other name."""
+    """Return names, with repeated ones numbered."""
     shared = {name for name, count in Counter(given).items() if count > 1}
     taken = {*given}
     names = []
@@ -75,7 +75,7 @@ def numbered(given: Sequence[str]) -> list[str]:
 
 
 def distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
-    """Motions that differ, and which of them each one is: the same command is often given several times."""
+    """Return distinct motions, and the index of each motion among them."""
     distinct: dict[tuple[bytes, ...], Motion] = {}
     keys = []
     for motion in motions:
@@ -94,17 +94,17 @@ def _refusal(given: Any) -> str:
     return f"a Motion is needed, not {kind}: make one with Motion.from_samples(array, dt), in m/s^2 and s"
 
 
-#: The name of a record that is read from standard input.
+#: Name of a record on standard input.
 STANDARD_INPUT = "-"
 
 
 def named_motion(
     name: str, *, vertical: str | None = None, scale: float = 1.0, several: bool = False, **about: Any
 ) -> Motion:
-    """Motion, times a factor, of a record file ("-" is standard input), or of a shipped record where there is no file.
+    """Return the scaled motion of a record file ("-" is standard input), or of a shipped record if no file exists.
 
-    Its channel, dt and units may be given. With `several`, they are for several files: those that say their step and
-    units keep them, and those that hold one channel are taken whatever its name.
+    Channel, dt and units are optional. With `several`, they apply to several files: files that state step and units
+    keep them, and the name of a single channel does not matter.
     """
     several = several or (vertical is not None and _stands_alone(vertical))
     if is_shipped(name):
@@ -119,8 +119,8 @@ def named_motion(
 
 
 def named_vertical(name: str, record: str, *, several: bool = False, **about: Any) -> Motion:
-    """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal file."""
-    about = {key: value for key, value in about.items() if key != "channel"}  # that of the horizontal motion
+    """Return a vertical motion by name: a file, a shipped record, or else a channel of the horizontal file."""
+    about = {key: value for key, value in about.items() if key != "channel"}  # the channel of the horizontal motion
     if _stands_alone(name):
         return named_motion(name, several=True, **about)
     if record == STANDARD_INPUT or not is_there(record):
@@ -130,29 +130,29 @@ def named_vertical(name: str, record: str, *, several: bool = False, **about: An
 
 
 def _stands_alone(vertical: str) -> bool:
-    """Whether a vertical motion is a file or a shipped record of its own, and no channel of the horizontal one's."""
+    """Return whether a vertical motion is a file or shipped record, not a channel of the horizontal file."""
     return os.path.isfile(vertical) or vertical in catalogue.names()  # noqa: PTH113 - see `is_there`
 
 
 def refuse_what_is_known(name: str, **said: object) -> None:
-    """Check that nothing is said of a shipped record that it knows itself."""
+    """Raise an error if an argument specifies a known property of a shipped record."""
     text = "a shipped record is one channel, with its step and units; leave {} out"
     for argument in (each for each, value in said.items() if value is not None):
         raise UnreadableRecord(text, argument, path=name)
 
 
 def is_there(name: str | Path) -> bool:
-    """Whether there is a file or folder of a name, which may be one that none can have, as it is too long."""
+    """Return whether a file or folder exists (False for overlong names)."""
     return os.path.exists(name)  # noqa: PTH110 - Path.exists() raises then
 
 
 def is_shipped(name: str) -> bool:
-    """Whether a name is that of a shipped record, and not of a file."""
+    """Return whether a name refers to a shipped record and not to a file."""
     return name in catalogue.names() and not is_there(name)
 
 
 def expanded(names: Iterable[str]) -> list[str]:
-    """Return the names of records that files, folders, patterns and shipped records stand for, each once."""
+    """Return the distinct record names from files, folders, patterns and shipped records."""
     return list(dict.fromkeys(itertools.chain.from_iterable(map(_files, names))))
 
 
@@ -171,20 +171,20 @@ def _files(name: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Contents:
-    """A list of records or channels.
+    """List of records or channels.
 
     Attributes
     ----------
     title : str
-        What they are; empty if the list says it.
+        Title of the list, possibly empty.
     facts : dict
-        What holds for all of them.
+        Properties common to all entries.
     kind : {"records", "channels"}
-        What is listed.
+        Kind of the entries.
     entries : list of dict
-        One for each, with the same names in the same order; units are in the names.
+        Entries with the same names, including units, in the same order.
     motions : tuple of Motion
-        Those of a file's channels.
+        Motions of a file's channels.
     """
 
     title: str
@@ -194,9 +194,9 @@ class Contents:
     motions: tuple[Motion, ...] = ()
 
     def summary(self) -> str:
-        """Return the table for people, with its title."""
+        """Return the table as text, with its title."""
         columns = list(self.entries[0])
-        # What has no value is the step of samples that are not evenly spaced.
+        # A missing value is the step of unevenly spaced samples.
         rows = [["uneven" if value is None else value for value in entry.values()] for entry in self.entries]
         return "\n\n".join(filter(None, (self.title, text_table(columns, rows))))
 
@@ -206,22 +206,26 @@ class Contents:
         return f"<Contents: {'; '.join(filter(None, (self.title, f'{len(self.entries)} {kind}: {names}')))}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table for machines: the facts, and the entries under their kind."""
+        """Return the facts, and the entries under their kind."""
         return {**self.facts, self.kind: self.entries}
 
 
 def shipped(name: str | None = None) -> Contents:
-    """List the records that ship, or one of them.
+    """List the shipped records, or one of them.
 
     Parameters
     ----------
     name : str, optional
-        Name of the one.
+        Name of a single record.
 
     Returns
     -------
     Contents
-        With step, duration and peaks.
+        Table with step, duration and peaks.
+
+    See Also
+    --------
+    rocking.records.load : load a shipped record as a motion.
 
     Examples
     --------
@@ -251,14 +255,19 @@ def contents(
     file : str, path or binary file
         As for `rocking.read`.
     channel, dt, units : str or float, optional
-        As for `rocking.read`; by default all channels are listed.
+        As for `rocking.read`. By default all channels are listed.
     several : bool
-        Whether the arguments are for several files: those that say their step and units keep them.
+        Whether the arguments apply to several files. Files that state step and units then keep them.
 
     Returns
     -------
     Contents
-        With units, step, duration and peaks of each channel.
+        Table with units, step, duration and peaks of each channel.
+
+    See Also
+    --------
+    rocking.read : read a motion from a record file.
+    rocking.records.channels : return the channels with their samples.
 
     Examples
     --------

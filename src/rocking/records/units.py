@@ -1,4 +1,4 @@
-"""Units of accelerations and times, in all their spellings."""
+"""Units of acceleration and time, in all their spellings."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 
-#: What the argument `units=` takes.
+#: Values of the argument `units=`.
 CHOICES = ("g", "m/s2", "cm/s2", "gal", "mm/s2", "mg")
 
 
 class Unit(NamedTuple):
-    """One unit: m/s^2, or s, = value * multiplier / divisor, so that decimal units round once."""
+    """Unit with m/s^2 or s = value * multiplier / divisor, so that decimal units are rounded once."""
 
     name: str
     multiplier: float
     divisor: float
 
     def to_si(self, values: Floats) -> Floats:
-        """Return `values` of this unit in m/s^2 or s (infinite where that overflows)."""
+        """Convert `values` of this unit to m/s^2 or s (infinite on overflow)."""
         with np.errstate(over="ignore"):
             return values * self.multiplier / self.divisor
 
@@ -35,7 +35,7 @@ def _by_spelling(units: dict[Unit, str]) -> dict[str, Unit]:
     return {spelling: unit for unit, spellings in units.items() for spelling in spellings.split()}
 
 
-#: Units of time by their spellings.
+#: Units of time by spelling.
 TIMES = _by_spelling(
     {
         SECOND: "s sec secs second seconds seg segundos sek sekunden secondes secondi",
@@ -48,7 +48,7 @@ TIMES = _by_spelling(
     }
 )
 
-#: Units of acceleration by their spellings without signs: "cm/s^2", "cm/sec/sec" and "cm_s2" are "cms2" or "cmss".
+#: Units of acceleration by spelling without signs, such as "cms2" for "cm/s^2" and "cm_s2", "cmss" for "cm/sec/sec".
 ACCELERATIONS = _by_spelling(
     {
         Unit("g", STANDARD_GRAVITY, 1.0): "g gs",
@@ -67,23 +67,23 @@ ACCELERATIONS = _by_spelling(
 
 
 def find_unit(spelling: str) -> Unit | None:
-    """Return the unit that one spells "CM/SEC/SEC", "cm/sec2", "cm/s^2", "cm/s²", "cm_s2", "gal", "G", ..., or None."""
+    """Return the unit spelled "CM/SEC/SEC", "cm/sec2", "cm/s^2", "cm/s²", "cm_s2", "gal", "G", ..., or None."""
     return ACCELERATIONS.get(plain_spelling(spelling))
 
 
 def plain_spelling(spelling: str) -> str:
-    """Return a unit's spelling without signs: "ms2" of "m/s^2", "M/SEC/SEC" has none and is "mss"."""
+    """Return a spelling without signs: "ms2" for "m/s^2", "mss" for "M/SEC/SEC"."""
     plain = re.sub(r"[\s^*._/·'’]", "", spelling.lower().replace("²", "2").replace("⁻", "-"))
     return plain.replace("sec", "s").replace("s-2", "s2")
 
 
 def find_time_unit(spelling: str) -> Unit | None:
-    """Return the unit of time that one spells "ms", "Sec.", "minutes", ..., or None."""
+    """Return the unit of time spelled "ms", "Sec.", "minutes", ..., or None."""
     return TIMES.get(spelling.strip().rstrip(".").lower())
 
 
 def choose_unit(units: str) -> Unit:
-    """Return the unit that a user names."""
+    """Return the unit named by a user."""
     unit = find_unit(units) if isinstance(units, str) else None
     if unit is None or unit.name not in CHOICES:
         text = f"the {{}} {units!r} are not known; give one of {', '.join(CHOICES)}"

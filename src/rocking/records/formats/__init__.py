@@ -1,7 +1,7 @@
 """Readers of strong-motion records: PEER AT2, CSMIP V1 and V2, COSMOS, SMC, K-NET, ESM, text, ObsPy's formats.
 
-The format is recognised from the content, never from the file's name. Numbers become m/s^2 (g = 9.80665 m/s^2); nothing
-else is done to them: no filter, no baseline, no offset removed.
+The format is recognised from the content, never from the file name. Numbers are converted to m/s^2 (g = 9.80665 m/s^2)
+without filter, baseline correction or offset removal.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from rocking.records.formats.source import Request, Source, open_source
 __all__ = ["Channel", "Identification", "channels", "identify", "read"]
 
 
-#: The formats with a header, in the order in which they are tried; a new one stands here.
+#: Formats with a header, in the order of recognition. Add a new format here.
 FORMATS: Final = (headed.AT2, csmip.COSMOS, csmip.V1, csmip.V2, headed.SMC, headed.ESM, headed.KNET)
-#: The last two accept what no header claims.
+#: The last two accept content without a recognised header.
 _RECOGNISERS: Final = (*(each.recognise for each in FORMATS), table.recognise, through_obspy.recognise)
 
 
@@ -36,31 +36,37 @@ def read(
     Parameters
     ----------
     path : str, path or binary file
-        A file in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, a text table of one
-        column (accelerations), two (times, accelerations) or more that a heading names (times, then channels), or any
-        file that ObsPy reads if the `formats` extra is installed. The format is recognised from the content.
+        File in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, text table of one column
+        (accelerations), two (times, accelerations) or more named by a heading (times, then channels), or any file that
+        ObsPy reads if the `formats` extra is installed. The format is recognised from the content.
     channel : int or str, optional
-        Number or name of the channel; needed only where the file contains several.
+        Number or name of the channel, required only if the file contains several.
     dt : float, optional
-        Sampling step, s; needed only for one column of accelerations, and for times printed with too few digits.
-        Elsewhere it must agree with the file.
+        Sampling step, s, required only for one column of accelerations and times with too few digits. Otherwise it must
+        agree with the file.
     units : {"g", "m/s2", "cm/s2", "gal", "mm/s2", "mg"}, optional
-        Units of the accelerations, which overrule a heading; needed only where the file does not say: ObsPy's formats,
-        and text tables without a heading such as "acceleration (cm/s2)" or "a_g".
+        Units of the accelerations, which override a heading. Required only if the file does not state them: ObsPy's
+        formats, and text tables without a heading such as "acceleration (cm/s2)" or "a_g".
 
     Returns
     -------
     Motion
-        In m/s^2, linear between the samples, its time counted from the first sample. Nothing is removed: an
-        instrument's constant offset, as K-NET's files have, is still in it.
+        Motion in m/s^2, linear between the samples, from time 0. A constant instrument offset, as in K-NET files, is
+        kept.
 
     Raises
     ------
     UnreadableRecord
-        If the file is missing or unreadable, its format unknown, its content at odds with its header, a number
-        damaged, the channel unknown or not chosen. The message names file and line, and how to correct it.
+        If the file is missing, unreadable or inconsistent, its format is unknown, a number is damaged, or the channel
+        is unknown or not specified. The message contains file, line and correction.
     InvalidMotion
-        If `dt` is not a positive number, or the samples do not make a motion.
+        If `dt` is not a positive number, or the samples do not form a motion.
+
+    See Also
+    --------
+    rocking.records.contents : list the channels of a file.
+    rocking.records.load : load a shipped record.
+    rocking.Motion.processed : filter or trim a motion.
 
     Examples
     --------
@@ -76,7 +82,7 @@ def read(
 
 
 def chosen(path: str | os.PathLike[str] | BinaryIO, request: Request, vertical: str | None = None) -> Channel:
-    """Return the channel of a record file that `read` makes a motion of; or the vertical one, by its name."""
+    """Return the channel of a record file for `read`, or the vertical channel by name."""
     source = open_source(path)
     found = _recognised(source).read(request)
     if vertical is not None:
@@ -85,7 +91,7 @@ def chosen(path: str | os.PathLike[str] | BinaryIO, request: Request, vertical: 
 
 
 def content(path: str | os.PathLike[str] | BinaryIO, request: Request) -> tuple[Identification, list[Channel]]:
-    """Return what format a file is taken for, and its acceleration channels, or the one that is named."""
+    """Return the format of a file, and its acceleration channels or the named one."""
     source = open_source(path)
     recognised = _recognised(source)
     found = recognised.read(request)
@@ -100,14 +106,19 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     Parameters
     ----------
     path : str or path
-        The file.
+        Record file.
     dt, units : float, str, optional
         As for `read`.
 
     Returns
     -------
     tuple of Channel
-        In the file's order.
+        Channels in the order of the file.
+
+    See Also
+    --------
+    rocking.read : read one channel as a motion.
+    rocking.records.contents : list the channels of a file.
 
     Examples
     --------
@@ -122,22 +133,26 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
 
 
 def identify(path: str | os.PathLike[str]) -> Identification:
-    r"""Return what format a file is taken for, and why.
+    r"""Identify the format of a file.
 
     Parameters
     ----------
     path : str or path
-        The file.
+        Record file.
 
     Returns
     -------
     Identification
-        Format and reason.
+        Format, and reason for the identification.
 
     Raises
     ------
     UnreadableRecord
         If the file is missing or unreadable, or its format is unknown.
+
+    See Also
+    --------
+    rocking.read : read one channel as a motion.
 
     Examples
     --------
@@ -185,7 +200,7 @@ def _choose(source: Source, found: list[Channel], wanted: int | str | None, what
 
 
 def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:
-    """Return the channels of that name, or else of that number, or whose name begins with that word."""
+    """Return the channels with that name, else number, else first word of the name."""
     text = str(wanted).casefold().split()
     by_number = [channel for channel in found if [str(channel.number)] == text]
     by_name = [channel for channel in found if channel.name.casefold().split() == text]

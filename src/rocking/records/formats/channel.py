@@ -1,4 +1,4 @@
-"""One channel of a record file: its samples in m/s^2, their times, and what the file says about them."""
+"""Channel of a record file: samples in m/s^2, times and metadata."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from rocking.motion.motion import Motion
 from rocking.records.formats.source import Request, Source
 from rocking.records.units import Unit
 
-#: Even times may be off their grid by this share of the step (or by what the printed decimals round away).
+#: Largest distance of even times from their grid divided by the step (or the rounding of printed decimals).
 _JITTER = 1e-6
-#: Rounded times leave the best even grid by one unit of their last decimal, and a little for that grid's own error.
+#: Distance of rounded times from the best even grid in units of the last decimal, with a margin for the grid's error.
 _SPREAD = 1.25
 #: Later times are mistakes, s (30,000 years).
 _LATEST = 1e12
 
 
 def first_fault(times: Floats) -> int | None:
-    """Return the index of the first time that does not come after the one before it, or None."""
+    """Return the first index at which the time does not increase, or None."""
     with np.errstate(over="ignore"):
         fine = (np.diff(times) > 0.0) & (np.abs(times[1:]) <= _LATEST) & (np.abs(times[:-1]) <= _LATEST)
     faults = np.flatnonzero(~fine)
@@ -41,7 +41,7 @@ def even_step(times: Floats) -> float | None:
     resolution = _resolution(times, rounding)
     multiple = round(mean / resolution) * resolution if resolution else 0.0
     if abs(multiple - mean) <= (resolution + rounding) / intervals:
-        # The decimals can write this step, so nothing is rounded: a missing sample must not pass for rounding.
+        # The decimals represent this step exactly. A missing sample must not pass for rounding.
         return _simplest_fit(times, multiple, rounding, _JITTER * mean + rounding)
     if resolution > 0.5 * mean:
         return None
@@ -52,7 +52,7 @@ def even_step(times: Floats) -> float | None:
 
 
 def prints_as(times: Floats, step: float) -> bool:
-    """Whether even times with this step may be printed as `times` are, with so many decimals."""
+    """Return whether even times with this step may be printed as `times`."""
     sizes = np.abs(times)
     if not sizes.max() <= _LATEST or not np.all(np.diff(times) >= 0.0):
         return False
@@ -64,7 +64,7 @@ def prints_as(times: Floats, step: float) -> bool:
 
 
 def _resolution(times: Floats, rounding: float) -> float:
-    """Return the place of the last decimal that the times were printed with, s; 0 for all digits."""
+    """Return the place of the last printed decimal of the times, s, or 0 for all digits."""
     for decimals in range(10):
         scaled = times * 10.0**decimals
         if float(np.abs(scaled - np.rint(scaled)).max()) <= max(_JITTER, rounding * 10.0**decimals):
@@ -73,7 +73,7 @@ def _resolution(times: Floats, rounding: float) -> float:
 
 
 def _simplest_fit(times: Floats, step: float, drift: float, allowed: float) -> float | None:
-    """Return the step of fewest digits within `drift` of `step`, s, over all times; None if these leave its grid."""
+    """Return the step (s) of fewest digits within `drift` of `step` over all times, or None off its grid."""
     candidates = (float(f"{step:.{digits}g}") for digits in range(1, 18))
     simplest = next((each for each in candidates if abs(each - step) * len(times) <= drift), step)
     spread = float(np.ptp(times - simplest * np.arange(len(times))))
@@ -83,7 +83,7 @@ def _simplest_fit(times: Floats, step: float, drift: float, allowed: float) -> f
 def timing(
     source: Source, request: Request, written: Floats, unit: Unit, at: int, row_at: Callable[[int], int] | None = None
 ) -> tuple[float | None, Floats | None]:
-    """Return the step (s) of times that are written in a unit, or else the times (s); refuse another step."""
+    """Return the step (s) of times in a unit, or else the times (s), checked against the requested step."""
     times, row_at = unit.to_si(written), row_at or (lambda _: at)
     fault = first_fault(times)
     step = even_step(written) if fault is None and len(written) > 1 else None
@@ -104,14 +104,14 @@ def timing(
 
 
 class Identification(NamedTuple):
-    """A file's format, and what in its content says so."""
+    """Format of a file, and the reason for its identification."""
 
     format: str
     reason: str
 
 
 class Recognised(NamedTuple):
-    """What a file is taken for, and what reads its channels, from what was seen of it already."""
+    """Recognised format, reason, and reader of the channels."""
 
     format: str
     reason: str
@@ -120,30 +120,34 @@ class Recognised(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One component of a recorded ground acceleration, evenly sampled (`dt`) or not (`times`).
+    """Component of a recorded ground acceleration, sampled evenly (`dt`) or unevenly (`times`).
 
     Attributes
     ----------
     name : str
-        Name of the component in the file, for instance "90 Deg", "Up" or "HNE".
+        Name of the component in the file, for example "90 Deg", "Up" or "HNE".
     number : int
-        The channel's number in the file, counted from 1 where the file gives none.
+        Channel number in the file, counted from 1 if the file states none.
     acceleration : ndarray, shape (n,)
-        m/s^2; nothing is removed, so an instrument's constant offset is still in it.
+        Acceleration, m/s^2, including a constant instrument offset.
     dt : float or None
-        Sampling step, s; None where the samples are uneven.
+        Sampling step, s, or None for uneven samples.
     times : ndarray, shape (n,), or None
-        Instants of uneven samples, s; None where they are even.
+        Instants of uneven samples, s, or None for even samples.
     azimuth : float or None
-        Direction of positive acceleration, degrees clockwise from north; None if vertical or unknown.
+        Direction of positive acceleration, degrees clockwise from north, or None if vertical or unknown.
     units : str
-        Units of the numbers in the file, as it spells them.
+        Units of the numbers in the file, as spelled there.
     station, event : str
-        As the file gives them, or empty.
+        Station and event as stated in the file, or empty.
     metadata : mapping of str to str
-        Other facts: format, file, location, what was kept, ...
+        Other facts: format, file, location, retained content, ...
     start : float or None
-        Instant of the first sample by the file's own clock, s; None where that is not known.
+        Instant of the first sample by the file's clock, s, or None if unknown.
+
+    See Also
+    --------
+    rocking.records.channels : return the channels of a file.
 
     Examples
     --------
@@ -176,12 +180,12 @@ class Channel:
         return f"{self.number} {self.name!r}"
 
     def motion(self) -> Motion:
-        """Return the channel as a motion, linear between samples, its time counted from the first sample.
+        """Return the channel as a motion, linear between samples, from time 0.
 
         Returns
         -------
         Motion
-            Its description has what the file says.
+            Motion whose description contains the metadata of the file.
 
         Raises
         ------
@@ -200,8 +204,8 @@ class Channel:
         return Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
 
 
-#: Numbers that files have where a value is missing: nines before and after the point, those of well logs and of SAC,
-#: the ends of 16 and 24 bits.
+#: Numbers that represent missing values: nines before and after the point, marks of well logs and SAC, limits of 16 and
+#: 24 bits.
 _MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(2, 9) for decimals in range(5)]
 _MARKS += [999.25, 12345.0, 32767.0, 32768.0, 8388607.0, 8388608.0]
 
@@ -218,7 +222,7 @@ def channel_of(
     row_at: Callable[[int], int] | None = None,
     **known: Any,
 ) -> Channel:
-    """Return the channel of numbers in a unit, which stand at the offset `at` of a file of that format."""
+    """Return the channel of numbers in a unit at the offset `at` of a file of that format."""
     if len(values) < 2:
         raise source.error(f"{len(values)} values are too few for a record; get the whole file", at)
     acceleration = unit.to_si(values)
@@ -233,7 +237,7 @@ def channel_of(
 
 
 def gap_at(values: Floats) -> int | None:
-    """Return the index of the first number that stands for a missing value, or None."""
+    """Return the index of the first number that represents a missing value, or None."""
     if np.isnan(values).any():
         return int(np.argmax(np.isnan(values)))
     sizes = np.abs(values)
@@ -248,6 +252,6 @@ def gap_at(values: Floats) -> int | None:
 
 
 def missing_value(source: Source, value: float, at: int | None) -> UnreadableRecord:
-    """Return the error for a number at the offset `at` that stands for a missing value."""
+    """Return the error for a missing value at the offset `at`."""
     text = f"{value:g} seems to stand for a missing value; get a record that has a value at every instant"
     return source.error(text, at)

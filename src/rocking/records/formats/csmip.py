@@ -1,9 +1,9 @@
-"""Formats of several channels a file: CSMIP V1 (uncorrected) and V2 (corrected), and COSMOS 1.20.
+"""Formats with several channels per file: CSMIP V1 (uncorrected) and V2 (corrected), and COSMOS 1.20.
 
-The files of CSMIP have text, integer and real headers for each channel, then a line with count, step or rate, units and
-columns. Older V1 files, and those of networks that took the format over, have no such line: pairs of time and
-acceleration follow at once, in columns 10F7.3 that touch, in seconds and g/10. In V2 velocity and displacement follow
-the acceleration. The files of COSMOS state the length and columns of each header.
+CSMIP files have text, integer and real headers for each channel, then a line with count, step or rate, units and
+columns. Older V1 files, and files of other networks, instead have pairs of time and acceleration, in touching columns
+10F7.3, in seconds and g/10. In V2, velocity and displacement follow the acceleration. COSMOS files state the length and
+columns of each header.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _v2(header: Header) -> Said:
         raise _without_count(header)
     step = number(stated[2])
     if len(header.lines) > _REAL_LINES:
-        # Real header 53, in columns 8F10, of those that end just before the line of the data: it has more decimals.
+        # Real header 53, in columns 8F10, of headers that end just before the data line: it has more decimals.
         finer = number(header.lines[5 - _REAL_LINES].text[40:50].strip())
         if abs(finer - step) <= 0.5 * 10.0 ** -len(stated[2].partition(".")[2]):
             step = finer
@@ -165,12 +165,12 @@ def _numbers_of(header: Header) -> Floats:
 
 
 def _step(header: Header, reals: Floats, points: int) -> float:
-    """Return the step (s) that fits the stated duration: real header 62 is in ms, 34, that of the raw data, in s."""
+    """Return the step (s) that fits the stated duration: real header 62 in ms, or 34 (raw data) in s."""
     data = header.lines[-1]
     steps = [float(step) for step in (*reals[61:62] / 1000.0, *reals[33:34]) if step > 0.0]
     stated = _DURATION.search(data.text)
     duration = int(stated[1]) if stated else 0
-    # The duration is printed in whole seconds, by some without the last interval.
+    # The duration is printed in whole seconds, in some files without the last interval.
     fitting = [step for step in steps if not duration or abs(points * step - duration) <= 1.0 + step]
     if not fitting:
         text = f"real headers 34 and 62 give no step at which {points} points last as stated"
@@ -178,7 +178,7 @@ def _step(header: Header, reals: Floats, points: int) -> float:
     return fitting[0]
 
 
-# The titles of GeoNet and of USC begin alike; their headers are others.
+# The titles of GeoNet and USC begin alike, but their headers differ.
 _TITLE: Final = r" accelerogram(?! \d{8}_\d{6}_|.*\bfile\s+\d)"
 _V1_TITLE, _V2_TITLE = (re.compile(rf"(?ia)^\s*{word}{_TITLE}") for word in ("uncorrected", "corrected"))
 V1: Final = Format("CSMIP V1", (_V1_TITLE,), _v1, several=True)

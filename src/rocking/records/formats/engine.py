@@ -1,8 +1,8 @@
-"""Numbers in bulk, and one reader of every format whose numbers follow a header.
+"""Conversion of numbers in bulk, and one reader for every format with a header.
 
-A format says how it is recognised and, in a function of a channel's header, what stands where: count, step, unit,
-labels, and how the numbers are laid out. The rest is the same for all: which channel comes next, whether the numbers
-are as many as stated and finite, whether step and unit agree with what is asked, and the channel itself.
+A format defines its recognition and, in a function of a channel's header, the location of count, step, unit, labels and
+layout of the numbers. All formats share the rest: search for the next channel, checks of the numbers and their count,
+agreement of step and unit with the request, and construction of the channel.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from rocking.records.formats.channel import Channel, Recognised, channel_of, mis
 from rocking.records.formats.source import Line, Request, Source
 from rocking.records.units import SECOND
 
-#: A number in a header, as a regular expression.
+#: Number in a header, as a regular expression.
 NUMBER: Final = r"[+-]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[EeDd][+-]?\d{1,4})?"
 
 #: Fortran writes double precision with a D.
 _FORTRAN: Final = bytes.maketrans(b"Dd", b"EE")
 _IS_OTHER: Final = bytes(0 if c in b"0123456789+-.eEdD \t\n\v" else 1 for c in range(256))
-#: Bytes at once: the numbers in them take some fifty times the memory while they are converted.
+#: Bytes per block: numbers need some fifty times as much memory during conversion.
 _CHUNK: Final = 2**18
 _SPACE: Final = re.compile(rb"\s")
 _LINE_END: Final = re.compile(rb"\n")
-#: No number is written with more characters.
+#: Largest number of characters of a number.
 _LONGEST: Final = 400
 _END_OF_DATA: Final = re.compile(r"(?i)^\s*(/&|-*\s*end[ -]of[ -]data)")
 _LAYOUT: Final = re.compile(r"(?ia)\(\s*(\d{1,3})\s*[EFGI]\s*(\d{1,3})(?:\.\d+)?\s*\)")
@@ -40,7 +40,7 @@ _NUMBER: Final = re.compile(rf"({NUMBER})\s*$")
 
 @dataclass
 class Header:
-    """The header of one channel, which a format takes line by line; `end` is where its numbers begin."""
+    """Header of one channel, read line by line by a format, with the numbers from `end`."""
 
     source: Source
     form: Format
@@ -49,7 +49,7 @@ class Header:
     lines: list[Line] = field(default_factory=list)
 
     def skip(self, count: int) -> list[Line]:
-        """Pass over so many lines."""
+        """Skip this many lines."""
         lines = self.source.lines(self.end, count)
         if len(lines) < count:
             last = lines[-1].start if lines else self.end
@@ -58,11 +58,11 @@ class Header:
         return lines
 
     def take(self, count: int) -> None:
-        """Take so many lines of text."""
+        """Read this many lines of text."""
         self.lines += self.skip(count)
 
     def expect(self, pattern: re.Pattern[str], what: str) -> re.Match[str]:
-        """Take the next line, which must match."""
+        """Read the next line, which must match."""
         self.take(1)
         found = pattern.search(self.lines[-1].text)
         if found is None:
@@ -70,7 +70,7 @@ class Header:
         return found
 
     def take_until(self, pattern: re.Pattern[str], most: int) -> re.Match[str] | None:
-        """Take the lines up to the first that matches, among so many and before the title of another channel."""
+        """Read the lines up to the first match, within a limit and the same channel."""
         for k, line in enumerate(self.source.lines(self.end, most)):
             if found := pattern.search(line.text):
                 self.take(k + 1)
@@ -80,17 +80,17 @@ class Header:
         return None
 
     def numbers(self, rows: int, layout: Layout | None, count: int) -> Floats:
-        """Take so many numbers in so many lines."""
+        """Read this many numbers in this many lines."""
         start = self.end
         self.skip(rows)
         return read_values(self.source, start, self.end, layout, Stated(count, start))
 
     def find(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
-        """Return what a pattern finds in the first of the lines in which it finds anything."""
+        """Return the first match of a pattern in the lines."""
         return next((found for line in self.lines if (found := pattern.search(line.text))), None)
 
     def text(self, pattern: re.Pattern[str]) -> str:
-        """Return the first group of what a pattern finds, or an empty text."""
+        """Return the first group of a match, or an empty text."""
         found = self.find(pattern)
         return found[1].strip() if found else ""
 
@@ -99,7 +99,7 @@ class Header:
         return next((line.start for line in self.lines if pattern.search(line.text)), self.end)
 
     def positive(self, key: re.Pattern[str], form: re.Pattern[str] = _NUMBER) -> list[float]:
-        """Return the numbers that stand, in this form, after a key; each must be positive."""
+        """Return the positive numbers that follow a key in this form."""
         found = form.match(self.text(key))
         numbers = [parse(group.encode("latin-1")) or 0.0 for group in found.groups()] if found else [0.0]
         if not all(number > 0.0 for number in numbers):
@@ -111,10 +111,11 @@ class Header:
 
 @dataclass(frozen=True)
 class Said:
-    """What a header says of a channel: its unit, its labels, and the numbers that follow.
+    """Contents of a channel's header: unit, labels, and layout of the numbers that follow.
 
-    They are pairs of time and value where there is no step (s). A number that means 'unknown' is refused. `scale` turns
-    an instrument's counts into the unit: a factor, and a divisor. `at` is the offset of the line that says all this.
+    Without a step (s) the numbers are pairs of time and value. A number that means 'unknown' is rejected. `scale`
+    converts the counts of an instrument to the unit: a factor and a divisor. `at` is the offset of the line with this
+    information.
     """
 
     at: int
@@ -131,10 +132,10 @@ class Said:
 
 
 class Format(NamedTuple):
-    """A format: its name, what its first lines have, and what reads a channel's header.
+    """Format: name, marks in its first lines, and reader of a channel's header.
 
-    Each of the marks is found in one of so many first lines; the first one also begins every channel of a file of
-    `several`. Data of other quantities, which begin with a line that has `other`, are passed over.
+    Each mark occurs in one of the first `within` lines. If the file may contain `several` channels, each begins with
+    the first mark. Data of other quantities, which begin with a line that matches `other`, are skipped.
     """
 
     name: str
@@ -155,7 +156,7 @@ class Format(NamedTuple):
         return Recognised(self.name, reason, functools.partial(self._read, source, lines[0].start))
 
     def begins(self, line: Line) -> bool:
-        """Whether a line begins a channel."""
+        """Return whether a line begins a channel."""
         return self.marks[0].search(line.text) is not None
 
     def _read(self, source: Source, start: int | None, request: Request) -> list[Channel]:
@@ -173,14 +174,14 @@ class Format(NamedTuple):
         return channels
 
     def _end(self, source: Source, start: int) -> int:
-        """Return where the numbers of a channel end: with the file, or where a line begins what follows them."""
+        """Return the end of a channel's numbers: the end of the file, or a line that begins other content."""
         end = numeric_end(source, start) if self.several else len(source.data)
         line = source.line(end)
         ends = _END_OF_DATA.match(line.text) or self.begins(line) or self.other.search(line.text)
-        return end if ends else line.next  # such a line is no end, but has a damaged number
+        return end if ends else line.next  # such a line is not an end, but contains a damaged number
 
     def _next(self, source: Source, end: int) -> int | None:
-        """Return where the next channel begins."""
+        """Return the offset of the next channel."""
         line = source.first_line(end)
         while line is not None and not self.begins(line):
             if not (_END_OF_DATA.match(line.text) or self.other.search(line.text)):
@@ -213,32 +214,32 @@ def _channel(header: Header, said: Said, end: int, request: Request) -> Channel:
 
 
 def stated_layout(text: str) -> Layout | None:
-    """Return the Fortran columns that a header such as "... Format: (8f9.6)" states, or None."""
+    """Return the Fortran columns stated by a header such as "... Format: (8f9.6)", or None."""
     found = _LAYOUT.search(text)
     layout = Layout(int(found[1]), int(found[2])) if found else None
     return layout if layout and all(layout) else None
 
 
 def direction(pattern: re.Pattern[str], name: str) -> float | None:
-    """Return the direction, degrees clockwise from north, with which a name begins as the pattern has it, or None."""
+    """Return the direction, degrees clockwise from north, at the start of a matching name, or None."""
     found = pattern.match(name)
     return float(found[1]) % 360.0 if found else None
 
 
 def number(text: str) -> float:
-    """Return the number that a text writes, or 0."""
+    """Return the number in a text, or 0."""
     return parse(text.encode("latin-1")) or 0.0
 
 
 def step_of(rate: float) -> float:
-    """Return the step, s, of so many samples per second; 0 of none."""
+    """Return the step, s, for this many samples per second, or 0 for 0."""
     return 1.0 / rate if rate else 0.0
 
 
 class Stated(NamedTuple):
-    """Number of values that a file states, the offset of the line that does, and how that is called.
+    """Number of values stated in a file, offset of its line, and name of its source.
 
-    So many more may follow that fill the last row, or that a length in whole seconds does not count.
+    Up to `more` additional values may fill the last row, or are not counted by a length in whole seconds.
     """
 
     values: float
@@ -247,7 +248,7 @@ class Stated(NamedTuple):
     more: float = 0.0
 
     def fits(self, count: int) -> bool:
-        """Whether so many values may follow."""
+        """Return whether this many values may follow."""
         return -0.5 < count - self.values < self.more + 0.5
 
 
@@ -258,14 +259,14 @@ class Layout(NamedTuple):
     width: int
 
     def fields(self, line: bytes) -> list[bytes]:
-        """Return the fields of a line; the line as it is where it does not fit."""
+        """Return the fields of a line, or the unchanged line if it does not fit."""
         if len(line) > self.per_line * self.width or b"\t" in line:
             return [line.strip()]
         return [line[i : i + self.width] for i in range(0, len(line), self.width)]
 
 
 def numeric_end(source: Source, start: int) -> int:
-    """Return the offset of the first line from `start` on that holds more than numbers, or the file's end."""
+    """Return the offset of the first line from `start` that is not numeric, or the file's end."""
     data = source.data
     for begin in range(start, len(data), _CHUNK):
         position = data[begin : begin + _CHUNK].translate(_IS_OTHER).find(1)
@@ -275,7 +276,7 @@ def numeric_end(source: Source, start: int) -> int:
 
 
 def read_values(source: Source, start: int, end: int, layout: Layout | None, stated: Stated) -> Floats:
-    """Return all numbers between the offsets `start` and `end`, which begin lines; as many as are stated."""
+    """Return all numbers between the offsets `start` and `end` of lines, as many as stated."""
     values, reached = _in_blocks(source, start, end, None)
     further = reached
     if layout is not None and not (reached == end and stated.fits(len(values))):
@@ -283,7 +284,7 @@ def read_values(source: Source, start: int, end: int, layout: Layout | None, sta
         if further == end and (reached < end or stated.fits(len(columns))):
             values, reached = columns, end
     if reached < end:
-        # The reading that got further is the one that the file was written for: its complaint helps.
+        # The reading that got further has the helpful error message.
         bad = _first_bad(source, reached, None), _first_bad(source, further, layout)
         raise not_a_number(source, *max(bad, key=lambda each: each[1]))
     if not stated.fits(len(values)):
@@ -294,7 +295,7 @@ def read_values(source: Source, start: int, end: int, layout: Layout | None, sta
 
 
 def not_a_number(source: Source, token: bytes, at: int) -> UnreadableRecord:
-    """Return the error for a piece of text that should be a finite number."""
+    """Return the error for text that should be a finite number."""
     shown, number = repr(token[:40].decode("latin-1")), parse(token)
     if b"," in token and parse(token.replace(b",", b".")) is not None:
         return source.error(f"{shown} is not a number; write decimal points in place of commas", at)
@@ -303,7 +304,7 @@ def not_a_number(source: Source, token: bytes, at: int) -> UnreadableRecord:
 
 
 def parse(token: bytes) -> float | None:
-    """Return the number that `token` writes (D exponents too; perhaps not finite), or None."""
+    """Return the number written by `token` (also with D exponent, possibly not finite), or None."""
     if len(token) > _LONGEST or b"_" in token:
         return None
     try:
@@ -313,7 +314,7 @@ def parse(token: bytes) -> float | None:
 
 
 def convert(tokens: list[bytes]) -> Floats | None:
-    """Return the numbers that the tokens write (D exponents too), or None if one is not a finite number."""
+    """Return the numbers written by the tokens (also with D exponents), or None unless all are finite."""
     if not tokens:
         return np.empty(0)
     joined = b"\n".join(tokens)
@@ -329,7 +330,7 @@ def convert(tokens: list[bytes]) -> Floats | None:
 
 
 def _in_blocks(source: Source, start: int, end: int, layout: Layout | None) -> tuple[Floats, int]:
-    """Numbers of the blocks that hold nothing else, up to the first other one, and where that begins; or the end."""
+    """Return the numbers of purely numeric blocks, and the offset of their end."""
     parts = [np.empty(0)]
     while start < end:
         found = (_LINE_END if layout else _SPACE).search(source.data, min(start + _CHUNK, end) - 1, end)
@@ -343,14 +344,14 @@ def _in_blocks(source: Source, start: int, end: int, layout: Layout | None) -> t
 
 
 def _tokens(text: bytes, layout: Layout | None) -> list[bytes]:
-    """Pieces between blanks; or columns, of which the last of a line may be missing."""
+    """Split at blanks, or into columns, of which the last in a line may be missing."""
     if layout is None:
         return text.split()
     return [field for line in text.split(b"\n") for field in layout.fields(line.rstrip())]
 
 
 def _first_bad(source: Source, at: int, layout: Layout | None) -> tuple[bytes, int]:
-    """Find the first piece of text from `at` on that is not a finite number, and where its line starts."""
+    """Find the first piece of text from `at` that is not a finite number, and the start of its line."""
     for line in source.data[at : at + 2 * _CHUNK].split(b"\n"):
         for token in _tokens(line, layout):
             if convert([token]) is None:

@@ -1,4 +1,4 @@
-"""Formats of one component a file: PEER AT2, USGS SMC, K-NET and KiK-net, ESM and ITACA."""
+"""Formats with one component per file: PEER AT2, USGS SMC, K-NET and KiK-net, ESM and ITACA."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from rocking.records.formats.engine import NUMBER, Format, Header, Layout, Said,
 
 _DEGREES: Final = re.compile(r"(?a)(\d{1,3})$")
 
-# PEER AT2: NPTS and DT stand in the last line of the header in several shapes, ``NPTS=  5372, DT= .0100 SEC,`` (NGA) or
-# ``4096    0.0100    NPTS, DT`` (the older database). VT2 and DT2 files look alike but hold velocities, displacements.
+# PEER AT2: NPTS and DT are in the last line of the header in several forms, ``NPTS=  5372, DT= .0100 SEC,`` (NGA) or
+# ``4096    0.0100    NPTS, DT`` (the older database). VT2 and DT2 files look alike but contain velocities and
+# displacements.
 
 _SIZES: Final = re.compile(
     rf"(?i)NPTS\s*[=:]?\s*(\d{{1,12}})\b.*?\bDT\s*[=:]?\s*({NUMBER})"
@@ -20,7 +21,7 @@ _SIZES: Final = re.compile(
 )
 _AT2_UNITS: Final = re.compile(r"(?i)UNITS\s+OF\s+([A-Z0-9/^*]+)")
 _AT2_OTHER: Final = re.compile(r"(?i)\b(VELOCITY|DISPLACEMENT)\s+TIME\b")
-#: Who owns the station, and its number there, at the end of a title.
+#: Owner and number of the station at the end of a title.
 _OWNER: Final = re.compile(r"(.*?)[\s,]*\(([^()]*)\)")
 
 
@@ -51,7 +52,7 @@ def _at2(header: Header) -> Said:
 
 
 # USGS SMC: 11 text lines, 48 integers, 50 reals, comments. Integer 16 counts the comment lines, integer 17 the values,
-# after which a last row may be padded; real 2 is the rate. A digitised film has no rate: its values are pairs.
+# after which the last row may be padded. Real 2 is the rate. Digitised films have no rate and pairs of values.
 
 _SMC_TITLE: Final = re.compile(
     r"(?i)^\s*([0-6])\s+(unknown|(?:un)?corrected accelerogram|velocity|displacement|response|fourier)"
@@ -90,8 +91,8 @@ def _smc(header: Header) -> Said:
     )
 
 
-# K-NET and KiK-net: 17 lines, then counts that the scale factor turns into gal. The counts hold the instrument's
-# constant offset (some gal), which is kept. "Record Time" is 15 s later than the first sample.
+# K-NET and KiK-net: 17 lines, then counts that the scale factor converts to gal. The instrument's constant offset (some
+# gal) is kept. "Record Time" is 15 s later than the first sample.
 
 _KNET_KEYS: Final = (
     "Origin Time", "Lat.", "Lon", "Depth", "Mag.", "Station Code", "Station Lat", "Station Lon", "Station Height",
@@ -115,7 +116,7 @@ def _knet(header: Header) -> Said:
         header.at(_KNET["Scale Factor"]),
         "gal",
         1.0 / rate,
-        # The duration is in whole seconds: fewer samples are missing, and a second's more are too many.
+        # The duration is in whole seconds. Fewer samples, or a surplus of a second, are errors.
         Stated(seconds * rate, header.at(_KNET["Duration Time"]), "the duration", more=rate - 1.0),
         {
             "name": name,
@@ -128,7 +129,7 @@ def _knet(header: Header) -> Said:
     )
 
 
-# ESM and ITACA: "KEY: value" lines, then one value to a line.
+# ESM and ITACA: "KEY: value" lines, then one value per line.
 
 _ESM_LINE: Final = re.compile(r"^([A-Z][A-Z0-9_/^]*)\s*:\s*(.*)$")
 _ESM_KEYS: Final = ("DATA_TYPE", "SAMPLING_INTERVAL_S", "NDATA", "UNITS")

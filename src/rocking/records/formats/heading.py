@@ -1,7 +1,7 @@
-"""Headings of text tables: which column holds times, which ones are channels, and the unit of each.
+"""Headings of text tables: columns of times, channels, and the unit of each.
 
-A unit stands in brackets, "a (cm/s2)", or ends a name: "a_g", "t/ms", "Time in ms", "Time, s"; or there is a line of
-units below the names or above them.
+A unit is in brackets, "a (cm/s2)", ends a name ("a_g", "t/ms", "Time in ms", "Time, s"), or is in a line of units below
+or above the names.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from typing import Final, Literal, NamedTuple
 from rocking.records.formats.source import Source
 from rocking.records.units import SECOND, Unit, find_time_unit, find_unit
 
-#: What a column holds: times, numbers of rows, periods or ordinates of a spectrum, or values of a channel.
+#: Kind of a column: times, row numbers, periods or ordinates of a spectrum, or values of a channel.
 Kind = Literal["time", "count", "spectrum", "channel"]
 
-#: What is in brackets, unless a value follows, as in "PGA (g) = 0.3".
+#: Text in brackets, unless a value follows, as in "PGA (g) = 0.3".
 _BRACKETS: Final = re.compile(r"[(\[{<]\s*([^()\[\]{}<>]{1,40}?)\s*[)\]}>](?!\s*[=:]\s*[+-]?[\d.])")
-#: What stands before the unit of a value, as in "PGA = 8.2 m/s2".
+#: Text before the unit of a value, as in "PGA = 8.2 m/s2".
 _VALUE: Final = re.compile(r"[=:]\s*[+-]?[\d.,]+(?:[eE][+-]?\d+)?$")
 _UP_TO_BRACKET: Final = re.compile(r"[^()\[\]]*[(\[][^()\[\]]*[)\]]")
 _WORD_WITH_BRACKETS: Final = re.compile(r'"[^"]*"|(?:[^\s()\[\]]+\s*)?[(\[][^()\[\]]*[)\]]|[^\s()\[\]]+')
 _WORD: Final = re.compile(r"[^\W\d_]+")
-#: What follows the name of an acceleration, in running text.
+#: Text after the name of an acceleration, in running text.
 _SUFFIX: Final = re.compile(r"(?i)(?:(?<![^\W_])a|(?:acc|acel|beschl)[^\W_]*)_(?=([A-Za-z]\w{0,12})\b)")
 _BREAK: Final = re.compile(r"[\s_/,;:.-]+(?:in\s+)?")
-#: A line that holds nothing: it divides, or has delimiters only.
+#: Line without content: a rule, or delimiters only.
 RULE: Final = re.compile(r"[-=_~+|\s]{3,}|#+|[,;\s]*")
-#: What may be a unit; the number in "channel (3)" is none.
+#: Possible unit, unlike the number in "channel (3)".
 _UNIT_LIKE: Final = re.compile(r".*(?:[^\W\d_]|[%°])")
 
 _TIMES: Final = {"t", "time", "times", "timestamp", "zeit", "temps", "tiempo", "tempo", "tid", "tijd"}
@@ -38,14 +38,14 @@ _COUNTS: Final = {"index", "idx", "i", "no", "nr", "num", "number", "sample", "s
     ("row", "rows", "step", "time", "scan", "count", "id", "record")
 )
 _SPECTRA: Final = {"period", "periods", "frequency", "frequencies", "freq", "sa", "psa"}
-#: What names the ordinates of a response spectrum, unless it is that of an accelerogram which was fitted to one.
+#: Names of the ordinates of a response spectrum, except for an accelerogram fitted to a spectrum.
 _SPECTRAL: Final = re.compile(r"(?i)(?!.*(?:match|[ck]ompat|consist|accelerogr)).*(?:spe[ckt]tr|pseudo|rotd\d|gmrot)")
 _PERIOD: Final = re.compile(r"(?i)p[eé]r[ií]od|periyot")
 _ACCELERATION: Final = re.compile(r"(?i)\b(a|acc\w*|acel\w*|beschl\w*)(?![a-z])")
 
 
 class Column(NamedTuple):
-    """What a heading says of a column; `strange` stands where its unit should, and is none that is known."""
+    """Column according to a heading, with the text of an unknown unit (`strange`)."""
 
     kind: Kind
     name: str
@@ -54,7 +54,7 @@ class Column(NamedTuple):
 
 
 class Heading(NamedTuple):
-    """What a heading says of each column, whether it names them and where (the offset of that line)."""
+    """Heading: its columns, whether it names them, and the offset of its line."""
 
     columns: tuple[Column, ...]
     named: bool
@@ -63,12 +63,12 @@ class Heading(NamedTuple):
     doubtful: bool
 
     def places(self, kind: Kind) -> list[int]:
-        """Return the places of the columns of one kind."""
+        """Return the indices of the columns of one kind."""
         return [place for place, column in enumerate(self.columns) if column.kind == kind]
 
 
 def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
-    """Return what the lines before the offset `end` say of the `count` columns that begin there."""
+    """Interpret the lines before the offset `end` as the heading of the `count` columns that begin there."""
     at = max(0, end - 10_000)
     lines: list[tuple[str, int]] = []
     for line in source.data[at:end].split(b"\n"):
@@ -90,7 +90,7 @@ def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
     cells = list(zip(names, above, strict=True)) if above else [(name,) for name in names]
     kinds = [_kind(each) for each in cells] if count > 1 else [_kind_of_only(cells[0])]
     labels = [_label(cells[place]) for place, kind in enumerate(kinds) if kind == "time"]
-    # "T" is the name of periods as well.
+    # "T" also denotes periods.
     surely = any(_TIMES - {"t"} & _words(each) or "T" not in _WORD.findall(each) for each in labels)
     first_time = kinds.index("time") if labels else 0
     kinds = ["channel" if kind == "count" and place > first_time else kind for place, kind in enumerate(kinds)]
@@ -105,7 +105,7 @@ def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
 
 
 def _kind(cell: tuple[str, ...]) -> Kind:
-    """Return the kind of a column from what is written above it, the nearest line first."""
+    """Return the kind of a column from the text above it, the nearest line first."""
     name = _without_brackets(_label(cell))
     words = _words(name)
     if (words and words <= _SPECTRA) or _SPECTRAL.match(name):
@@ -118,13 +118,13 @@ def _kind(cell: tuple[str, ...]) -> Kind:
     if counts and not any(map(_time_of, cell)):
         return "count"
     alone = find_time_unit(_bare(cell[0]))
-    # "min", "h" and "d" are units of time in brackets only, and "ns" is north and south.
+    # "min", "h" and "d" are units of time in brackets only, and "ns" means north and south.
     unit = _time_of(cell[0]) and alone and (alone.multiplier == 1.0 or cell[0] != _bare(cell[0]))
     return "time" if words & _TIMES or unit else "channel"
 
 
 def _kind_of_only(cell: tuple[str, ...]) -> Kind:
-    """Return the kind of a single column, above which a title may stand: times only if it says nothing else."""
+    """Return the kind of a single column, possibly below a title: times only if nothing else is named."""
     name = _label(cell)
     words = {word for word in _words(name) if not (find_unit(word) or find_time_unit(word))} - {"in"}
     unclear = words == {"t"} and not any(map(_time_of, cell))
@@ -133,7 +133,7 @@ def _kind_of_only(cell: tuple[str, ...]) -> Kind:
 
 
 def _label(cell: tuple[str, ...]) -> str:
-    """Return a column's name, which may stand above a line of units."""
+    """Return the name of a column, which may be above a line of units."""
     bare = _bare(cell[0])
     return cell[-1] if find_unit(bare) or find_time_unit(bare) or not _WORD.search(cell[0]) else cell[0]
 
@@ -143,12 +143,12 @@ def _words(name: str) -> set[str]:
 
 
 def _time_of(line: str) -> Unit | None:
-    """Return the unit of time in a name; that of "ns" alone is north and south."""
+    """Return the unit of time in a name, except in "ns" (north and south)."""
     return None if line.lower() == "ns" else next(filter(None, map(find_time_unit, _texts(line))), None)
 
 
 def _time_unit(cell: tuple[str, ...], rest: str) -> tuple[Unit | None, str]:
-    """Return the unit of a column of times: where nothing says it, seconds, unless the rest has another in brackets."""
+    """Return the unit of a column of times, seconds unless other text has a unit in brackets."""
     unit = next(filter(None, map(_time_of, cell)), None)
     strange = "" if unit else _strange(cell[0])
     if unit or strange:
@@ -169,7 +169,7 @@ def _acceleration_unit(cell: tuple[str, ...], rest: str) -> tuple[Unit | None, s
 
 
 def _cells(line: str, count: int, delimiter: str) -> tuple[str, ...]:
-    """Return the names in a line of so many columns, or none where it cannot be split so."""
+    """Return the names in a line with this many columns, or none."""
     if count == 1:
         return (line.strip(),)
     for split, sure in _ways(delimiter):
@@ -182,7 +182,7 @@ def _cells(line: str, count: int, delimiter: str) -> tuple[str, ...]:
 
 
 def _ways(delimiter: str) -> Iterator[tuple[Callable[[str], list[str]], bool]]:
-    """Yield ways to split a line of names, those that fit the rows below it first, and whether each is sure."""
+    """Yield ways to split a line of names, and whether each is certain. Ways that fit the rows below come first."""
     for sign in ["\t", ";", ","] if delimiter == " " else [delimiter, ";", ",", "\t"]:
         yield functools.partial(_divided, sign), True
     yield lambda line: re.split(r"\t+|\s{2,}", line.strip()), True
@@ -196,12 +196,12 @@ def _divided(sign: str, line: str) -> list[str]:
 
 
 def _texts(name: str) -> list[str]:
-    """Return what may be the unit in a name: what is in brackets, or how it ends."""
+    """Return possible units in a name: text in brackets, and ends of the name."""
     return [*_BRACKETS.findall(name), *_ends(name)]
 
 
 def _ends(name: str) -> Iterator[str]:
-    """Yield the ends of a name that may be its unit, the longest first; "g" alone only of what is an acceleration."""
+    """Yield ends of a name that may be its unit, the longest first ("g" alone only after an acceleration)."""
     yield _bare(name)
     text = _without_brackets(name).rstrip("_. ")
     for found in _BREAK.finditer(text):
@@ -222,18 +222,18 @@ def _without_brackets(name: str) -> str:
 
 
 def _strange(name: str) -> str:
-    """Return what a name has in brackets that may be a unit, or an empty text."""
+    """Return text in the brackets of a name that may be a unit, or an empty text."""
     return ", ".join(text for text in _BRACKETS.findall(name) if _UNIT_LIKE.match(text))
 
 
 def _acceleration_unit_in(text: str) -> Unit | None:
-    """Return the one unit of acceleration that a text names in brackets or after an underscore, or None."""
+    """Return the only unit of acceleration in brackets or after an underscore in a text, or None."""
     units = {unit for each in [*_BRACKETS.findall(text), *_SUFFIX.findall(text)] if (unit := find_unit(each))}
     return units.pop() if len(units) == 1 else None
 
 
 def _uncommented(line: bytes) -> str:
-    """Return the text of a line without the sign of a comment."""
+    """Return the text of a line without its comment sign."""
     try:
         text = line.decode("utf-8").strip(" ")
     except UnicodeDecodeError:

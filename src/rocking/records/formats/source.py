@@ -1,6 +1,6 @@
-"""A record file in memory, and what the caller says about it: step and units.
+"""Record file in memory, and the caller's arguments: step, units and channel.
 
-The text of a file has line ends made uniform; errors name one of its lines.
+Line ends in the text of a file are made uniform, and errors refer to one of its lines.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from rocking.errors import InvalidMotion, UnreadableRecord, literal
 from rocking.records import catalogue
 from rocking.records.units import CHOICES, Unit, choose_unit, find_unit
 
-#: Largest file that is read, bytes; the longest strong-motion records are a hundred times smaller.
+#: Largest accepted file, bytes, a hundred times the longest strong-motion records.
 SIZE_LIMIT = 512 * 2**20
 
-#: Header lines are decoded up to this length, so that a file without line ends costs no more than any other.
+#: Decoded length of header lines, which limits the cost of files without line ends.
 LINE_LIMIT = 512
 
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n")
@@ -29,7 +29,7 @@ _VISIBLE = re.compile(rb"\S")
 
 
 class Line(NamedTuple):
-    """One line: its text (cut at LINE_LIMIT), its offset in the file and that of the next line."""
+    """Line: text (cut at LINE_LIMIT), its offset in the file, and the offset of the next line."""
 
     text: str
     start: int
@@ -38,16 +38,16 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True)
 class Source:
-    """A file's content.
+    """Content of a file.
 
     Attributes
     ----------
     path : str
-        The file's name as the user gave it.
+        File name as specified by the user.
     raw : bytes
-        The bytes as they are on disk, for binary formats.
+        Bytes as on disk, for binary formats.
     data : bytes
-        The text: byte-order marks, form feeds and end-of-text bytes removed, lines ended by newlines.
+        Text without byte-order marks, form feeds and end-of-text bytes, with lines ended by newlines.
     """
 
     path: str
@@ -62,7 +62,7 @@ class Source:
         return Line(text.rstrip(), start, min(end + 1, len(self.data)))
 
     def lines(self, start: int, count: int) -> list[Line]:
-        """Return up to `count` lines from the offset `start` on."""
+        """Return up to `count` lines from the offset `start`."""
         found: list[Line] = []
         while len(found) < count and start < len(self.data):
             found.append(self.line(start))
@@ -70,32 +70,32 @@ class Source:
         return found
 
     def first_line(self, start: int = 0) -> Line | None:
-        """Return the first line from `start` on that is not blank, or None."""
+        """Return the first line from `start` that is not blank, or None."""
         found = _VISIBLE.search(self.data, start)
         return None if found is None else self.line(self.data.rfind(b"\n", 0, found.start()) + 1)
 
     def first_lines(self, count: int) -> list[Line]:
-        """Return up to `count` lines from the first one on that is not blank."""
+        """Return up to `count` lines from the first nonblank one."""
         first = self.first_line()
         return [] if first is None else self.lines(first.start, count)
 
     def line_number(self, at: int) -> int:
-        """Return the number (from 1) of the line that holds the offset `at`."""
+        """Return the number (from 1) of the line that contains the offset `at`."""
         return self.data.count(b"\n", 0, at) + 1
 
     @cached_property
     def is_binary(self) -> bool:
-        """Whether one byte in a hundred is such as no text file contains; a stray one is none."""
+        """Whether at least one byte in a hundred cannot occur in a text file."""
         return len(self.data.translate(None, _CONTROL)) < 0.99 * len(self.data)
 
     def error(self, message: str, at: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
-        """Return the error that says `message` about this file, at the line that holds the offset `at`."""
+        """Return an error with this message about the file's line at the offset `at`."""
         line = None if at is None else self.line_number(at)
         return UnreadableRecord(message, *arguments, path=self.path, line=line, value=value)
 
 
 def unreadable(name: str, error: Exception) -> UnreadableRecord:
-    """Return why a file could not be opened, with the shipped record that may be meant."""
+    """Return an error for a file that could not be opened, with any similar shipped record."""
     text = f"this file could not be read ({getattr(error, 'strerror', None) or error}); check the name and the disk"
     if isinstance(error, FileNotFoundError):
         shipped = {each: f"the shipped record {each}" for each in catalogue.names()}
@@ -104,9 +104,9 @@ def unreadable(name: str, error: Exception) -> UnreadableRecord:
 
 
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
-    """Read a file whole, or what is left of one that is open."""
+    """Read a whole file, or the rest of an open one."""
     read = getattr(path, "read", None)
-    if read is not None:  # Python's own streams have no name but "<stdin>" or a number
+    if read is not None:  # Python's standard streams are named "<stdin>" or by a number
         name = str(getattr(path, "name", "<"))
         name = "standard input" if name.startswith("<") or name.isdecimal() else name
     elif not isinstance(path, (str, bytes, os.PathLike)):
@@ -132,7 +132,7 @@ def _content(name: str) -> bytes:
         text = "this is a folder" if stat.S_ISDIR(status.st_mode) else "this is not a regular file"
         raise UnreadableRecord(f"{text}; name one record file", path=name)
     with open(name, "rb") as file:  # noqa: PTH123
-        # A read sets aside as much memory as it is asked for.
+        # A read allocates as much memory as requested.
         return file.read(min(status.st_size, SIZE_LIMIT) + 1)
 
 
@@ -141,18 +141,17 @@ def _text(raw: bytes) -> bytes:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", "replace").encode("latin-1", "replace")
     data = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    # At the start of a line a form feed is the printer's page break and takes no column.
+    # A form feed at the start of a line is a page break and does not occupy a column.
     data = data.removeprefix(b"\f").replace(b"\n\f", b"\n").replace(b"\f", b" ")
     return data.rstrip(b"\x00\x1a")
 
 
 @dataclass(frozen=True)
 class Request:
-    """The arguments `dt` (s), `units` and `channel` of a read; None where the file should know.
+    """Arguments `dt` (s), `units` and `channel` of a read, or None if the file should state them.
 
-    ``most`` is how many samples may be unpacked from a file that is compressed; None is any number. Where arguments are
-    given for several files at once they are for those that do not say, or hold several channels; for one
-    alone they must not contradict it.
+    ``most`` limits the number of samples unpacked from a compressed file, unless None. For several files, the arguments
+    apply to files that do not state the values or contain several channels. They must not contradict a single file.
     """
 
     dt: float | None = None
@@ -170,13 +169,13 @@ class Request:
         *,
         several: bool = False,
     ) -> Request:
-        """Return the request."""
+        """Create a request from checked arguments."""
         step = None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s")
         return cls(step, None if units is None else choose_unit(units), channel, several)
 
     def step(self, source: Source, stated: float, at: int | None) -> float:
-        """Return the step (s) that the file states at the offset `at`."""
-        # No file holds more samples than bytes, so this also bounds the record's length.
+        """Return the checked step (s) that the file states at the offset `at`."""
+        # Files contain no more samples than bytes, so this also bounds the record's duration.
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):
@@ -185,7 +184,7 @@ class Request:
         return stated
 
     def units(self, source: Source, stated: Unit | str | None, at: int | None) -> Unit:
-        """Return the unit that the file states at the offset `at`, in its own spelling, or else the one asked for."""
+        """Return the unit that the file states at the offset `at`, or else the requested one."""
         spelling = stated.strip() if isinstance(stated, str) else ""
         unit = find_unit(spelling) if isinstance(stated, str) else stated
         unit = unit or (None if spelling and self.several else self.unit)

@@ -1,10 +1,10 @@
-"""Plain text and CSV: one column of accelerations with dt=, times and accelerations, or as many as a heading names.
+"""Plain text and CSV: accelerations with dt=, times and accelerations, or the columns named by a heading.
 
-Columns and their units are what the heading says (`heading`), or units=; times are in seconds where it says nothing.
-Heading lines and comments (#, %, !, //) are passed over, but no line that looks like a damaged row. The delimiter is a
-semicolon (a comma is then the decimal sign), a comma, or blanks; between blanks a comma within a number is the decimal
-sign. Numbers may be quoted, and exponents Fortran's (1.0D-3). Rows such as "1,5" in a file without any point, and
-without two names above them, may be one number or two: they are refused.
+Columns and units come from the heading (`heading`) or units=. Times are in seconds by default. Heading lines and
+comments (#, %, !, //) are skipped, except lines that look like a damaged row. The delimiter is a semicolon (a comma is
+then the decimal sign), a comma, or blanks. Between blanks a comma within a number is the decimal sign. Numbers may be
+quoted and may have Fortran exponents (1.0D-3). Rows such as "1,5" in a file without any point, and without two names
+above, are ambiguous and rejected.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from rocking.records.formats.source import Line, Request, Source
 
 _DELIMITERS: Final = {",": "a comma", ";": "a semicolon", " ": "a blank"}
 
-#: Headings are no longer.
+#: Largest number of heading lines.
 HEADING_LINES: Final = 1000
-#: No row of numbers is longer; what is, is refused before it is split.
+#: Longest row of numbers. Longer lines are rejected before splitting.
 _ROW_LIMIT: Final = 1024
-#: What follows a longer piece on its line may not be seen.
+#: Text after a longer piece on its line may not be seen.
 _LONG: Final = 300
 
-#: What spreadsheets write after a # where they have no number.
+#: Error values of spreadsheets after a #.
 _ERRORS: Final = r"(?:(?:n/?a|nv)(?!\w)|div/0!|value!|ref!|num!|name\?|null!|wert!|zahl!)"
 _COMMENT: Final = re.compile(rf"[ \t]*(?:%|!|//|#(?!{_ERRORS}|#+[ \t]*(?:[,;\t]|$)))".encode(), re.IGNORECASE)
-#: What begins like a number, or stands where one is missing.
+#: Text that begins like a number, or stands for a missing number.
 _LIKE_NUMBER: Final = re.compile(
     rf"(?i)[<>~]?[+-]*[ool]?[.,]?\d.*|[*?-]+|##+|#{_ERRORS}|n/?a|nil|null|none|missing|bad|error|overflow|void"
 )
 _WITHOUT_POINT: Final = re.compile(r"[+-]?\d+(?:,\d+)?(?:[EeDd][+-]?\d+)?")
 _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+(?:[EeDd][+-]?\d+)?")
 
-#: What a unit of another quantity has.
+#: Pattern of a unit of another quantity.
 _OF_OTHER_QUANTITY: Final = re.compile(r"(?i).*[/%].*|m|cm|mm|in|ft|m?v|counts?|rad|deg")
 #: Step or rate in a heading.
 _STATES_STEP: Final = re.compile(
@@ -58,7 +58,7 @@ OTHER_TITLE: Final = "TIMESERIES "
 
 
 class _Table(NamedTuple):
-    """How the rows are written, where the first one starts, the damaged row before it, and the heading."""
+    """Format of the rows, start of the first one, damaged row before it, and heading."""
 
     source: Source
     translation: bytes
@@ -70,8 +70,8 @@ class _Table(NamedTuple):
 
     @property
     def ambiguous(self) -> bool:
-        """Whether the commas may be decimal signs as well as delimiters: rows such as "1,5" and no point anywhere."""
-        # A comma that blanks follow is no decimal sign, and one at the end of a row neither.
+        """Whether commas may be decimal signs or delimiters, as in rows such as "1,5" without any point."""
+        # A comma before blanks or at the end of a row is not a decimal sign.
         return (
             self.delimiter == ","
             and self.columns <= 2
@@ -93,7 +93,7 @@ class _Table(NamedTuple):
         heading, dt = self.heading, request.dt
         assumed = heading.assumed and heading.named and heading.columns[0].kind == "time"
         if assumed and dt is not None and first_fault(numbers[:, 0]) is not None:
-            # The first column does not hold times, as was assumed.
+            # The first column does not contain times as assumed.
             first = heading.columns[0]._replace(kind="channel", unit=None)
             heading = heading._replace(columns=(first, *heading.columns[1:]))
         return self._replace(heading=heading)._channels(request, numbers)
@@ -120,7 +120,7 @@ class _Table(NamedTuple):
         return channels
 
     def _timing(self, request: Request, numbers: Floats, place: int) -> dict[str, Any]:
-        """Return step or times, and start (s), from the nearest column of times before a channel, or else the first."""
+        """Return step or times, and start (s), from the nearest column of times before a channel, else the first."""
         times = self.heading.places("time")
         if not times:
             return {"dt": request.dt}
@@ -133,7 +133,7 @@ class _Table(NamedTuple):
         return {"dt": dt, "times": instants, "start": float(unit.to_si(numbers[:1, column])[0])}
 
     def _check_step(self, dt: float | None) -> None:
-        """Refuse a table without times if no step is given, or another one than its heading states."""
+        """Raise an error for a table without times if the step is missing or differs from its heading."""
         said = "the file does not say its sampling step"
         for line in itertools.takewhile(lambda line: line.start < self.start, self.source.lines(0, HEADING_LINES)):
             match = _STATES_STEP.search(line.text)
@@ -147,7 +147,7 @@ class _Table(NamedTuple):
             raise self.source.error(f"{said}; give {{}} in seconds", self.start, "dt")
 
     def _held(self) -> list[int]:
-        """Return the places of the accelerations: with a unit of acceleration if any has one, else without any unit."""
+        """Return the columns of accelerations: with a unit of acceleration if any has one, else without any unit."""
         columns, channels = self.heading.columns, self.heading.places("channel")
         if not channels or (self.heading.places("spectrum") and not self.heading.places("time")):
             others = ", ".join(repr(column.name) for column in columns)
@@ -191,14 +191,14 @@ class _Table(NamedTuple):
 
 
 def _is_step(number: str, dt: float) -> bool:
-    """Whether a printed number may be a step (s): in s or ms, or as a rate, rounded as it is printed."""
+    """Return whether a printed number may be a step (s): in s or ms, or as a rate, rounded as printed."""
     printed = Decimal(number.upper().replace("D", "E"))
     rounded = min(float(f"0.5e{printed.as_tuple().exponent}"), 0.03 * abs(float(printed)))
     return any(abs(each - float(printed)) <= rounded for each in (dt, 1e3 * dt, 1.0 / dt))
 
 
 def recognise(source: Source) -> Recognised | None:
-    """Return the format if rows of one or two numbers begin after comments and headings, or of more that are named."""
+    """Recognise rows of one or two numbers after comments and headings, or of more numbers with named columns."""
     table = _table(source)
     if table is None or (table.columns > 2 and not table.heading.named):
         return None
@@ -209,7 +209,7 @@ def recognise(source: Source) -> Recognised | None:
 
 
 def refusal(source: Source) -> UnreadableRecord | None:
-    """Return why what looks like a table is not read as one, or None if it does not look so."""
+    """Return the reason why an apparent table cannot be read, or None for other content."""
     table = _table(source)
     if table is None:
         return None
@@ -218,7 +218,7 @@ def refusal(source: Source) -> UnreadableRecord | None:
 
 
 def _table(source: Source) -> _Table | None:
-    """Return how the rows are written that begin at the first line of numbers alone; None where there is none."""
+    """Return the table that begins at the first purely numeric line, or None."""
     lines = [] if source.is_binary else source.lines(0, HEADING_LINES)
     for k, line in enumerate(lines):
         if line.text.startswith(OTHER_TITLE):
@@ -228,10 +228,10 @@ def _table(source: Source) -> _Table | None:
         if tokens and not _is_comment(line) and all(parse(token) is not None for token in tokens):
             following = _filled(source.lines(line.next, 64))
             if delimiter == " " and len(tokens) > 1:
-                # Between blanks commas may be decimal signs, in rows below the first one that has any.
+                # Between blanks commas may be decimal signs, in rows below the first one with a comma.
                 ways = (_delimiter(each) for each in following if "," in each.text)
                 translation = next((way for way, sign in ways if sign == " "), translation)
-            # The second row tells how many columns there are: the first one may be damaged.
+            # The first row may be damaged, so the second one determines the number of columns.
             columns = len(_tokens(following[0] if following else line, translation))
             heading = heading_of(source, line.start, columns, delimiter)
             damaged = None
@@ -249,7 +249,7 @@ def _is_comment(line: Line) -> bool:
 
 
 def _filled(lines: Sequence[Line]) -> list[Line]:
-    """Return the lines that hold more than a comment."""
+    """Return the lines that contain more than a comment."""
     return [line for line in lines if not _is_comment(line) and not RULE.fullmatch(line.text)]
 
 
@@ -258,10 +258,10 @@ def _tokens(line: Line, translation: bytes) -> list[bytes]:
 
 
 def _damaged(text: str, tokens: list[bytes], columns: int, *, named: bool) -> bytes:
-    """Return the first piece that is no number if a line above the rows looks like one of them; else nothing.
+    """Return the first non-numeric piece of a line if it looks like a damaged row, else empty bytes.
 
-    It does if all pieces look like numbers; or if they are as many as columns, with a number among them, below names or
-    where more than blanks divide it and the first one is a number, or one has a point.
+    In a row all pieces look like numbers, or there are as many as columns with a number among them, below names or with
+    delimiters other than blanks and a number that is first or has a point.
     """
     strange = [token for token in tokens if parse(token) is None]
     numbers = [token for token in tokens if parse(token) is not None]
@@ -274,7 +274,7 @@ def _damaged(text: str, tokens: list[bytes], columns: int, *, named: bool) -> by
 
 
 def _delimiter(line: Line) -> tuple[bytes, str]:
-    """Return what turns a row into numbers with points between blanks, and the delimiter."""
+    """Return the translation of a row into numbers with points between blanks, and the delimiter."""
     if ";" in line.text:
         return bytes.maketrans(b',;"', b".  "), ";"
     words = line.text.replace('"', " ").split()

@@ -1,4 +1,4 @@
-"""Every other format: MiniSEED, SAC, GSE2 and the rest that ObsPy reads, if it is installed."""
+"""Other formats: MiniSEED, SAC, GSE2 and the rest that ObsPy reads, if ObsPy is installed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rocking.records.formats.channel import Channel, Recognised, channel_of
 from rocking.records.formats.source import Request, Source
 from rocking.records.units import Unit
 
-#: PICKLE runs what a file tells it to; the other two open further files that a file names.
+#: PICKLE executes code from a file. The other two open files named in a file.
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
 _TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
@@ -32,7 +32,7 @@ def installed() -> bool:
 
 
 def recognise(source: Source) -> Recognised | None:
-    """Return the first format whose reader in ObsPy claims the file (and, of several, can read it)."""
+    """Return the first format whose ObsPy reader claims the file (and, of several, can read it)."""
     claims = _claims(source) if installed() else []
     able = (name for name in claims if len(claims) == 1 or not isinstance(_traces(source, name), str))
     if not claims:
@@ -43,9 +43,9 @@ def recognise(source: Source) -> Recognised | None:
 
 
 def _read(source: Source, name: str, request: Request) -> list[Channel]:
-    """Return all traces of the file, times their calibration factor."""
+    """Return all traces of the file times their calibration factor."""
     unit = request.units(source, None, None)
-    if request.most is not None:  # before they are unpacked, a file says how many samples it holds
+    if request.most is not None:  # the file states its number of samples before they are unpacked
         heads = _traces(source, name, headonly=True)
         samples = sum(int(trace.stats.npts) for trace in heads if not isinstance(trace, str))
         if samples > request.most:
@@ -67,7 +67,7 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, name: str
         raise source.error(f"trace {number} has gaps, or no numbers; get a record without gaps")
     with np.errstate(all="ignore"):
         values = np.asarray(trace.data, dtype=np.float64).reshape(len(trace.data)) * float(stats.calib)
-    # SAC gives the azimuth of a component, and its angle from above, which is about a right one of horizontal ones.
+    # SAC states azimuth and angle from the vertical, about 90 degrees if horizontal.
     sac = {"cmpaz": None, "cmpinc": None, **stats.get("sac", {})}
     horizontal = None not in (sac["cmpaz"], sac["cmpinc"]) and abs(sac["cmpinc"] - 90.0) <= 5.0
     return channel_of(
@@ -86,7 +86,7 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, name: str
 
 
 def _refuse_cut(source: Source, traces: Any) -> None:
-    """Refuse a file that lacks its end where ObsPy reads what is left without a word."""
+    """Reject a truncated file if ObsPy reads the rest silently."""
     titles = _TITLE.findall(source.data)
     lengths = {int(trace.stats.mseed.record_length) for trace in traces if "mseed" in trace.stats}
     held = [len(trace.data) for trace in traces]
@@ -96,7 +96,7 @@ def _refuse_cut(source: Source, traces: Any) -> None:
 
 
 def _claims(source: Source) -> list[str]:
-    """Return the names of the formats whose readers say that the file is theirs."""
+    """Return the names of the formats whose readers claim the file."""
     from obspy.core.util.base import ENTRY_POINTS
     from obspy.core.util.misc import buffered_load_entry_point
 
@@ -104,7 +104,7 @@ def _claims(source: Source) -> list[str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for name in (each for each in ENTRY_POINTS["waveform"] if each not in _REFUSED):
-            # A reader that stumbles over foreign bytes (they raise anything) does not claim them.
+            # A reader that fails on foreign bytes (with any exception) does not claim them.
             with contextlib.suppress(Exception):
                 is_format = buffered_load_entry_point("obspy", f"obspy.plugin.waveform.{name}", "isFormat")
                 if is_format(_opened(source)):
@@ -113,22 +113,22 @@ def _claims(source: Source) -> list[str]:
 
 
 def _opened(source: Source) -> io.BytesIO:
-    """Return a copy of the file's bytes: ObsPy's check for GCF writes to those that it is given."""
+    """Return a copy of the file's bytes, because ObsPy's check for GCF writes to its input."""
     return io.BytesIO(bytearray(source.raw))
 
 
 def _traces(source: Source, name: str, *, headonly: bool = False) -> Any:
-    """Return ObsPy's traces, or the reason why there are none; their heads alone where the format knows them."""
+    """Return ObsPy's traces (only headers if supported and requested), or the reason for their absence."""
     import obspy
     from obspy.io.mseed import InternalMSEEDWarning
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        # What does not pass MiniSEED's own check of its numbers is a warning only.
+        # A failure of MiniSEED's own check of its numbers is only a warning.
         warnings.simplefilter("error", InternalMSEEDWarning)
         try:
             traces = obspy.read(_opened(source), format=name, headonly=headonly)
         except Exception as error:
-            # ObsPy's readers raise whatever their parsing ran into.
+            # ObsPy's readers raise any exception from their parsing.
             return " ".join(str(error).split())[:200] or type(error).__name__
     return traces if len(traces) else "it holds no trace"
