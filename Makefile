@@ -85,11 +85,12 @@ latest: .bounds-latest ## the same with the versions of the day
 doctest: .venv/.all ## run the examples in the docstrings
 	$(BIN)/python -m pytest --doctest-modules src/rocking
 
-lint: .venv/.all ## ruff (rules and format), the import contracts, public docstrings
+lint: .venv/.all ## ruff (rules and format), the import contracts, public docstrings, prose
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 	$(BIN)/python tests/public_names.py
+	$(BIN)/python scripts/prose.py
 
 types: .venv/.all ## mypy: strictly for the package, and whether what stands beside it still fits
 	$(BIN)/mypy
