@@ -651,3 +651,18 @@ def test_a_response_is_explored_in_a_frame():
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])
     with pytest.raises(InvalidOption, match="must be a Response"):
         rocking.explore(response.motion)
+
+
+def test_connections_whose_request_never_comes_keep_nobody_out(monkeypatch):
+    monkeypatch.setattr("rocking.explorer.server.PATIENCE", 0.3)
+    here = served(Explorer(), {"motion": "one-sine:amplitude=0.3g,frequency=1"})
+    here.run_in_background()
+    held = [socket.create_connection(("127.0.0.1", here.port)) for _ in range(3)]
+    for each in held:
+        each.sendall(b"GET / HT")
+    for each in held:
+        each.settimeout(20.0)
+        with contextlib.suppress(ConnectionResetError):
+            assert each.recv(100) == b""
+        each.close()
+    here.server.should_exit = True

@@ -91,7 +91,7 @@ def served(
     require_packages()
     import uvicorn
 
-    from rocking.explorer.server import App
+    from rocking.explorer.server import App, BoundedProtocol
 
     application = App(explorer, opening, study, framed_by).asgi
     listening = _bound(address, port)
@@ -104,7 +104,7 @@ def served(
         log_level="error",
         access_log=False,
         ws="none",
-        http="h11",
+        http=BoundedProtocol,
         timeout_keep_alive=10,
         backlog=_WAITING,
         server_header=False,

@@ -6,13 +6,15 @@ import functools
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from rocking import records
 from rocking.core import checks
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.explorer.parameters import PARAMETERS, PULSES, Texts, Values, given_texts, names_of
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.declared import SCALINGS
-from rocking.inputs.pulses import pulse_values
+from rocking.inputs.pulses import FAMILIES, pulse_values
 from rocking.inputs.quantities import acceleration, scaling
 from rocking.inputs.texts import arguments as written_arguments
 from rocking.inputs.texts import as_option, as_path
@@ -165,7 +167,35 @@ def pulse_call(text: str, arguments: Mapping[str, str]) -> str:
     return f"rocking.pulses.{pulse_values(text)[0].make.__name__}({written})"
 
 
+def pulse_as_text(motion: Motion) -> str | None:
+    """Return the text of a motion that is one of the pulses, bit for bit and without a vertical component, else None.
+
+    Examples
+    --------
+    >>> pulse_as_text(pulse_of("one-sine:amplitude=3,frequency=2").scaled(2.0))
+    'one-sine:amplitude=6.0,frequency=2.0'
+    """
+    name = motion.description.family.lower().replace(" ", "-")
+    parameters: dict[str, Any] = dict(motion.description.parameters)
+    if name.endswith("-ricker"):
+        name, parameters = "ricker", parameters | {"kind": name.removesuffix("-ricker")}
+    if name not in PULSES or motion.vertical is not None:
+        return None
+    names = [*FAMILIES[name].needed, *FAMILIES[name].optional]
+    text = pulse_text(name, {each: value for each, value in parameters.items() if each in names})
+    return pulse_text(text, arguments_of(text)) if _is_same(pulse_of(text), motion) else None
+
+
+def _is_same(motion: Motion, other: Motion) -> bool:
+    pairs = ((getattr(each, name) for each in (motion, other)) for name in ("breakpoints", "coefficients"))
+    return motion.vertical is other.vertical is None and all(np.array_equal(*pair) for pair in pairs)
+
+
 def texts_of_motion(motion: Motion, uploads: UploadStore, factor: float = 1.0) -> dict[str, str]:
-    """Texts of a motion times a factor, which the store keeps under a key."""
+    """Texts of a motion times a factor: a pulse, a shipped record, or the key under which the store keeps it."""
+    if (pulse := pulse_as_text(motion if factor == 1.0 else motion.scaled(factor))) is not None:
+        return {"motion": pulse}
+    if motion.name in records.names() and _is_same(_shipped(motion.name), motion):
+        return {"motion": motion.name} | ({} if factor == 1.0 else {"scale": repr(factor)})
     kept = {"motion": f"given:{uploads.add_motion(motion)}"}
     return kept if factor == 1.0 else kept | {"scale": repr(factor)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import secrets
@@ -19,6 +20,7 @@ from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from rocking.core.tables import plain
 from rocking.errors import InvalidOption, RockingError
@@ -34,6 +36,9 @@ from rocking.explorer.uploads import LARGEST, TOO_LARGE
 from rocking.inputs.quantities import number
 
 T = TypeVar("T")
+
+#: Time until the first request of a connection has come, s.
+PATIENCE: Final = 10.0
 
 #: Prefix of the texts of the case that is compared with.
 OTHER: Final = "other."
@@ -112,6 +117,32 @@ class Download(NamedTuple):
 
     form: str
     content: bytes
+
+
+class BoundedProtocol(H11Protocol):
+    """A connection that ends unless a whole request comes within some seconds."""
+
+    _timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: Any) -> None:
+        """Wait for the first request."""
+        super().connection_made(transport)
+        self._timer = self.loop.call_later(PATIENCE, transport.abort)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Stop waiting."""
+        self._stop()
+        super().connection_lost(exc)
+
+    def handle_events(self) -> None:
+        """Stop waiting once a request has come; between requests uvicorn has a limit of its own."""
+        super().handle_events()
+        if self.cycle is not None:
+            self._stop()
+
+    def _stop(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
 
 
 class App:

@@ -127,17 +127,22 @@ class UploadStore:
         return self._kept(upload)
 
     def _kept(self, upload: Upload) -> str:
-        key, usage = hashlib.sha256(upload.data).hexdigest()[:_HASH], self.usage()
+        key = hashlib.sha256(upload.data).hexdigest()[:_HASH]
         if len(upload.data) > LARGEST:
             raise UnreadableRecord(TOO_LARGE, path=upload.name)
-        if key not in self._files and (usage["files"] >= MOST or usage["bytes"] + len(upload.data) > ALL):
-            raise UnreadableRecord(
-                f"it cannot be kept: {MOST} files and {ALL // 2**20} MiB are kept at most; take some out of "
-                "the list of records first",
-                path=upload.name,
-            )
-        # What was made of a content has the name under which that came first, which stays.
         with self._lock:
+            others = {name: file for name, file in self._files.items() if name != key}
+            while len(others) >= MOST or sum(len(file.data) for file in others.values()) + len(upload.data) > ALL:
+                # No list shows meshes: the oldest one leaves.
+                mesh = next((name for name, file in others.items() if _is_mesh(file.name)), None)
+                if mesh is None:
+                    raise UnreadableRecord(
+                        f"it cannot be kept: {MOST} files and {ALL // 2**20} MiB are kept at most; take some out of "
+                        "the list of records first",
+                        path=upload.name,
+                    )
+                del others[mesh], self._files[mesh]
+            # Results of a content have the name under which it came first, which stays.
             self._files.setdefault(key, upload)
         return key
 
