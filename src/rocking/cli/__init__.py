@@ -1,4 +1,4 @@
-"""Command line: thin wrappers of the public functions. Each command imports its module when it is called."""
+"""Command line: thin wrappers of the public functions, imported when called."""
 
 from __future__ import annotations
 
@@ -107,13 +107,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 raise
             print(f"rocking: {sentence}", file=sys.stderr)
             sys.exit(2)
-    # Outside `except`: the traceback would keep alive the iterators whose threads end when they are closed.
+    # Outside `except`: the traceback would keep alive iterators that own threads.
     print(INTERRUPTED, file=sys.stderr)
     sys.exit(130)
 
 
 def _is_of_an_interrupt(error: BaseException | None) -> bool:
-    """Whether an error replaced an interrupt, for example one raised inside a lock of `threading`."""
+    """Whether an error replaced an interrupt, as in a lock of `threading`."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
     return error is not None

@@ -223,8 +223,8 @@ def measures(
         Fraction of critical damping of the spectral accelerations.
     clusters
         Groups of records, each of which counts as one in the intervals: station groups the components of one station
-        in one earthquake by file name; or a label for each record, separated by commas. By default each record is a
-        group.
+        in one earthquake, as named in the files; or a label for each record, separated by commas. By default each
+        record is a group.
     """
     bodies = block.blocks(model)
     with output.folder() as folder:
@@ -242,7 +242,7 @@ def measures(
 def _deliver(
     found: DatasetResult, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
 ) -> None:
-    """Write and print an analysis whose tables name each motion by its record, too."""
+    """Write and print an analysis, with the records of the motions."""
     result = found.to_dict()
     if read is not None:
         result |= read.to_dict()
@@ -273,7 +273,7 @@ def chatter(
     table: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Compute by every method how long a slender block chatters under a sine, and whether it comes to rest.
+    """Compute how long a slender block chatters under a sine and whether it comes to rest, by every method.
 
     Times are dimensionless, p t; with --p also in seconds. --out contains chatter.png, .pdf (intervals between the
     impacts), result.json, impacts.csv and cycles.csv.
@@ -310,7 +310,7 @@ def chatter(
 
 
 def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPUT] = OutputOptions()) -> None:
-    """Compute by every method the amplitude up to which chattering under a sine is complete.
+    """Compute the amplitude up to which chattering under a sine is complete, by every method.
 
     --out contains result.json.
 

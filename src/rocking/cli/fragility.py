@@ -83,8 +83,8 @@ def fragility(
     polarity
         Motions as they are (+), reversed (-), or both. A symmetric block responds equally to both, which count once.
     clusters
-        Groups of records for the intervals: station groups the components of one station in one earthquake by file
-        name; or a label for each record, separated by commas. By default each record is a group.
+        Groups of records for the intervals: station groups the components of one station in one earthquake, as named
+        in the files; or a label for each record, separated by commas. By default each record is a group.
     confidence
         Probability of the intervals and bands.
     taxonomy
@@ -188,7 +188,7 @@ def _with_records(found: Fragility, records: list[dict[str, Any]]) -> Fragility:
 
 @contextlib.contextmanager
 def _outcomes_kept(folder: Path | None) -> Iterator[None]:
-    """Write the simulated outcomes even if no curve can be fitted."""
+    """Write simulated outcomes even if the fit fails."""
     try:
         yield
     except Unfitted as refused:
@@ -199,7 +199,7 @@ def _outcomes_kept(folder: Path | None) -> Iterator[None]:
 
 
 def _hazard(file: Path | None, site: int, years: float, period: float | None) -> HazardCurve | None:
-    """Read a hazard curve, if any, with notes on likely mistakes."""
+    """Read a hazard curve, if any, with notes."""
     if file is None:
         for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
             if is_given:

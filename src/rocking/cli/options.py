@@ -1,4 +1,4 @@
-"""Options shared by several commands, built from the declared inputs: bodies, motions, intensity, model, treatment."""
+"""Options shared by several commands, built from the declared inputs."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ class FileOptions(InputOptions):
         return {"channel": None, "dt": None, "units": None} | self.read("channel", "dt", "units")
 
     def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
-        """Return the scaled motion of a record or pulse, with its vertical component and notes."""
+        """Return the scaled motion of a record or pulse, with notes."""
         given, vertical = self.given(), self.given().get("vertical")
         # Mistakes in the options are reported before a long file is read.
         target = scaling({n: given[n] for n in ("scale", "pga", "pgv", "sa") if n in given}, positive_acceleration)
@@ -254,14 +254,14 @@ class ReadRecords(NamedTuple):
     single: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the records of the motions in other tables and the skipped files, for JSON."""
+        """Return the records and skipped files for JSON."""
         from rocking.analysis.survey import record_columns
 
         return {"records": record_columns([*self.motions], [*self.motions.values()]), "skipped": self.skipped}
 
 
 def refusal(name: str, error: RockingError) -> str:
-    """Return why a record cannot be read, with its name, as a message of the command line."""
+    """Return why a record cannot be read, for the command line."""
     reason = error.text(lambda argument: option_of(argument) if argument in ("channel", "dt", "units") else argument)
     return reason if error.path == name else f"{name}: {reason}"
 
@@ -293,7 +293,7 @@ class _RecordOptions(FileOptions):
     ] = False
 
     def read_all(self, names: Sequence[str]) -> ReadRecords:
-        """Return the motions of records, folders, patterns and pulses by name."""
+        """Return the motions by name."""
         records, pulses = expanded(names), self.given().get("pulse", ())
         if not records and not pulses:
             raise InvalidOption(
@@ -401,7 +401,7 @@ def labels_of(clusters: str | None) -> str | list[str] | None:
 
 
 def positive_acceleration(text: str, name: str) -> float:
-    """Return a positive acceleration, m/s^2, with a note if a number without a unit looks like a multiple of g."""
+    """Return a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
     if not acceleration(text, name) > 0.0:
         raise InvalidOption(
             f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text

@@ -46,12 +46,12 @@ class OutputOptions(PrintOptions):
     out: Annotated[Path | None, Parameter(help="Folder for the files: figures, tables, result.json.")] = None
 
     def folder(self) -> AbstractContextManager[Path | None]:
-        """Create the folder, if any, before the computation; on failure, remove it if it is empty."""
+        """Create the folder, if any; on failure, remove it if empty."""
         return nullcontext() if self.out is None else output_folder(self.out, listed=not self.as_json)
 
 
 def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
-    """Write figures (PNG and PDF), returned by functions by name, and a result (JSON) into a folder."""
+    """Write named figures (PNG and PDF) and a result (JSON) into a folder."""
     for stem, draw in figures.items():
         with left_out(f"{stem}.png and {stem}.pdf"):
             figure = draw()
@@ -68,7 +68,7 @@ def write_tables(folder: Path, found: Result) -> None:
 
 @contextmanager
 def left_out(files: str) -> Iterator[None]:
-    """Skip files whose content is rejected, with a note, so that the other results are kept."""
+    """Skip files whose content is rejected, with a note."""
     try:
         yield
     except InvalidOption as error:
@@ -142,6 +142,6 @@ def subfolder(folder: Path, name: str) -> Path:
 
 
 def _written_at(folder: Path) -> dict[str, int]:
-    """Return the modification times, ns, of all files below a folder by their relative names."""
+    """Return the modification times, ns, of the files below a folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
     return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}

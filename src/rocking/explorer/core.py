@@ -68,7 +68,7 @@ class Explorer:
         return self.uploads.take(name, data)
 
     def take_mesh(self, name: str, data: bytes) -> dict[str, Any]:
-        """Store a mesh, and return the direction of first uplift of its body, or an error that the user may correct."""
+        """Store a mesh, and return the direction of first uplift, or an error that the user may correct."""
         uploads = self.uploads
         key = uploads.add_mesh(name, data)
         found = {"key": key, "name": uploads.file(key).name, "azimuth": 0.0}

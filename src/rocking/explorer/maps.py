@@ -80,7 +80,7 @@ class MapGrid:
 
 
 class Part(NamedTuple):
-    """Some points of a map: spacing of the points of their level, indices, and quantities."""
+    """Some points of a map: spacing, indices, and quantities."""
 
     stride: int
     points: Integers
@@ -317,7 +317,7 @@ def _lifting(grid: MapGrid, alpha: float | None) -> float:
 
 
 def _tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
-    """Yield tasks level by level, row by row; points of a task share the factor on the motion."""
+    """Yield tasks by level and row; points of a task share the factor on the motion."""
     rows, columns = grid.shape
     for level, stride in enumerate((8, 4, 2, 1)):
         for row in range(0, rows, stride):

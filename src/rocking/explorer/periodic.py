@@ -305,7 +305,7 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
 
 
 def parts(sweep: Sweep) -> Generator[Part]:
-    """Sweep the parameter up and down from rest in decreasing steps, each from the last state unless it overturned."""
+    """Sweep up and down from rest in decreasing steps, each from the last state unless it overturned."""
     values, maps, done = sweep.axis.values, {}, 0
     every = [(stride, order) for stride in (8, 4, 2, 1) for order in (1, -1)]
     whole = sum(len(values[::stride]) for stride, _ in every)

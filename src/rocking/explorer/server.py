@@ -1,4 +1,4 @@
-"""Web application: converts requests to calls of the core, and payloads to bytes. It contains no mechanics."""
+"""Web application: converts requests to calls of the core, and payloads to bytes."""
 
 from __future__ import annotations
 

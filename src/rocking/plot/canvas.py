@@ -59,8 +59,7 @@ STYLE: Final[dict[Any, Any]] = {
 #: A number with too many decimals.
 _LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
 
-#: Letter width relative to the font size: mean, and for short labels; letters taken by the handle and gaps of a
-#: legend line.
+#: Letter width relative to the font size: mean, and for short labels; letters per legend handle.
 #: and gaps take.
 _LETTER: Final = 0.52
 _WIDE_LETTER: Final = 0.53
@@ -124,7 +123,7 @@ class Place(TypedDict, total=False):
 
 
 class Page:
-    """Figure in progress, with its panels and the legend handles that labels do not provide."""
+    """Figure in progress, with its panels and additional legend handles."""
 
     def __init__(self, figure: Figure, ax: Axes | None) -> None:
         self.figure, self.ax = figure, ax
@@ -220,7 +219,7 @@ def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> No
 
 
 def handles_of(*panels: Axes) -> list[Artist]:
-    """Collect the handles of all labelled artists in these panels, each label once."""
+    """Collect the handles of labelled artists, each label once."""
     named: dict[str, Artist] = {}
     for panel in panels:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
@@ -256,7 +255,7 @@ def _shows_at_the_end_of_cells() -> bool:
 
 
 def _show_once(figure: Figure) -> None:
-    """Make pyplot forget a caller's figure when it is first shown, because the value of a cell would be shown twice."""
+    """Make pyplot forget a figure when it is first shown, so that cells do not show it twice."""
     if _shows_at_the_end_of_cells():
         vars(figure)["_ipython_display_"] = functools.partial(_show, figure)
 

@@ -101,7 +101,7 @@ class RiskLine(NamedTuple):
 def risk_figure(
     *, intensity: Floats, hazard: HazardLine, lines: Sequence[RiskLine], intensity_label: str, **place: Unpack[Place]
 ) -> Figure:
-    """Draw a hazard curve, dotted where extrapolated, and below it the contributions to each limit state's rate."""
+    """Draw a hazard curve, and below it the contributions to each limit state's rate."""
     with page_for((5.6, 5.2), **place) as page:
         *curves, shares = page.panels("A;B", sharex=True)
         for axes in curves:
@@ -132,7 +132,7 @@ def survival_figure(
     intensity_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw the largest annual rates of motions that are consistent with a standing block, and a hazard curve."""
+    """Draw a hazard curve and the largest annual rates consistent with a standing block."""
     with page_for((5.6, 3.6), **place) as page:
         (axes,) = page.panels()
         scale_by_ratio(axes, intensity)
@@ -387,7 +387,7 @@ def measured_figure(
 
 
 def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
-    """Draw the distribution of the blocks, and above it the median of the population's centre and its interval."""
+    """Draw the distribution of the blocks, and the median and interval of the population's centre."""
     sides = parameter.values.shape[1]
     drawn = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}
     edges = np.histogram_bin_edges(parameter.values, _BINS)

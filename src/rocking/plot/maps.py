@@ -42,7 +42,7 @@ _OVERTURNS: Final = (
     ("#fbe7cd", "...."),
 )
 
-#: Fraction of the frame below which a region is invisible, and of its height below which lines would hide it.
+#: Fraction of the frame below which a region is invisible, and of its height below which lines hide it.
 _LEAST_SEEN: Final = 1e-3
 _STRIP: Final = 1e-2
 
@@ -87,7 +87,7 @@ def outcome_figure(
 def _colour_cells(
     axes: Axes, x: Floats, y: Floats, numbers: NDArray[np.integer], colours: Sequence[str], first: int = 0
 ) -> None:
-    """Fill the cells around grid points with the colours of their numbers, which begin at `first`."""
+    """Fill the cells around grid points by number, from `first` on."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     norm = BoundaryNorm(np.arange(len(colours) + 1) + first - 0.5, len(colours))
@@ -323,7 +323,7 @@ def _around(azimuth: Floats, values: Floats) -> Floats:
 
 
 def _look_down(axes: Axes, most: float) -> None:
-    """Set equal limits on all sides, and label both axes with the distance from the centre."""
+    """Set equal limits, and label both axes with the distance from the centre."""
     axes.set(aspect="equal", xlim=(-1.1 * most, 1.1 * most), ylim=(-1.1 * most, 1.1 * most))
     axes.locator_params(nbins=5)
     axes.grid(True)

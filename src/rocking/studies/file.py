@@ -125,7 +125,7 @@ def read_study(path: str | Path) -> StudyFile:
 
 
 def _check_tables(tables: Tables) -> None:
-    """Check the names of tables and keys, and the types of values that are not numbers."""
+    """Check table names, keys, and types of non-numeric values."""
     for table, content in tables.tables.items():
         if table not in SCHEMA:
             raise tables.wrong(table, None, f"there is no table [{{}}]; {nearest(table, SCHEMA)}", table)
@@ -184,7 +184,7 @@ def _made(
     reader: Callable[[str], quantities.Quantity | None],
     make: Callable[[dict[str, Any]], Any],
 ) -> list[Any]:
-    """Create the object of the k-th table of a name, or several if its numbers are lists or ranges."""
+    """Create the object of the k-th table, or several for lists or ranges."""
     axes: dict[str, Any] = {}
     for key, value in given.items():
         with tables.located(table, key=key, occurrence=k):
@@ -302,11 +302,11 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
 
 
 def _records_of(folder: Path, name: str) -> list[str]:
-    """Return the files beside the study file that match a name, folder or pattern, or a shipped record."""
+    """Return the matching files beside the study file, or a shipped record."""
     path = str(folder / name)
     if glob.has_magic(name) and not is_there(path):
         return expanded([str(Path(glob.escape(str(folder))) / name)])
     if is_there(path):
         return expanded([path])
-    # A file of this name in the working folder is not meant; if there is none, the name alone gives a better message.
+    # Not a file in the working folder; the bare name gives a better message.
     return [path if is_there(name) and name not in records.names() else name]

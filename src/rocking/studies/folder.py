@@ -1,4 +1,4 @@
-"""Folder of a study: its inputs and units, in files written atomically, and the lock of its runs."""
+"""Folder of a study: inputs and units in atomically written files, and a lock."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ class Store:
             )
 
     def outcomes(self, key: Key) -> Mapping[str, Floats] | None:
-        """Return the outcomes of a full unit by name, None if it is not done; raise a StudyError if it is damaged."""
+        """Return the outcomes of a full unit by name, or None; raise a StudyError if it is damaged."""
         data = read(self.file_of(key))
         if data is None:
             return None
@@ -168,7 +168,7 @@ def exists(path: str | Path) -> bool:
 
 
 def require_free(path: str | Path) -> None:
-    """Check that a folder contains nothing except remains of an interrupted creation."""
+    """Check that a folder is empty except for remains of a creation."""
     folder = folder_of(path)
     others = sorted({each.name for each in folder.glob("[!.]*")} - {"lock"})
     if others:
@@ -201,7 +201,7 @@ def put(file: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def locked(path: str | Path, *, shared: bool = False) -> Iterator[None]:
-    """Lock a folder for this process: exclusively, or shared with runs of other parts of the study."""
+    """Lock a folder, exclusively or shared with runs of other parts."""
     folder = folder_of(path)
     with _refused("locked", folder / "lock"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -211,7 +211,7 @@ def locked(path: str | Path, *, shared: bool = False) -> Iterator[None]:
             try:
                 _lock(file, shared)
             except (BlockingIOError, PermissionError):
-                # On Windows other processes cannot read the locked byte, so the name begins at the second byte.
+                # On Windows the locked byte is unreadable, so the name begins at the second byte.
                 file.seek(1)
                 holder = file.read().decode(errors="replace") or "another process"
                 raise StudyError(
@@ -235,7 +235,7 @@ def _refused(done: str, file: Path) -> Iterator[None]:
 
 
 def _arrays(product: Product) -> dict[str, NDArray[Any]]:
-    """Return all inputs as arrays by name, prefixed with the name of their part."""
+    """Return all inputs as arrays by part and name."""
     bodies, scales = product.bodies, product.scales
     arrays = {f"{bodies.kind}/{name}": values for name, (values, _) in bodies.parameters().items()}
     arrays[f"{bodies.kind}/gravity"] = np.array(bodies.gravity)

@@ -101,7 +101,7 @@ def _lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
 
 
 def _selected(store: Store, names: Sequence[str], complete: bool, key: _Selection) -> list[Floats]:
-    """Read a selection of some outcomes, with NaN for missing units if the study is not complete."""
+    """Read a selection of outcomes, with NaN for missing units."""
     grid = store.grid
     axes = [np.arange(size)[part] for size, part in zip(grid.shape, key, strict=True)]
     wanted = [np.atleast_1d(axis) for axis in axes]
@@ -178,7 +178,7 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
         holds[part], known[part] = overturned, ~(unfinished | stopped)
         if verdict == "complete_chattering":
             holds[part], known[part] = completes, (known[part] | rests) & ~stalled
-    # Unknown outcomes inherit the last known one below; otherwise a change with unknown outcomes inside would be lost.
+    # Unknown outcomes inherit the last known one below, so that no change is lost.
     below = np.zeros(store.grid.shape, np.int64)  # index of that scale; -1 if no outcome is known so far
     for k in range(product.scales.count):
         below[:, k] = np.where(known[:, k], k, below[:, k - 1] if k else -1)
@@ -239,7 +239,7 @@ def _peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
 
 
 def _repeated(bodies: Bodies, polarities: int) -> Flags:
-    """Whether a polarity (polarities, bodies) repeats the first one because the body is symmetric."""
+    """Whether a polarity repeats the first one by symmetry, shape (polarities, bodies)."""
     repeated = np.zeros((polarities, len(bodies)), bool)
     if polarities > 1:
         repeated[1] = [bodies.select(slice(k, k + 1)).is_symmetric for k in range(len(bodies))]
@@ -309,7 +309,7 @@ class BlockTable(DatasetResult):
 
 
 def study_spectrum(store: Store, fractiles: Sequence[float], progress: bool | None) -> BlockTable:
-    """Compute fractiles of the normalised peak rotation over motions and polarities, for each scale and block."""
+    """Compute fractiles of the normalised peak rotation for each scale and block."""
     import xarray as xr
 
     given = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()

@@ -1,4 +1,4 @@
-"""Studies: stored simulations that can be interrupted at any time without loss and resumed."""
+"""Studies: stored simulations that can be interrupted and resumed without loss."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Status:
     Attributes
     ----------
     done, units, simulations : int
-        Number of units that are done, of all units, and of all simulations.
+        Number of finished units, of all units, and of simulations.
     """
 
     done: int
@@ -86,7 +86,7 @@ class RunReport:
     Attributes
     ----------
     units, simulations : int
-        Number of computed units and of simulations in them.
+        Number of computed units and simulations.
     seconds : float
         Duration of the run, s.
     failed : mapping
@@ -167,7 +167,7 @@ class Study:
         threads : int, optional
             As for `simulate_many`.
         executor : concurrent.futures.Executor or dask.distributed.Client, optional
-            Pool of processes, or client of a cluster, whose workers compute instead; only this process writes.
+            Pool of processes or cluster client that computes instead; only this process writes.
         part : str, optional
             Fixed share of the units, for example "3/10", the third of ten. Different shares may run at the same time,
             on machines with a common file system; a run without a part then computes the missing units.
@@ -177,8 +177,7 @@ class Study:
         Returns
         -------
         RunReport
-            Units that this run computed. SIGTERM ends the run after the current units, Ctrl-C at once. Both keep all
-            stored units.
+            Computed units. SIGTERM ends the run after the current units, Ctrl-C at once; stored units are kept.
 
         Raises
         ------
@@ -228,7 +227,7 @@ class Study:
         Raises
         ------
         StudyError
-            If units are to be computed again and another version created the study.
+            If another version created the study whose units are to be computed again.
         """
         store, faults = self._store, dict[Key, str]()
         if checks.whole(recompute, "recompute", InvalidOption, 0) or repair:
@@ -441,9 +440,9 @@ def study(
 def study_of(
     folder: str | Path, product: Product, unit_blocks: int | None = None, records: Sequence[str] = ()
 ) -> Study:
-    """Create the study of a product in a folder, or open the existing one and check its inputs."""
+    """Create the study of a product, or open it and check its inputs."""
     if not exists(folder):
-        require_free(folder)  # before the pilot, and before a lock file appears in an unrelated folder
+        require_free(folder)  # before the pilot and the lock file
         unit = unit_of(product, unit_blocks)
         with locked(folder):
             if not exists(folder):  # another process may have created it meanwhile
@@ -469,7 +468,7 @@ def _part(part: str) -> tuple[int, int]:
 
 
 def _run(store: Store, share: Sequence[Key], threads: int, executor: Any, progress: bool | None) -> RunReport:
-    """Compute the missing units of a share, in threads or by an executor, until SIGTERM."""
+    """Compute the missing units of a share until SIGTERM."""
     start, grid, pending = time.monotonic(), store.grid, dict[Future[bytes], Key]()
     units, simulations, failed = 0, 0, dict[str, str]()
     done = store.done()
@@ -526,7 +525,7 @@ def _terminated() -> Iterator[threading.Event]:
 
 @contextlib.contextmanager
 def _workers(executor: Any, threads: int) -> Iterator[tuple[Callable[[Work], Future[bytes]], Callable[[], int]]]:
-    """Yield functions that submit a unit and count the workers; an error inside the context stops the threads."""
+    """Yield functions that submit a unit and count the workers; errors stop the threads."""
     if executor is None:
         cancelled, pool = threading.Event(), ThreadPoolExecutor(threads)
         try:

@@ -1,4 +1,4 @@
-"""Units of a study: cells of a regular grid, their size, computation, and encoding in files."""
+"""Units of a study: grid cells, their size, computation and encoding."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def name_of(key: Key) -> str:
 
 
 def unit_of(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
-    """Return the size of a unit along the axes, for a number of blocks or for about five seconds (pilot run)."""
+    """Return the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
     if unit_blocks is not None:
         width = checks.whole(unit_blocks, "unit_blocks", InvalidOption, least=_GROUP)
         if width % _GROUP:
@@ -116,7 +116,7 @@ def unit_of(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
 
 @functools.cache
 def program() -> str:
-    """Return an identifier of this program, equal for programs that compute the same bits."""
+    """Return an identifier shared by programs that compute the same bits."""
     return f"rocking {VERSION} (kernels {fingerprint()})"
 
 
@@ -132,7 +132,7 @@ class Work:
 
 
 def compute(work: Work, cancelled: threading.Event | None = None) -> bytes:
-    """Simulate a unit and return its bytes, unless `cancelled`; raise a StudyError if the program differs."""
+    """Return the bytes of a unit, unless `cancelled`; raise a StudyError if the program differs."""
     if work.program != program():
         raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
     # NaN where the unit contains fewer simulations than a full one
