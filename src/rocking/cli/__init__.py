@@ -166,12 +166,12 @@ def spelling_of(command: App) -> Spelling:
 
 
 def command_of(arguments: Sequence[str]) -> App:
-    """Return the called command, or the program if there is none; the parser treats --help as a command."""
+    """Return the called command, or the program if there is none. The parser treats --help as a command."""
     return app.parse_commands(arguments)[1][len(_words(arguments))]
 
 
 def refuse_unknown_options(given: Iterable[object], arguments: Sequence[str]) -> None:
-    """Check that no record name is an unknown option; after "--" any name is allowed."""
+    """Check that no record name is an unknown option. After "--" any name is allowed."""
     typed = arguments[: arguments.index("--")] if "--" in arguments else arguments
     for name in given:
         if isinstance(name, str) and name.startswith("-") and name.lstrip("-")[:1].isalpha() and name in typed:

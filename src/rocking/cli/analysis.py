@@ -68,11 +68,11 @@ def spectrum(
     Parameters
     ----------
     alpha
-        Slendernesses, for example 10deg,15deg or 0.1:0.3:5 (rad); or use --ensemble.
+        Slendernesses, for example 10deg,15deg or 0.1:0.3:5 (rad). Alternatively use --ensemble.
     p
-        Frequency parameters, rad/s; or use --size.
+        Frequency parameters, rad/s. Alternatively use --size.
     size
-        Half diagonals of rectangular blocks, for example 0.5,1 (m) or 50cm:5m:10; or use --p.
+        Half diagonals of rectangular blocks, for example 0.5,1 (m) or 50cm:5m:10. Alternatively use --p.
     restitution
         Coefficients of restitution; Housner's by default.
     ensemble
@@ -183,7 +183,7 @@ def ida(
 
     The block is a rectangle (--width, --height, or half of each) or described by its parameters (--p, --alpha). By
     default --levels increase in steps of 5 % to three times the level by which every motion has overturned the block.
-    Bands and gaps between two levels are missed; closer levels miss fewer. --out contains ida.png, .pdf, .nc,
+    Bands and gaps between two levels are missed. Closer levels miss fewer. --out contains ida.png, .pdf, .nc,
     levels.csv, bands.csv (levels that overturn) and result.json.
 
     Parameters
@@ -275,7 +275,7 @@ def chatter(
 ) -> None:
     """Compute how long a slender block chatters under a sine and whether it comes to rest, by every method.
 
-    Times are dimensionless, p t; with --p also in seconds. --out contains chatter.png, .pdf (intervals between the
+    Times are dimensionless, p t, with --p also in seconds. --out contains chatter.png, .pdf (intervals between the
     impacts), result.json, impacts.csv and cycles.csv.
 
     Parameters
@@ -291,9 +291,9 @@ def chatter(
     order
         Number of terms of the expansion in a - 1, 1 to 40.
     resolved
-        Number of impacts that the semi-analytical method resolves; by default it depends on the restitution.
+        Number of impacts that the semi-analytical method resolves. The default depends on the restitution.
     table
-        Show some cycles of the paper's iterative procedure (Eqs 62 and 64); cycles.csv contains all.
+        Show some cycles of the paper's iterative procedure (Eqs 62 and 64). cycles.csv contains all.
     """
     with output.folder() as folder:
         report = chattering_report(a, omega, eta, order=order, resolved=resolved, p=p)

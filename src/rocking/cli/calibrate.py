@@ -66,7 +66,7 @@ def calibrate(
     data
         CSV table of outcomes or of a history.
     model
-        Equation of motion; the linear one is faster, and suits slender specimens.
+        Equation of motion. The linear one is faster and suits slender specimens.
     p
         Lowest and highest plausible frequency parameter, rad/s, separated by a comma; or a known value.
     alpha
@@ -75,20 +75,20 @@ def calibrate(
         Likewise the coefficient of restitution; for outcomes also housner, which computes it from the slenderness (two
         sides are treated as one rectangle).
     two_sided
-        Whether the two sides of the block may differ; by default yes for outcomes, no for a history.
+        Whether the two sides of the block may differ. By default yes for outcomes, no for a history.
     candidates
-        Outcomes: approximate number of blocks to try; more are tried if the runs disagree.
+        Outcomes: approximate number of blocks to try. More are tried if the runs disagree.
     folds
         Outcomes: number of folds for cross-validation; 0: none. Tests of one group stay together.
     predict
-        Outcomes: records to predict, files or names of shipped records; use --pulse for pulses.
+        Outcomes: records to predict, files or names of shipped records. Use --pulse for pulses.
     motion
         History: record of the base's motion, or use one --pulse; without either, the block was released and rocked
         freely.
     initial_rotation
-        History: rotation at time 0, 2deg or 0.03 (rad); by default fitted for a release test, 0 under a motion.
+        History: rotation at time 0, 2deg or 0.03 (rad). By default fitted for a release test, 0 under a motion.
     seed
-        Seed of the random numbers; the same seed reproduces the result.
+        Seed of the random numbers. The same seed reproduces the result.
     """
     ranges = {
         "p": None if p is None else bounds(p, "p", number),
@@ -131,7 +131,7 @@ def calibrate(
 
 
 def _motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
-    """Read records and pulses; reject options of motions if there are none."""
+    """Read records and pulses and reject options of motions if there are none."""
     motions = {name: file.motion(name) for name in records} | file.pulses()
     for name in {} if motions else file.given("scale", "pga", "pgv", "sa", "vertical"):
         raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
@@ -176,7 +176,7 @@ def validate(
     tests
         CSV table of tests.
     lapse
-        Probability that an outcome is unrelated to the rocking of the block; by default 0.
+        Probability that an outcome is unrelated to the rocking of the block, by default 0.
     bins
         Number of bins of the reliability diagram.
     seed

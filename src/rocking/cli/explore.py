@@ -35,7 +35,7 @@ def explore(
         Initial ground motion: a shipped record, a record file, or a pulse; or the folder of a study, whose results are
         shown as maps.
     port
-        Port of the server; by default a free one.
+        Port of the server, by default a free one.
     no_open
         Do not open a browser.
     address

@@ -36,7 +36,7 @@ def mesh(
     """Compute the mass of a body from a mesh, its resistance in every direction, and the equivalent blocks.
 
     FILE is an OBJ, PLY, STL or glTF file, another format that trimesh reads, or "statue", the shipped mesh. x points
-    east and y north; azimuths are in degrees clockwise from north. --out contains rose.png, .pdf, .csv (uplift
+    east and y north. Azimuths are in degrees clockwise from north. --out contains rose.png, .pdf, .csv (uplift
     acceleration, slenderness and p against the azimuth), .nc, support.csv, with --azimuth blocks.csv, and result.json.
 
     Parameters
@@ -49,18 +49,18 @@ def mesh(
     density
         Density, kg/m^3; or the density of each part, as plinth=2700,figure=2650. By default the density is uniform.
     support
-        Corners of the support, m, as "0.3,0.2;-0.3,0.2;0,-0.2"; by default the corners of the mesh near the ground.
+        Corners of the support, m, as "0.3,0.2;-0.3,0.2;0,-0.2". By default the corners of the mesh near the ground.
     tolerance
-        Height above the lowest corner up to which corners carry load, as 0.002 (m) or 0.2cm; by default a thousandth of
+        Height above the lowest corner up to which corners carry load, as 0.002 (m) or 0.2cm. By default a thousandth of
         the height.
     up
-        Axis that points up: x, y, z, -x, -y, -z, or a vector, 0.1,0,1; by default z, for glTF files y.
+        Axis that points up: x, y, z, -x, -y, -z, or a vector, 0.1,0,1. By default z, for glTF files y.
     unit
         Unit of the coordinates: m, cm, mm, in, ft, or its length in m.
     turn
         Rotation of the mesh, degrees, clockwise seen from above.
     restitution
-        Coefficient of restitution, in (0, 1], one or two; by default from conservation of angular momentum.
+        Coefficient of restitution, in (0, 1], one or two. By default from conservation of angular momentum.
     """
     with output.folder() as folder:
         if restitution is not None and azimuth is None:

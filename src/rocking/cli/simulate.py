@@ -150,7 +150,7 @@ def check(
     Parameters
     ----------
     rules
-        Some of west,ishiyama,housner,asce_43_05,priestley; by default all.
+        Some of west,ishiyama,housner,asce_43_05,priestley. By default all.
     """
     body = block.block()
     chosen = None if rules is None else [name.strip() for name in rules.split(",")]

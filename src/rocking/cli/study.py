@@ -45,7 +45,7 @@ def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT] = QuietOptions())
     Parameters
     ----------
     file
-        TOML file to write; an existing file is not replaced.
+        TOML file to write. An existing file is not replaced.
     """
     if file.exists():
         raise OutputError("the file is there already: choose another name, or remove it first", path=str(file))
@@ -70,7 +70,7 @@ def create(
     folder
         Folder of the study.
     unit_blocks
-        Number of blocks in a unit (one motion and scale), a multiple of 512; by default a unit runs for about five
+        Number of blocks in a unit (one motion and scale), a multiple of 512. By default a unit runs for about five
         seconds.
     """
     print(f"{folder}: {_created(file, folder, unit_blocks).status}; next: rocking study run {folder}")
@@ -92,11 +92,11 @@ def run(
     folder
         Folder of the study; or its TOML file, from which the study is created first.
     into
-        With a file, the folder of the study; by default beside the file, with its name without .toml.
+        With a file, the folder of the study. By default beside the file, with its name without .toml.
     threads
-        Number of threads; by default one for every core.
+        Number of threads, by default one for every core.
     part
-        Fixed share of the units to compute, as 3/10; shares may run at the same time, as an array of jobs.
+        Fixed share of the units to compute, as 3/10. Shares may run at the same time, as an array of jobs.
     """
     if into is not None and not folder.endswith(".toml"):
         raise InvalidOption(f"{into} is for a study from a TOML file, which {folder} is not; name one place only")
@@ -133,7 +133,7 @@ def verify(
     repair: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
-    """Read and check every unit; recompute some units and compare all bits.
+    """Read and check every unit, recompute some units and compare all bits.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def report(
     folder
         Folder of the study.
     out
-        Folder for the results; by default the folder report in the folder of the study.
+        Folder for the results. By default the folder report in the folder of the study.
     limits
         Limit states, separated by commas: overturning, or NAME=ROTATION divided by the slenderness, as half=0.5.
     together
