@@ -34,7 +34,6 @@ _LEAST, _MOST = 2, 60
 
 #: Ratio of successive levels of the margin from the uplift level on, and the number of levels simulated at once; the
 #: first level that overturns is then refined.
-#: many are simulated at once; the first that overturns is then closed in on.
 _STEP: Final = 1.05
 _AT_ONCE: Final = 16
 
@@ -78,7 +77,7 @@ class Assessment:
         return count if count < len(self.entries) else None
 
     def record(self, k: int) -> Found:
-        """Read one record; the list is not stored in memory as a whole."""
+        """Read one record, because the whole list is not stored in memory."""
         return read_motion(self.entries[k], self.uploads)
 
     def motion(self, k: int) -> Motion:

@@ -110,7 +110,7 @@ class RequestAuthentication:
         return None if own else (403, "only the page of this server may send this")
 
     def _redeemed(self, token: bytes) -> bool:
-        """Whether a token is valid and unused; marks it as used."""
+        """Whether a token is valid and unused, and mark it as used."""
         with self._lock:
             for known in self._tokens:
                 if hmac.compare_digest(known.encode(), token):

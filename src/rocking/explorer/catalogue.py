@@ -29,7 +29,6 @@ _COMPONENT: Final = re.compile(
 
 #: Sensor number in a component name, and its heading: KiK-net has one sensor in a borehole, 1, and one at the surface,
 #: 2, each with three components.
-#: one at the surface, 2, each with three components.
 _SENSOR: Final = re.compile(r"(?i)(?:ns|ew|ud)([12])$")
 _DEEP: Final = " borehole"
 

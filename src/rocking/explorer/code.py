@@ -129,7 +129,7 @@ def case_as_python(case: Case) -> str:
 
 
 def case_as_command(case: Case) -> str | None:
-    """Write the case as a command; return None if the command line does not support it.
+    """Write the case as a command, or return None if the command line does not support it.
 
     Examples
     --------

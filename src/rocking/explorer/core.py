@@ -48,7 +48,7 @@ _TABLES: Final[Mapping[str, Any]] = {"csv": "histories", "events.csv": "events",
 
 
 class Explorer:
-    """Cases by their texts, with a cache of the last responses; thread-safe.
+    """Cases by their texts, with a thread-safe cache of the last responses.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class Explorer:
             return found
 
     def forget(self, key: str) -> dict[str, int]:
-        """Remove a file and its responses; return the number of remaining files."""
+        """Remove a file and its responses, and return the number of remaining files."""
         self.uploads.remove(key)
         self._kept.forget(f"file:{key}")
         return self.uploads.usage()
@@ -181,7 +181,7 @@ def _rows(shown: Simulated) -> int:
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
-    """Return the texts of a case with replacements; texts of a block, or of motion and start, are replaced together."""
+    """Return the texts of a case with replacements. Texts of a block, or of motion and start, are replaced together."""
     together = [(names_of("block"), names_of("block")), (names_of("motion"), names_of("motion", "start"))]
     gone = {name for given, names in together if changed.keys() & {*given} for name in names}
     return {name: value for name, value in texts.items() if name not in gone} | dict(changed)

@@ -74,8 +74,8 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     """Read a case from texts named as in `PARAMETERS`, with the command line's defaults.
 
     ``motion`` is the name of a shipped record, a pulse (``sine:amplitude=0.3g,frequency=1,cycles=2.5``), ``file:KEY``,
-    ``given:KEY`` or ``none``; ``vertical`` is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a
-    channel of the motion's own file; ``mesh`` is the name of a shipped mesh, or ``file:KEY``.
+    ``given:KEY`` or ``none``. ``vertical`` is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a
+    channel of the motion's own file. ``mesh`` is the name of a shipped mesh, or ``file:KEY``.
 
     Examples
     --------

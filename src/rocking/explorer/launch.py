@@ -87,7 +87,7 @@ def served(
     port: int = 0,
     framed_by: str = "'none'",
 ) -> Server:
-    """Bind the explorer's application to an address of this machine and a port; 0 selects a free port."""
+    """Bind the explorer's application to an address of this machine and a port (0: a free one)."""
     require_packages()
     import uvicorn
 

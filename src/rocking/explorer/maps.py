@@ -208,7 +208,7 @@ def texts_at(grid: MapGrid, x: float, y: float) -> dict[str, str]:
 
 
 def _peak_at(grid: MapGrid, at: Mapping[str, float]) -> float | None:
-    """Return the peak acceleration at a point of the map, m/s^2; None if the motion is unchanged."""
+    """Return the peak acceleration at a point of the map, m/s^2, or None if the motion is unchanged."""
     if "a" in at:
         return at["a"] * _lifting(grid, math.radians(at["alpha"]) if "alpha" in at else None)
     if "pga" in at:

@@ -45,7 +45,7 @@ _READERS: Final[Mapping[str, Callable[[str], Any]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Body of a mesh, with the name and outline of its file; ``call`` is the Python expression."""
+    """Body of a mesh, with its file name and outline; ``call`` is the Python expression."""
 
     solid: Solid
     sections: Sections

@@ -78,7 +78,7 @@ def lifting(case: Case) -> float:
 
 
 def slowest(case: Case) -> float:
-    """Return the frequency parameter of the block, rad/s; the smaller of two."""
+    """Return the (smaller) frequency parameter of the block, rad/s."""
     return min(side.p for side in case.block.sides)
 
 

@@ -94,7 +94,7 @@ def _state(response: Response, time: float, rotation: float) -> dict[str, Any]:
 
 
 def _ground(shown: Simulated, time: float) -> dict[str, float | None]:
-    """Return the ground accelerations at a time, g; None for missing motions."""
+    """Return the ground accelerations at a time, g, or None for missing motions."""
     motion = shown.case.motion
     both = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}
     return {

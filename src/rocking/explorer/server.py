@@ -331,7 +331,7 @@ class _Stream(NamedTuple):
 
 
 def _next(stream: _Stream, motion: str) -> bytes | None:
-    """Return the next part or an error as bytes; None at the end."""
+    """Return the next part or an error as bytes, or None at the end."""
     try:
         part = next(stream.parts, None)
     except RockingError as error:

@@ -160,7 +160,7 @@ class StudyView:
         return {name: list(dict.fromkeys(map(float, pair))) for name, pair in pairs.items()}
 
     def _drawn(self, quantity: str) -> Any:
-        """Return the outcome to draw; outcomes that a simulation left open are `OPEN`."""
+        """Return the outcome to draw, or `OPEN` if the simulation left it open."""
         results = self.study.results()
         found = results[quantity]
         if quantity != "overturned":

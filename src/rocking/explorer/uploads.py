@@ -32,9 +32,8 @@ TOO_LARGE: Final = (
     f"a file may be {LARGEST // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
 )
 
-#: Maximum number of files, forty stations of three components, and their bytes; further records are rejected, so that
+#: Maximum number of files, forty stations of three components, and their bytes. Further records are rejected, so that
 #: none disappears unnoticed.
-#: goes unseen.
 MOST: Final = 120
 ALL: Final = 256 * 2**20
 
@@ -71,7 +70,7 @@ class Upload(NamedTuple):
 
 
 class Recent(Generic[V]):
-    """Least-recently-used cache with limited total weight; thread-safe."""
+    """Thread-safe least-recently-used cache with limited total weight."""
 
     def __init__(self, most: float, weight: Callable[[V], float] = lambda _: 1.0) -> None:
         self._most, self._weight = most, weight
@@ -99,7 +98,7 @@ class Recent(Generic[V]):
 
 
 class UploadStore:
-    """Files and motions by keys; thread-safe."""
+    """Thread-safe store of files and motions by keys."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -143,7 +142,7 @@ class UploadStore:
         return key
 
     def take(self, name: str, data: bytes) -> dict[str, Any]:
-        """Store a file, and describe it; unreadable files are not stored."""
+        """Store a file, unless it is unreadable, and describe it."""
         key = self.add_file(name, data)
         try:
             return self.contents(key)

@@ -59,8 +59,8 @@ STYLE: Final[dict[Any, Any]] = {
 #: A number with too many decimals.
 _LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
 
-#: Letter width relative to the font size: mean, and for short labels; letters per legend handle.
-#: and gaps take.
+#: Letter width relative to the font size: mean, and for short labels; letters that the handle
+#: and gaps of a legend line take.
 _LETTER: Final = 0.52
 _WIDE_LETTER: Final = 0.53
 _HANDLE: Final = 5

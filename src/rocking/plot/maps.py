@@ -29,8 +29,6 @@ _LATER: Final = "#b0390c"
 #: Colours and hatches of regions in which the block stays, and in which it overturns after 0, 1, ... impacts, from
 #: darkest to lightest; hatches distinguish them in greyscale. The second of the regions in which it stays is the
 #: darkest, because it is often a strip that must remain visible between the others.
-#: from darkest to lightest: hatched, so that none is taken for one of the others in grey. The second one of those in
-#: which it stays is the darkest, as it is often a strip and must be seen between the others.
 _STAYS: Final = (("#ffffff", ""), ("#5d7da6", ""), ("#dde7f0", ""))
 _OVERTURNS_AFTER_REST: Final = ("#b0390c", "ooo")
 _UNFINISHED: Final = ("#b5b5b5", "++")

@@ -99,7 +99,6 @@ def branch_figure(
 
 #: Colour and marker area (points squared) of each sweep direction. The first of two is larger, so that both are
 #: visible.
-#: the second is seen on it, and the first around it.
 _LOOKS: Final = ((INK, 4.0), (ABOVE, 0.9))
 _ALONE: Final = ((INK, 0.9),)
 
