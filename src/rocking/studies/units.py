@@ -28,7 +28,7 @@ from rocking.simulation.ensemble import VARIABLES, Product
 #: All outcomes of a simulation, in the order of the encoding.
 OUTCOMES: Final = tuple(VARIABLES)
 
-#: Block count that units are a multiple of; the engine integrates so many blocks together.
+#: Unit sizes are multiples of this number of blocks, which the engine integrates together.
 _GROUP: Final = 512
 
 #: Maximum number of simulations in a unit.
