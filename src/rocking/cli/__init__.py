@@ -1,4 +1,4 @@
-"""Command line: thin commands over the public names, in modules that are imported when they are called."""
+"""Command line: thin wrappers of the public functions, imported when called."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ app = App(
 
 
 def _lines_of(module: str) -> dict[str, str]:
-    """Return the first line of what each function says of itself; nothing is imported for a list of commands."""
+    """Return the first docstring line of each function, without importing the module."""
     parsed = ast.parse(Path(__file__).with_name(f"{module}.py").read_text("utf-8"))
     functions = [each for each in parsed.body if isinstance(each, ast.FunctionDef)]
     return {each.name: (ast.get_docstring(each) or "").partition("\n")[0] for each in functions}
@@ -57,7 +57,7 @@ def _version(*, verbose: bool = False) -> None:
     Parameters
     ----------
     verbose
-        Add the versions of Python and of the libraries below, and which compiled code serves this installation.
+        Also list the versions of Python and of the required libraries, and the compiled code in use.
     """
     import platform
     from importlib import metadata
@@ -84,12 +84,12 @@ app.register_install_completion_command(help="Install completion of commands and
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0 when done, 2 with one line on stderr for bad input, 130 when interrupted."""
-    # Figures are written to files here, so no toolkit of windows need be started for them.
+    """Run the command line and exit: 0 on success, 2 with one line on stderr for bad input, 130 if interrupted."""
+    # Figures are only written to files, so no GUI toolkit is needed.
     os.environ.setdefault("MPLBACKEND", "agg")
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # what the locale cannot encode is shown as question marks
+            stream.reconfigure(errors="replace")  # characters outside the locale become question marks
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         _run(given)
@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:
         pass
     except BrokenPipeError:
-        # The reader of our output has gone; so must Python's own last flush.
+        # The reader of the output has gone, so Python's final flush must not write either.
         _close_output()
         return
     except Exception as error:
@@ -107,20 +107,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 raise
             print(f"rocking: {sentence}", file=sys.stderr)
             sys.exit(2)
-    # Not within `except`: its traceback would keep the iterators whose threads end when they are closed.
+    # Outside `except`: the traceback would keep alive iterators that own threads.
     print(INTERRUPTED, file=sys.stderr)
     sys.exit(130)
 
 
 def _is_of_an_interrupt(error: BaseException | None) -> bool:
-    """Whether an error was raised in place of an interrupt, as by a lock of `threading` within which that fell."""
+    """Whether an error replaced an interrupt, as in a lock of `threading`."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
     return error is not None
 
 
 def _sentence(error: Exception, given: list[str]) -> str:
-    """Return an error as one line that names options; nothing where it is a fault of the program."""
+    """Return an error as one line that names options; empty for a bug of the program."""
     if isinstance(error, DamagedStudy):
         return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
     if isinstance(error, RockingError):
@@ -129,7 +129,7 @@ def _sentence(error: Exception, given: list[str]) -> str:
         sentence = " ".join(str(error).split()).rstrip(".")
         return sentence if sentence.endswith("?") else f"{sentence}; see {_named(given)} --help"
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
-        # Files have their own sentence: this is what is printed, to a disk that is full.
+        # File errors have their own sentence; this is printing to a full disk.
         _close_output()
         return f"the output cannot be written: {os.strerror(error.errno)}; send it elsewhere"
     if isinstance(error, OSError) and error.filename is not None:
@@ -138,10 +138,10 @@ def _sentence(error: Exception, given: list[str]) -> str:
 
 
 def _run(given: list[str]) -> None:
-    """Call the command that is given."""
+    """Run the command in the arguments."""
     called = command_of(given)
     if called.default_command is not None:
-        called.help = None  # The help of a command is all that its function says, not its line in the list.
+        called.help = None  # The help of a command is its whole docstring, not its line in the list.
     command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
     refuse_unknown_options(bound.args, given)
     quiet = any(getattr(value, "quiet", False) for value in bound.arguments.values())
@@ -151,14 +151,14 @@ def _run(given: list[str]) -> None:
 
 
 def _close_output() -> None:
-    """Send to nowhere what is still to be printed."""
+    """Discard all remaining output."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def spelling_of(command: App) -> Spelling:
-    """Return how a command writes the name of an argument: as its option, if it has that option."""
+    """Return a function that spells an argument as the command's option, if there is one."""
 
-    @functools.cache  # Nothing is asked of the command before a message names an argument.
+    @functools.cache  # The command is inspected only when a message names an argument.
     def options() -> frozenset[str]:
         return frozenset(_options(command))
 
@@ -166,25 +166,25 @@ def spelling_of(command: App) -> Spelling:
 
 
 def command_of(arguments: Sequence[str]) -> App:
-    """Return the command that is called, or the program where none is; to the parser --help is a command as well."""
+    """Return the called command, or the program if there is none. The parser treats --help as a command."""
     return app.parse_commands(arguments)[1][len(_words(arguments))]
 
 
 def refuse_unknown_options(given: Iterable[object], arguments: Sequence[str]) -> None:
-    """Check that no name of a record is an option that the command does not have; after "--" any name may be one."""
+    """Check that no record name is an unknown option. After "--" any name is allowed."""
     typed = arguments[: arguments.index("--")] if "--" in arguments else arguments
     for name in given:
         if isinstance(name, str) and name.startswith("-") and name.lstrip("-")[:1].isalpha() and name in typed:
             option = name.partition("=")[0]
-            # Short names are too alike for a guess: a suggestion must not lead to another quantity.
+            # Short names are too alike to guess: a suggestion must not lead to another quantity.
             known = [each for each in _options(command_of(arguments)) if min(len(each), len(option)) > len("--pga")]
             words = {each.lstrip("-"): each for each in known}
-            hint = meant(option.lstrip("-"), words, "see its --help", 0.8)  # a slip: a letter or two of six
+            hint = meant(option.lstrip("-"), words, "see its --help", 0.8)  # a typo of one or two letters in six
             raise InvalidOption(f"{_named(arguments)} has no option {option}; {hint}")
 
 
 def _named(arguments: Sequence[str]) -> str:
-    """Return how the command that is called is typed."""
+    """Return the called command as it is typed."""
     return " ".join(["rocking", *_words(arguments)])
 
 
@@ -193,7 +193,7 @@ def _words(arguments: Sequence[str]) -> list[str]:
 
 
 def _options(command: App) -> Iterable[str]:
-    """Options of a command, without the arguments that need no name."""
+    """Return the options of a command without its positional arguments."""
     if command.default_command is None:
         return ()
     arguments = command.assemble_argument_collection()

@@ -1,4 +1,4 @@
-"""`rocking spectrum`, `map`, `ida`, `measures`: many simulations, one answer; `chatter`, `critical`: theory."""
+"""`rocking spectrum`, `map`, `ida` and `measures`: many simulations; `chatter` and `critical`: theory."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from rocking.inputs.bodies import block_of, note_likely_mistakes
 from rocking.inputs.declared import SHAPES
 from rocking.inputs.quantities import angle, length, tilt, values
 
-#: Descriptions of a block, of which the slenderness alone may be known.
+#: Descriptions of a block for which the slenderness alone suffices.
 _SLENDER: Final = tuple(
     shape._replace(needed=("alpha",), optional=("p",)) if "alpha" in shape.needed else shape for shape in SHAPES
 )
@@ -61,25 +61,25 @@ def spectrum(
 ) -> None:
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
 
-    Lists of numbers are 1,2,5 or START:STOP:COUNT, with :log at the end for equal ratios. In the results, peaks are
-    null where the block overturns. --out holds spectrum.png, .pdf, .nc, fractiles.csv, peaks.csv (of every motion) and
-    result.json.
+    Lists of numbers are written 1,2,5 or START:STOP:COUNT, followed by :log for equal ratios. In the results, peaks
+    are null if the block overturns. --out contains spectrum.png, .pdf, .nc, fractiles.csv, peaks.csv (every motion)
+    and result.json.
 
     Parameters
     ----------
     alpha
-        Slendernesses, as 10deg,15deg or 0.1:0.3:5 (rad); or give --ensemble.
+        Slendernesses, for example 10deg,15deg or 0.1:0.3:5 (rad). Alternatively use --ensemble.
     p
-        Frequency parameters, rad/s; or give --size.
+        Frequency parameters, rad/s. Alternatively use --size.
     size
-        Half diagonals of rectangular blocks, as 0.5,1 (m) or 50cm:5m:10; or give --p.
+        Half diagonals of rectangular blocks, for example 0.5,1 (m) or 50cm:5m:10. Alternatively use --p.
     restitution
-        Restitutions; Housner's by default.
+        Coefficients of restitution; Housner's by default.
     ensemble
-        The ensemble.csv that rocking calibrate writes, in place of slendernesses and restitutions: its blocks are made
-        larger or smaller together, so that their median p is each of --p (by default half to twice their own).
+        File ensemble.csv from rocking calibrate, instead of slendernesses and restitutions. Its blocks are scaled
+        together, so that their median p equals each of --p (by default half to twice their own).
     fractiles
-        Shares of the motions that stay below the fractile curves.
+        Fractions of the motions that stay below the fractile curves.
     against
         Abscissa of the figure.
     """
@@ -126,10 +126,10 @@ def map(
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Map what a pulse does to a block, over amplitude and frequency, with refined boundaries.
+    """Map the outcomes of a pulse over its amplitude and frequency, with refined boundaries.
 
-    Lists of numbers are 1,2,5 or START:STOP:COUNT, with :log at the end for equal ratios. --out holds map.png, .pdf,
-    .nc, modes.csv, boundaries.csv and result.json.
+    Lists of numbers are written 1,2,5 or START:STOP:COUNT, followed by :log for equal ratios. --out contains map.png,
+    .pdf, .nc, modes.csv, boundaries.csv and result.json.
 
     Parameters
     ----------
@@ -137,19 +137,19 @@ def map(
         sine (with --cycles), half-sine, one-sine, one-cosine, ricker (with --kind) or mavroeidis-papageorgiou (with
         --phase and --gamma).
     amplitudes
-        Peak accelerations over the smallest that lifts the block.
+        Peak accelerations divided by the uplift acceleration.
     frequencies
-        2 pi times the pulse's frequency, over the block's p.
+        2 pi times the pulse's frequency, divided by the block's p.
     cycles
-        Cycles of a sine.
+        Number of cycles of a sine.
     phase
         Phase of a sine or a Mavroeidis-Papageorgiou pulse, 90deg or 1.57 (rad).
     gamma
         Length of a Mavroeidis-Papageorgiou pulse in cycles.
     kind
-        symmetric or antisymmetric, of a Ricker pulse.
+        Kind of a Ricker pulse: symmetric or antisymmetric.
     tolerance
-        Width, relative to the amplitude, that boundaries are refined to.
+        Width of the refined boundaries, relative to the amplitude.
     """
     given: dict[str, Any] = {
         "cycles": cycles,
@@ -181,15 +181,15 @@ def ida(
 ) -> None:
     """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
 
-    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Without
-    --levels, they go in steps of 5 % to three times that by which every motion has overturned the block. Bands and
-    gaps between two levels are not seen; close ones see more of them. --out holds ida.png, .pdf, .nc, levels.csv,
-    bands.csv (of levels that overturn) and result.json.
+    The block is a rectangle (--width, --height, or half of each) or described by its parameters (--p, --alpha). By
+    default --levels increase in steps of 5 % to three times the level by which every motion has overturned the block.
+    Bands and gaps between two levels are missed. Closer levels miss fewer. --out contains ida.png, .pdf, .nc,
+    levels.csv, bands.csv (levels that overturn) and result.json.
 
     Parameters
     ----------
     tolerance
-        Width, relative to the level, that the ends of bands are refined to.
+        Width of the refined ends of bands, relative to the level.
     """
     body = block.body()
     with output.folder() as folder:
@@ -209,22 +209,22 @@ def measures(
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Compare intensity measures: how widely motions scatter, by each, at which they first overturn a block.
+    """Compare intensity measures by the scatter of the intensities at which motions first overturn a block.
 
-    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha), or the
-    ensemble of a calibration stands for it (--ensemble). Every motion is scaled up until it overturns the block. --out
-    holds measures.png, .pdf, .nc, measures.csv, intensities.csv (at which each motion overturns) and result.json.
+    The block is a rectangle (--width, --height, or half of each), described by its parameters (--p, --alpha), or an
+    ensemble from a calibration (--ensemble). Every motion is scaled up until it overturns the block. --out contains
+    measures.png, .pdf, .nc, measures.csv, intensities.csv (at which each motion overturns) and result.json.
 
     Parameters
     ----------
     periods
         Periods of spectral accelerations, s: 0.5,1,2 or 0.2:4:10:log.
     damping
-        Their fraction of critical damping.
+        Fraction of critical damping of the spectral accelerations.
     clusters
-        Which records belong together, and count as one in the intervals: station joins components of one station in
-        one earthquake, as files name them; or a label for each record, with commas between. By default each is on its
-        own.
+        Groups of records, each of which counts as one in the intervals: station groups the components of one station
+        in one earthquake, as named in the files; or a label for each record, separated by commas. By default each
+        record is a group.
     """
     bodies = block.blocks(model)
     with output.folder() as folder:
@@ -242,7 +242,7 @@ def measures(
 def _deliver(
     found: DatasetResult, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
 ) -> None:
-    """Write and print an analysis, whose tables name each motion by the record that was read, too."""
+    """Write and print an analysis, with the records of the motions."""
     result = found.to_dict()
     if read is not None:
         result |= read.to_dict()
@@ -251,7 +251,7 @@ def _deliver(
 
 
 def _slender(options: BlockOptions) -> Block:
-    """Return a block, of which the slenderness alone may be given: p is then 1."""
+    """Return a block for which the slenderness alone suffices: p is then 1."""
     values = options.read()
     if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
         raise InvalidBlock(
@@ -273,27 +273,27 @@ def chatter(
     table: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.
+    """Compute how long a slender block chatters under a sine and whether it comes to rest, by every method.
 
-    Times are dimensionless, p t; with --p also in seconds. --out holds chatter.png, .pdf (intervals between
-    the impacts), result.json, impacts.csv and cycles.csv.
+    Times are dimensionless, p t, with --p also in seconds. --out contains chatter.png, .pdf (intervals between the
+    impacts), result.json, impacts.csv and cycles.csv.
 
     Parameters
     ----------
     a
-        Amplitude of the ground acceleration over g alpha, at least 1.
+        Amplitude of the ground acceleration divided by g alpha, at least 1.
     omega
-        Frequency of the ground acceleration (rad/s) over the block's p.
+        Frequency of the ground acceleration (rad/s) divided by the block's p.
     eta
         Coefficient of restitution.
     p
-        The block's frequency parameter, rad/s.
+        Frequency parameter of the block, rad/s.
     order
-        Terms of the expansion in a - 1, 1 to 40.
+        Number of terms of the expansion in a - 1, 1 to 40.
     resolved
-        Impacts that the semi-analytical method resolves; by default as many as the restitution asks for.
+        Number of impacts that the semi-analytical method resolves. The default depends on the restitution.
     table
-        Show the paper's iterative procedure (Eqs 62 and 64): some of its cycles; all are in cycles.csv.
+        Show some cycles of the paper's iterative procedure (Eqs 62 and 64). cycles.csv contains all.
     """
     with output.folder() as folder:
         report = chattering_report(a, omega, eta, order=order, resolved=resolved, p=p)
@@ -310,14 +310,14 @@ def chatter(
 
 
 def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPUT] = OutputOptions()) -> None:
-    """Give the amplitude up to which chattering under a sine is complete, by every method.
+    """Compute the amplitude up to which chattering under a sine is complete, by every method.
 
-    --out holds result.json.
+    --out contains result.json.
 
     Parameters
     ----------
     omega
-        Frequency of the ground acceleration (rad/s) over the block's p.
+        Frequency of the ground acceleration (rad/s) divided by the block's p.
     eta
         Coefficient of restitution.
     """

@@ -1,4 +1,4 @@
-"""`rocking calibrate` and `validate`: the block behind observed outcomes or a measured history, and its predictions."""
+"""`rocking calibrate` and `validate`: estimate a block from outcomes or a rotation history, and test predictions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from rocking.errors import InvalidOption
 from rocking.inputs.quantities import bounds, number, tilt
 from rocking.motion.motion import Motion
 
-#: Blocks to try, unless it is said.
+#: Default number of candidate blocks.
 _CANDIDATES: Final = 8192
 
 
@@ -54,41 +54,41 @@ def calibrate(
     file: Annotated[ScaledPulseOptions, RECORDS] = ScaledPulseOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Find the block behind observed outcomes (overturned or not), or behind a measured rotation history.
+    """Estimate the block from observed outcomes (overturned or not) or from a measured rotation history.
 
-    DATA is a CSV table with a header. Outcomes: columns motion (a record file, a shipped record, or a pulse) and
-    overturned (1 or 0), and where wanted scale, vertical, channel, dt_s, units and group. A history: columns time_s and
-    rotation_rad (or rotation_deg). The motions of --predict, --motion and --pulse may be scaled. --out holds
-    calibration.png, .pdf, result.json and, of outcomes, ensemble.csv.
+    DATA is a CSV table with a header. Columns for outcomes: motion (a record file, a shipped record, or a pulse),
+    overturned (1 or 0), and optionally scale, vertical, channel, dt_s, units and group. Columns for a history: time_s
+    and rotation_rad (or rotation_deg). The motions of --predict, --motion and --pulse may be scaled. --out contains
+    calibration.png, .pdf, result.json and, for outcomes, ensemble.csv.
 
     Parameters
     ----------
     data
         CSV table of outcomes or of a history.
     model
-        Equation of motion; the linear one is faster, and serves slender specimens.
+        Equation of motion. The linear one is faster and suits slender specimens.
     p
-        Lowest and highest thinkable frequency parameter, rad/s, with a comma between; or a known value.
+        Lowest and highest plausible frequency parameter, rad/s, separated by a comma; or a known value.
     alpha
-        Likewise the slenderness, as 5deg,20deg or 0.1,0.3 (rad).
+        Likewise the slenderness, for example 5deg,20deg or 0.1,0.3 (rad).
     restitution
-        Likewise the factor on the angular speed at an impact; of outcomes also housner, to follow from the slenderness
-        (of two sides as those of one rectangle).
+        Likewise the coefficient of restitution; for outcomes also housner, which computes it from the slenderness (two
+        sides are treated as one rectangle).
     two_sided
-        Whether the two sides of the block may differ; by default yes for outcomes, no for a history.
+        Whether the two sides of the block may differ. By default yes for outcomes, no for a history.
     candidates
-        Outcomes: blocks to try, about; more where its runs disagree.
+        Outcomes: approximate number of blocks to try. More are tried if the runs disagree.
     folds
-        Outcomes: parts for cross-validation; 0: none. Tests of one group stay together.
+        Outcomes: number of folds for cross-validation; 0: none. Tests of one group stay together.
     predict
-        Outcomes: records to predict, files or names of shipped records; pulses to predict go with --pulse.
+        Outcomes: records to predict, files or names of shipped records. Use --pulse for pulses.
     motion
-        History: record of the base's motion, or give one --pulse; without either, the block was released and rocked
+        History: record of the base's motion, or use one --pulse; without either, the block was released and rocked
         freely.
     initial_rotation
-        History: rotation at time 0, 2deg or 0.03 (rad); by default fitted in a release test, 0 under a motion.
+        History: rotation at time 0, 2deg or 0.03 (rad). By default fitted for a release test, 0 under a motion.
     seed
-        The same seed gives the same result.
+        Seed of the random numbers. The same seed reproduces the result.
     """
     ranges = {
         "p": None if p is None else bounds(p, "p", number),
@@ -116,7 +116,7 @@ def calibrate(
             found: Calibration | HistoryCalibration = calibrate_history(table.times, table.rotation, shaking, **choices)
             result, text = found.to_dict(), found.summary()
         else:
-            # Outcomes that cannot be calibrated, and more folds than groups, are refused before the work.
+            # Invalid outcomes, and more folds than groups, are rejected before the computation.
             fell = checked_outcomes([test.overturned for test in table], len(table)).tolist()
             if folds:
                 group_labels([test.group for test in table], len(table), folds)
@@ -131,7 +131,7 @@ def calibrate(
 
 
 def _motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
-    """Read records and pulses; refuse what is said of motions where there are none."""
+    """Read records and pulses and reject options of motions if there are none."""
     motions = {name: file.motion(name) for name in records} | file.pulses()
     for name in {} if motions else file.given("scale", "pga", "pgv", "sa", "vertical"):
         raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
@@ -141,7 +141,7 @@ def _motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> d
 def _of_outcomes(
     found: Calibration, tests: Sequence[ShakeTest], others: Mapping[str, Motion], folds: int
 ) -> tuple[dict[str, Any], str]:
-    """Return numbers and words of a calibration, with predictions and a cross-validation where they are asked for."""
+    """Return the numbers and text of a calibration, optionally with predictions and a cross-validation."""
     predicted = dict(zip(others, found.predict([*others.values()]), strict=True))
     numbers, parts = {**found.to_dict(), "predicted": predicted}, [found.summary()]
     if folds:
@@ -165,22 +165,22 @@ def validate(
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Judge what a block, or the ensemble of a calibration, predicts of tests against what was observed.
+    """Compare the predictions of a block, or of an ensemble from a calibration, with observed outcomes of tests.
 
-    TESTS is a CSV table with a row for each test: motion (a record file beside it, a shipped record, or a pulse), where
-    wanted scale, vertical, channel, dt_s and units; overturned (1 or 0); and where wanted name and group (rows with the
-    same belong together). --out holds validation.png, .pdf, tests.csv and result.json.
+    TESTS is a CSV table with a row for each test and the columns motion (a record file beside it, a shipped record, or
+    a pulse), overturned (1 or 0), and optionally scale, vertical, channel, dt_s, units, name and group (rows of the
+    same group belong together). --out contains validation.png, .pdf, tests.csv and result.json.
 
     Parameters
     ----------
     tests
         CSV table of tests.
     lapse
-        Chance that an outcome is not that of a rocking block at all; by default 0.
+        Probability that an outcome is unrelated to the rocking of the block, by default 0.
     bins
-        Bins of the reliability diagram.
+        Number of bins of the reliability diagram.
     seed
-        Seed of the simulations for bands and chances.
+        Seed of the simulations for bands and probabilities.
     """
     with output.folder() as folder:
         rows = read_tests(tests, **file.about())

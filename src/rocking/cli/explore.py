@@ -1,4 +1,4 @@
-"""`rocking explore`: the explorer's page."""
+"""`rocking explore`: the explorer."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ def explore(
     address: str = "127.0.0.1",
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
-    """Open a page on which a block is seen to rock, chatter, rest and fall.
+    """Open an interactive page that shows how a block rocks, chatters, comes to rest and overturns.
 
-    One line is printed, with a link that opens the page once, in one browser. Ctrl-C ends it.
+    The command prints a link that opens the page once, in one browser. Press Ctrl-C to stop.
 
     Parameters
     ----------
     motion
-        What shakes the block at first: a shipped record, a record file, or a pulse; or the folder of a study, whose
-        results are shown as maps.
+        Initial ground motion: a shipped record, a record file, or a pulse; or the folder of a study, whose results are
+        shown as maps.
     port
-        Port to listen on; by default one that is free.
+        Port of the server, by default a free one.
     no_open
         Do not open a browser.
     address
-        Address of this machine to listen on. Others than 127.0.0.1 can be reached from other machines.
+        Address of this machine for the server. Addresses other than 127.0.0.1 can be reached from other machines.
     """
     from rocking.explorer.launch import require_packages, served
 
@@ -56,7 +56,7 @@ def explore(
 
 
 def _study(folder: Path) -> StudyView:
-    """Study in a folder, to be shown as maps."""
+    """Return the study in a folder, for display as maps."""
     from rocking.explorer.studies import StudyView
     from rocking.studies.folder import exists
 
@@ -67,7 +67,7 @@ def _study(folder: Path) -> StudyView:
 
 
 def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
-    """Texts of the motion that the page opens with."""
+    """Return the texts of the initial motion."""
     from rocking.explorer.motions import is_pulse, pulse_of
     from rocking.records.formats.source import unreadable
 

@@ -1,4 +1,4 @@
-"""`rocking fragility`: curves that are fitted to outcomes, simulated or observed, and what follows for a site."""
+"""`rocking fragility`: curves fitted to simulated or observed outcomes, and the resulting rates at a site."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from rocking.simulation.ensemble import Polarity
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Time of probabilities, unless it is said.
+#: Default time for probabilities, years.
 _YEARS: Final = 50.0
 
 
@@ -64,27 +64,27 @@ def fragility(
     model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Fit the probability that a block overturns, or passes a rotation, against the intensity of the motions.
+    """Fit the probability that a block overturns, or exceeds a rotation, against the intensity of the motions.
 
-    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha), or the
-    ensemble of a calibration stands for it (--ensemble). With --levels every motion is scaled to each (stripes);
-    without, motions are taken as they are (a cloud). Or outcomes that were observed are fitted (--outcomes), without
-    records and block. --out holds fragility.png, .pdf, .csv, outcomes.csv (record, intensity, peak, outcome),
-    result.json, and fragility.xml (NRML 0.5).
+    The block is a rectangle (--width, --height, or half of each), described by its parameters (--p, --alpha), or an
+    ensemble from a calibration (--ensemble). With --levels every motion is scaled to each level (stripes); otherwise
+    motions are used unscaled (a cloud). --outcomes fits observed outcomes instead, without records and block. --out
+    contains fragility.png, .pdf, .csv, outcomes.csv (record, intensity, peak, outcome), result.json, and fragility.xml
+    (NRML 0.5).
 
     Parameters
     ----------
     outcomes
-        CSV table of what was observed: a column overturned (1 or 0; with a column trials, how many of them), and the
-        intensity (pga_g, pgv_m_s, sa_g with --period) or the motion (a record file, a shipped record, or a
-        pulse, of which the --measure is taken); and where wanted group: outcomes that belong together.
+        CSV table of observations: a column overturned (1 or 0; with a column trials, their number), the intensity
+        (pga_g, pgv_m_s, sa_g with --period) or the motion (a record file, a shipped record, or a pulse, for which
+        --measure is computed), and optionally group: outcomes that belong together.
     limits
-        Limit states, with commas between: overturning, or NAME=ROTATION over slenderness, as half=0.5.
+        Limit states, separated by commas: overturning, or NAME=ROTATION divided by the slenderness, as half=0.5.
     polarity
-        Motions as they are (+), reversed (-), or both; a symmetric block does the same in both, which count once.
+        Motions as they are (+), reversed (-), or both. A symmetric block responds equally to both, which count once.
     clusters
-        Which records belong together, for the intervals: station joins components of one station in one earthquake, as
-        files name them; or a label for each record, with commas between. By default each is on its own.
+        Groups of records for the intervals: station groups the components of one station in one earthquake, as named
+        in the files; or a label for each record, separated by commas. By default each record is a group.
     confidence
         Probability of the intervals and bands.
     taxonomy
@@ -95,10 +95,10 @@ def fragility(
     site
         Row of OpenQuake's file, from 0.
     years
-        Time for which probabilities are given.
+        Time of the probabilities, years.
     standing
-        Years for which the block has stood: adds how strongly and how often it was not shaken, and with --hazard how
-        probable that is; survival.png and .pdf to --out.
+        Years for which the block has stood: adds upper bounds on how strongly and how often it was shaken, with
+        --hazard the probability of its survival, and survival.png and .pdf to --out.
     """
     if outcomes is not None:
         beside = {
@@ -170,7 +170,7 @@ def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
 
 
 def _limit_of_standing(names: list[str]) -> str:
-    """Name the limit that a block has not passed in a time: overturning, or the only one."""
+    """Return the limit that a standing block has not exceeded: overturning, or the only one."""
     if len(names) > 1 and "overturning" not in names:
         sentence = f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}"
         raise InvalidOption(sentence, "standing", "limits", value=names)
@@ -178,7 +178,7 @@ def _limit_of_standing(names: list[str]) -> str:
 
 
 def _with_records(found: Fragility, records: list[dict[str, Any]]) -> Fragility:
-    """Name the motion of each outcome by the record that was read, too."""
+    """Add the record to the name of the motion of each outcome."""
     if not records or found.outcomes is None:
         return found
     named = found.outcomes.copy()
@@ -188,7 +188,7 @@ def _with_records(found: Fragility, records: list[dict[str, Any]]) -> Fragility:
 
 @contextlib.contextmanager
 def _outcomes_kept(folder: Path | None) -> Iterator[None]:
-    """Write what was simulated although no curve can be fitted to it."""
+    """Write simulated outcomes even if the fit fails."""
     try:
         yield
     except Unfitted as refused:
@@ -199,7 +199,7 @@ def _outcomes_kept(folder: Path | None) -> Iterator[None]:
 
 
 def _hazard(file: Path | None, site: int, years: float, period: float | None) -> HazardCurve | None:
-    """Read a hazard curve, where there is one, with notes on what looks like a mistake."""
+    """Read a hazard curve, if any, with notes."""
     if file is None:
         for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
             if is_given:

@@ -1,4 +1,4 @@
-"""`rocking mesh`: a body from a mesh, how it resists in every direction, and the blocks that it is."""
+"""`rocking mesh`: a body from a mesh, its resistance in every direction, and equivalent blocks."""
 
 from __future__ import annotations
 
@@ -33,34 +33,34 @@ def mesh(
     restitution: str | None = None,
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Make a body from a mesh: its mass, how it resists in every direction, and the blocks that it is.
+    """Compute the mass of a body from a mesh, its resistance in every direction, and the equivalent blocks.
 
-    FILE is an OBJ, PLY, STL or glTF file, or another that trimesh reads, or "statue", a mesh that ships. x is to the
-    east and y to the north; azimuths are in degrees clockwise from north. --out holds rose.png, .pdf, .csv (uplift,
-    slenderness and p over the azimuth), .nc, support.csv, with --azimuth blocks.csv, and result.json.
+    FILE is an OBJ, PLY, STL or glTF file, another format that trimesh reads, or "statue", the shipped mesh. x points
+    east and y north. Azimuths are in degrees clockwise from north. --out contains rose.png, .pdf, .csv (uplift
+    acceleration, slenderness and p against the azimuth), .nc, support.csv, with --azimuth blocks.csv, and result.json.
 
     Parameters
     ----------
     file
-        The mesh.
+        Mesh file.
     azimuth
-        Azimuths of blocks to list, degrees: 0,45,90 or 0:165:12; their pivots, height of mass and gyration are those
-        that other commands take.
+        Azimuths of blocks to list, degrees: 0,45,90 or 0:165:12. Other commands accept their pivots, height of mass
+        and gyration.
     density
-        Density, kg/m^3; or of each part, as plinth=2700,figure=2650. Without it all is of one density.
+        Density, kg/m^3; or the density of each part, as plinth=2700,figure=2650. By default the density is uniform.
     support
-        Corners of the support, m, as "0.3,0.2;-0.3,0.2;0,-0.2"; by default those of the mesh near the ground.
+        Corners of the support, m, as "0.3,0.2;-0.3,0.2;0,-0.2". By default the corners of the mesh near the ground.
     tolerance
-        How far above the lowest corner others still carry, as 0.002 (m) or 0.2cm; by default a thousandth of the
-        height.
+        Height above the lowest corner up to which corners carry load, as 0.002 (m) or 0.2cm. By default a thousandth of
+        the height.
     up
-        Axis that points up: x, y, z, -x, -y, -z, or a vector, 0.1,0,1; by default z, of glTF files y.
+        Axis that points up: x, y, z, -x, -y, -z, or a vector, 0.1,0,1. By default z, for glTF files y.
     unit
         Unit of the coordinates: m, cm, mm, in, ft, or its length in m.
     turn
-        Degrees, clockwise seen from above, by which the mesh is turned.
+        Rotation of the mesh, degrees, clockwise seen from above.
     restitution
-        Factor on the angular speed at an impact, in (0, 1]; one or two; by default from angular momentum.
+        Coefficient of restitution, in (0, 1], one or two. By default from conservation of angular momentum.
     """
     with output.folder() as folder:
         if restitution is not None and azimuth is None:
@@ -94,7 +94,7 @@ def mesh(
 
 
 def _row(azimuth: float, block: Block) -> dict[str, float]:
-    """Row of a table: a block as its pivots describe it, and the parameters of both sides; with notes on it."""
+    """Return a table row with a block's pivots and the parameters of both sides, with notes on the block."""
     for sentence in block_notes(block):
         note(f"azimuth {azimuth:g}: {sentence}")
     plus, minus = block.sides
@@ -114,5 +114,5 @@ def _row(azimuth: float, block: Block) -> dict[str, float]:
 
 
 def _numbers(text: str, name: str) -> Sequence[float]:
-    """Return numbers with commas between."""
+    """Return numbers separated by commas."""
     return [number(part, name) for part in text.split(",")]

@@ -1,4 +1,4 @@
-"""Options that several commands share, made from the declared inputs: bodies, motions, intensity, model, treatment."""
+"""Options shared by several commands, built from the declared inputs."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
 Made = TypeVar("Made")
 Options = TypeVar("Options", bound="InputOptions")
 
-#: Spread over the command's own options, each group under its own heading in the help.
+#: Spread over the options of a command, each group under its own heading in the help.
 MEASURE: Final = Parameter(name="*", group=Group("Intensity", sort_key=0))
 BLOCK: Final = Parameter(name="*", group=Group("Block", sort_key=1))
 RECORDS: Final = Parameter(name="*", group=Group("Records", sort_key=2))
 MODEL: Final = Parameter(name="*", group=Group("Model", sort_key=3))
 
-#: Records as arguments: a lone hyphen is one, too.
+#: Records as arguments, including a lone hyphen.
 Names = Annotated[
     str,
     Parameter(
@@ -57,7 +57,7 @@ def hint(text: str) -> Parameter:
 
 
 def written(text: str) -> Parameter:
-    """Return the help of an option whose value is a number as people write it, which may begin with a minus sign."""
+    """Return the help of a numeric option whose value may begin with a minus sign."""
     return Parameter(help=text, allow_leading_hyphen=True)
 
 
@@ -67,7 +67,7 @@ def _whole(_: Any, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
 
-#: How a whole number is read: the parser itself would round 1.5 to one.
+#: Reader of integers; the parser itself would round 1.5 to an integer.
 WHOLE: Final = Parameter(converter=_whole)
 
 
@@ -76,12 +76,12 @@ class InputOptions:
     """Texts of some inputs."""
 
     def given(self, *names: str) -> dict[str, Any]:
-        """Return the texts that are given, or those of them that have these names."""
+        """Return the texts that were supplied, or the named ones."""
         texts = {each.name: getattr(self, each.name) for each in fields(self)}
         return {n: text for n, text in texts.items() if text not in (None, False, ()) and (not names or n in names)}
 
     def read(self, *names: str) -> dict[str, Any]:
-        """Return the values of what is given, or of those of them that have these names."""
+        """Return the values of the supplied texts, or of the named ones."""
         return {name: INPUTS[name].read(text) for name, text in self.given(*names).items() if name in INPUTS}
 
 
@@ -90,7 +90,7 @@ _TYPES: Final[Mapping[str, tuple[Any, Any]]] = {"flag": (bool, False), "texts": 
 
 
 def _with(*names: str) -> Callable[[type[Options]], type[Options]]:
-    """Give a class of options a field for each of some inputs."""
+    """Add a field for each of some inputs to a class of options."""
 
     def decorated(options: type[Options]) -> type[Options]:
         made: list[Any] = []
@@ -108,10 +108,10 @@ def _with(*names: str) -> Callable[[type[Options]], type[Options]]:
 
 @_with(*(name for name in declared.BLOCK if name != "mass"))
 class BlockOptions(InputOptions):
-    """A block by its sizes, by its parameters, or by its pivots."""
+    """Block described by its sizes, parameters, or pivots."""
 
     def block(self) -> Block:
-        """Return the block, with notes on what looks like a mistake."""
+        """Return the block, with notes on likely mistakes."""
         block = bodies.block_of(self.read(*declared.BLOCK))
         bodies.note_likely_mistakes([block])
         return block
@@ -119,10 +119,10 @@ class BlockOptions(InputOptions):
 
 @_with("mass", *declared.HELD)
 class HeldOptions(BlockOptions):
-    """A block, and what holds it back or pushes it."""
+    """Block with restraints."""
 
     def body(self) -> Body:
-        """Return the block, with its restraints where there are some."""
+        """Return the block, with its restraints if any."""
         given, block = self.given(), bodies.block_of(self.read(*declared.BLOCK))
         forces = [_made(declared.FORCES[name], text, name) for name in declared.FORCES for text in given.get(name, ())]
         for name, couple in declared.COUPLES.items():
@@ -134,14 +134,14 @@ class HeldOptions(BlockOptions):
         except InvalidBlock as wrong:
             if not forces or wrong.argument != "offset":
                 raise
-            raise InvalidBlock(literal(str(wrong))) from wrong  # that of a restraint, where --offset is the block's own
+            raise InvalidBlock(literal(str(wrong))) from wrong  # offset of a restraint, not the --offset of the block
         bodies.note_likely_mistakes([block], [body])
         return body
 
 
 @dataclass(frozen=True)
 class EnsembleOptions(HeldOptions):
-    """A block by its sizes or by its parameters, or the ensemble of a calibration."""
+    """Block described by its sizes or parameters, or an ensemble from a calibration."""
 
     ensemble: Annotated[
         Path | None,
@@ -157,7 +157,7 @@ class EnsembleOptions(HeldOptions):
         return ensemble_of(self.ensemble, model)
 
     def of_block(self) -> list[str]:
-        """Return the options of a block that are given."""
+        """Return the supplied options of a block."""
         return [name for name in self.given() if name != "ensemble"]
 
 
@@ -171,7 +171,7 @@ def ensemble_of(file: Path, model: ModelOptions) -> dict[str, Any]:
 
 @contextmanager
 def _about(option: str) -> Iterator[None]:
-    """Say of which option a parameter is that is wrong, whose name may be that of another option."""
+    """Add the option to errors on its parameters, because other options share their names."""
     try:
         yield
     except RockingError as wrong:
@@ -179,7 +179,7 @@ def _about(option: str) -> Iterator[None]:
 
 
 def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
-    """Make what an option describes by NAME=VALUE."""
+    """Create an object from an option with NAME=VALUE pairs."""
     given: dict[str, Any] = {}
     flags = {name for name, each in inspect.signature(kind).parameters.items() if isinstance(each.default, bool)}
     for part in text.split(","):
@@ -198,16 +198,16 @@ def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
 
 @_with("channel", "dt", "units")
 class FileOptions(InputOptions):
-    """What a record file does not say."""
+    """Metadata that a record file lacks."""
 
     def about(self) -> dict[str, Any]:
         """Return channel, step and units as arguments."""
         return {"channel": None, "dt": None, "units": None} | self.read("channel", "dt", "units")
 
     def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
-        """Return the motion of a record or a pulse, with its vertical component and scaled, with notes on it."""
+        """Return the scaled motion of a record or pulse, with notes."""
         given, vertical = self.given(), self.given().get("vertical")
-        # A mistake in the options is reported before a long file is read.
+        # Mistakes in the options are reported before a long file is read.
         target = scaling({n: given[n] for n in ("scale", "pga", "pgv", "sa") if n in given}, positive_acceleration)
         if is_pulse:
             motion = named_pulse(name)
@@ -233,20 +233,20 @@ class FileOptions(InputOptions):
 
 @_with("vertical", "scale", "pga", "pgv", "sa", "pulse")
 class ScaledPulseOptions(FileOptions):
-    """One record at a time, and pulses, scaled."""
+    """One record at a time, or pulses, scaled."""
 
 
 class ReadRecords(NamedTuple):
-    """Records that were read, and pulses.
+    """Motions of records and pulses.
 
     Attributes
     ----------
     motions : dict of str to Motion
-        Motions by the names that were asked for.
+        Motions by the names in the command.
     skipped : dict of str to str
-        Why records could not be read.
+        Reasons why records could not be read.
     single : bool
-        Whether one record or pulse was named by itself, and no folder or pattern that happens to hold one.
+        Whether the command names one record or pulse itself, rather than a folder or pattern with one match.
     """
 
     motions: dict[str, Motion]
@@ -254,14 +254,14 @@ class ReadRecords(NamedTuple):
     single: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Return for machines what stands for each record in other tables, and what was skipped."""
+        """Return the records and skipped files for JSON."""
         from rocking.analysis.survey import record_columns
 
         return {"records": record_columns([*self.motions], [*self.motions.values()]), "skipped": self.skipped}
 
 
 def refusal(name: str, error: RockingError) -> str:
-    """Return why a record cannot be read, with its name, in the words of the command line."""
+    """Return why a record cannot be read, for the command line."""
     reason = error.text(lambda argument: option_of(argument) if argument in ("channel", "dt", "units") else argument)
     return reason if error.path == name else f"{name}: {reason}"
 
@@ -269,7 +269,7 @@ def refusal(name: str, error: RockingError) -> str:
 def read_each(
     names: Sequence[str], read: Callable[[str], Made], *, keep_going: bool
 ) -> tuple[dict[str, Made], dict[str, str]]:
-    """Read records one after the other; return what was read, and why others cannot be where it goes on."""
+    """Read records one by one; return the motions and, if reading continues after errors, the errors."""
     found: dict[str, Made] = {}
     refused: dict[str, str] = {}
     with Progress("reading records", total=len(names)) as progress:
@@ -286,14 +286,14 @@ def read_each(
 
 @dataclass(frozen=True)
 class _RecordOptions(FileOptions):
-    """Several records, and pulses."""
+    """Several records and pulses."""
 
     keep_going: Annotated[
         bool, Parameter(name="--keep-going", negative="", help="Skip records that cannot be read, and list them.")
     ] = False
 
     def read_all(self, names: Sequence[str]) -> ReadRecords:
-        """Return the motions of records, folders of them, patterns and pulses, by the name of each."""
+        """Return the motions by name."""
         records, pulses = expanded(names), self.given().get("pulse", ())
         if not records and not pulses:
             raise InvalidOption(
@@ -316,17 +316,17 @@ class _RecordOptions(FileOptions):
 
 @_with("vertical", "pulse")
 class UnscaledOptions(_RecordOptions):
-    """Several records, and pulses, with their vertical motions, that an analysis scales itself."""
+    """Several records and pulses with vertical motions, scaled by the analysis itself."""
 
 
 @_with("vertical", "scale", "pga", "pgv", "sa", "pulse")
 class MotionOptions(_RecordOptions):
-    """Several records, and pulses, scaled."""
+    """Several records and pulses, scaled."""
 
 
 @dataclass(frozen=True)
 class IntensityOptions:
-    """How the intensity of motions is measured."""
+    """Intensity measure of motions."""
 
     measure: Annotated[
         IntensityName,
@@ -340,13 +340,13 @@ class IntensityOptions:
 
     @property
     def wanted(self) -> Measure:
-        """Measure of intensity."""
+        """Return the intensity measure."""
         return Measure(self.measure, self.period, self.damping)
 
 
 @dataclass(frozen=True)
 class MeasureOptions(IntensityOptions):
-    """How the intensity of motions is measured, and its levels."""
+    """Intensity measure of motions, and its levels."""
 
     levels: Annotated[
         str | None,
@@ -365,19 +365,19 @@ class MeasureOptions(IntensityOptions):
 
 @dataclass(frozen=True)
 class ModelOptions:
-    """The equation of motion."""
+    """Equation of motion."""
 
     equation: Annotated[Model | None, Parameter(name="--model", help=INPUTS["model"].help)] = None
 
     @property
     def model(self) -> Model:
-        """Equation of motion, nonlinear unless it is said."""
+        """Return the equation of motion; nonlinear by default."""
         return self.equation or "nonlinear"
 
 
 @dataclass(frozen=True)
 class TreatmentOptions(ModelOptions):
-    """The equation of motion, and how chattering ends."""
+    """Equation of motion and treatment of chattering."""
 
     chattering: Annotated[str, hint(INPUTS["chattering"].help)] = "certified"
 
@@ -390,18 +390,18 @@ class TreatmentOptions(ModelOptions):
 
 @_with("duration", "initial_rotation", "initial_velocity")
 class StartOptions(InputOptions):
-    """How a simulation starts and ends."""
+    """Start and end of a simulation."""
 
 
 def labels_of(clusters: str | None) -> str | list[str] | None:
-    """Return what an option says of motions that belong together."""
+    """Return the labels of an option that groups motions."""
     from rocking.analysis.levels import BY_STATION
 
     return clusters if clusters in (None, BY_STATION) else [label.strip() for label in clusters.split(",")]
 
 
 def positive_acceleration(text: str, name: str) -> float:
-    """Return a positive acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
+    """Return a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
     if not acceleration(text, name) > 0.0:
         raise InvalidOption(
             f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
@@ -410,7 +410,7 @@ def positive_acceleration(text: str, name: str) -> float:
 
 
 def _ratio(text: str, name: str) -> float:
-    """Return a level of a measure in the block's own units."""
+    """Return a level of a measure in the units of the block."""
     try:
         return number(text, name)
     except InvalidOption:
@@ -419,7 +419,7 @@ def _ratio(text: str, name: str) -> float:
 
 
 def limits_of(text: str) -> dict[str, float]:
-    """Return limit states by name: overturning, or rotations over slenderness, as half=0.5."""
+    """Return limit states by name: overturning, or rotations divided by the slenderness, as half=0.5."""
     limits = {}
     for part in text.split(","):
         name, given, value = part.strip().partition("=")

@@ -1,4 +1,4 @@
-"""What comes out of a command: a folder for it, writing into that, printing, and the options that say so."""
+"""Output of a command: its folder, files, printing, and the options for them."""
 
 from __future__ import annotations
 
@@ -27,48 +27,48 @@ OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))
 
 @dataclass(frozen=True)
 class QuietOptions:
-    """What every command takes."""
+    """Options of every command."""
 
     quiet: Annotated[bool, Parameter(name="--quiet", negative="", help="No notes on stderr.")] = False
 
 
 @dataclass(frozen=True)
 class PrintOptions(QuietOptions):
-    """How a result is printed."""
+    """Options for printing a result."""
 
     as_json: Annotated[bool, Parameter(name="--json", negative="", help="Print the result as JSON.")] = False
 
 
 @dataclass(frozen=True)
 class OutputOptions(PrintOptions):
-    """How a result is printed, and where its files go."""
+    """Options for printing a result and for its files."""
 
     out: Annotated[Path | None, Parameter(help="Folder for the files: figures, tables, result.json.")] = None
 
     def folder(self) -> AbstractContextManager[Path | None]:
-        """Make the folder, if one is wanted, before the work; on failure, remove it again where it is empty."""
+        """Create the folder, if any; on failure, remove it if empty."""
         return nullcontext() if self.out is None else output_folder(self.out, listed=not self.as_json)
 
 
 def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
-    """Write figures (PNG and PDF), given by name as what draws them, and a result (JSON) into a folder."""
+    """Write named figures (PNG and PDF) and a result (JSON) into a folder."""
     for stem, draw in figures.items():
         with left_out(f"{stem}.png and {stem}.pdf"):
             figure = draw()
             write_figure(folder / f"{stem}.png", figure, dpi=160)
             write_figure(folder / f"{stem}.pdf", figure)
-    write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
+    write_text(folder / "result.json", to_json(result) + "\n")  # last: marks a complete folder
 
 
 def write_tables(folder: Path, found: Result) -> None:
-    """Write every table of a result into a folder, each into a file of its name."""
+    """Write every table of a result into its own file in a folder."""
     for table in found.TABLES:
         found.to_csv(folder / f"{table}.csv", table)
 
 
 @contextmanager
 def left_out(files: str) -> Iterator[None]:
-    """Go on without files whose content is refused, with a note why: what was computed is not lost for them."""
+    """Skip files whose content is rejected, with a note."""
     try:
         yield
     except InvalidOption as error:
@@ -84,7 +84,7 @@ def deliver(
     result: Mapping[str, Any] | None = None,
     **figure: Any,
 ) -> None:
-    """Write a result into a folder where there is one (figure, tables, dataset, result), and print it."""
+    """Write a result into a folder, if any (figure, tables, dataset, result), and print it."""
     result = found.to_dict() if result is None else result
     if folder is not None:
         write_tables(folder, found)
@@ -94,27 +94,27 @@ def deliver(
 
 
 def print_result(result: Mapping[str, Any], text: str, *, as_json: bool) -> None:
-    """Print a result, for machines or for people."""
+    """Print a result as JSON or as text."""
     print(to_json(result) if as_json else text)
 
 
 @contextmanager
 def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
-    """Make a folder for results, and say what was written; on failure, remove what was made and is empty.
+    """Create a folder for results and report the written files; on failure, remove new empty folders.
 
-    What was replaced is noted; what was written is printed where it is `listed`.
+    Replaced files are noted. If `listed`, the written files are printed.
 
     Raises
     ------
     OutputError
-        If it cannot be made or written to.
+        If the folder cannot be created or written to.
     """
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     before = _written_at(folder)
     try:
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=folder).close()  # it can be written to
+            tempfile.TemporaryFile(dir=folder).close()  # checks that the folder is writable
         except OSError as error:
             sentence = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
             raise OutputError(sentence, "out", path=str(folder)) from error
@@ -133,7 +133,7 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
 
 
 def subfolder(folder: Path, name: str) -> Path:
-    """Make a folder in that of the results, unless it is there."""
+    """Create a folder in the folder of the results, unless it exists."""
     try:
         (folder / name).mkdir(exist_ok=True)
     except OSError as error:
@@ -142,6 +142,6 @@ def subfolder(folder: Path, name: str) -> Path:
 
 
 def _written_at(folder: Path) -> dict[str, int]:
-    """Return the times, ns, at which the files in a folder and below it were written, by their names in it."""
+    """Return the modification times, ns, of the files below a folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
     return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}

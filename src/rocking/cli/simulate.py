@@ -1,4 +1,4 @@
-"""`rocking simulate` and `check`: one block under records; `rocking records` and `pulses`: the motions there are."""
+"""`rocking simulate` and `check`: one block under records; `rocking records` and `pulses`: available motions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ from rocking.simulation.simulate import simulate as run
 
 @dataclass(frozen=True)
 class _Start(StartOptions):
-    """How a simulation starts and ends, and what is asked of it."""
+    """Start and end of a simulation, and optional results."""
 
     friction: Annotated[
         float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
@@ -69,23 +69,23 @@ def simulate(
     model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Simulate one block under a record and say what happens to it; under several, with one line for each.
+    """Simulate one block under a record and describe its response; for several records, print one line each.
 
-    The block is a rectangle (--width, --height, or half of each; --offset where its centre of mass is off the middle),
-    or given by its parameters (--p, --alpha) or by its pivots (--pivots, --height-of-mass, --gyration). It may be held
-    back or pushed (--tendon, --spring, --damper, --thrust, --load), lean, or rock one way (--one-sided). Of one record
-    --out holds response.png, .pdf, .csv, .nc, events.csv, impacts.csv and result.json; of several, summary.csv,
-    summary.json and (if openpyxl is installed) summary.xlsx.
+    The block is a rectangle (--width, --height, or half of each; --offset if its centre of mass is not in the middle),
+    or described by its parameters (--p, --alpha) or pivots (--pivots, --height-of-mass, --gyration). It may be
+    restrained or pushed (--tendon, --spring, --damper, --thrust, --load), lean, or rock to one side only (--one-sided).
+    For one record --out contains response.png, .pdf, .csv, .nc, events.csv, impacts.csv and result.json; for several,
+    summary.csv, summary.json and (if openpyxl is installed) summary.xlsx.
 
     Parameters
     ----------
     each
-        Of several records: write the files of each into a folder of its own below --out, too.
+        Also write the files of each of several records into its own folder below --out.
     energy
-        Draw the phase plane (phase-plane.png, .pdf) and the energy over time (energy.png, .pdf) into --out, too.
+        Also draw the phase plane (phase-plane.png, .pdf) and the energy against time (energy.png, .pdf) into --out.
     """
     if start.friction is not None:
-        friction_coefficient(start.friction)  # before the work
+        friction_coefficient(start.friction)  # checked before the simulation
     steps_within(start.precision)
     shown: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
     body = block.body()
@@ -118,9 +118,9 @@ def simulate(
 def _result(
     response: Response, record: str, shown: dict[str, Any], folder: Path | None, energy: bool
 ) -> dict[str, Any]:
-    """Return the result, and write it with figures, histories and events into a folder where there is one."""
+    """Return the result, and write it with figures, histories and events into a folder, if any."""
     result = response.to_dict(**shown)
-    # Its motion is named by the record that was read, too, as in tables of many.
+    # The record also names the motion, as in tables of several records.
     result |= {"motion": {"record": record, **result["motion"]}}
     if folder is not None:
         response.to_csv(folder / "response.csv")
@@ -144,13 +144,13 @@ def check(
 ) -> None:
     """Compare rules of thumb with the simulated response of a block under records.
 
-    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Numbers are
-    demand over capacity: from 1 on the block overturns. --out holds check.csv and result.json.
+    The block is a rectangle (--width, --height, or half of each) or described by its parameters (--p, --alpha). Numbers
+    are demand divided by capacity: a rule predicts overturning from 1 on. --out contains check.csv and result.json.
 
     Parameters
     ----------
     rules
-        Some of west,ishiyama,housner,asce_43_05,priestley; by default all.
+        Some of west,ishiyama,housner,asce_43_05,priestley. By default all.
     """
     body = block.block()
     chosen = None if rules is None else [name.strip() for name in rules.split(",")]
@@ -169,9 +169,9 @@ def records(
     file: Annotated[FileOptions, RECORDS] = FileOptions(),
     output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
 ) -> None:
-    """List the shipped records, or show what record files hold and what the reader took them for.
+    """List the shipped records, or show the content of record files and how it was interpreted.
 
-    Of several files those that cannot be read are listed with the reason, and the exit status is 2.
+    For several files, those that cannot be read are listed with the reason, and the exit status is 2.
     """
     files = expanded(names)
     several = len(files) > 1
@@ -201,7 +201,7 @@ def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
 
 
 def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
-    """List the pulses that --pulse takes, with their parameters and, where they need not be given, their defaults."""
+    """List the pulses that --pulse accepts, with their parameters and defaults."""
     families = FAMILIES.values()
     if output.as_json:
         units = [{name: one.unit(name) for name in (*one.needed, *one.optional)} for one in families]
@@ -215,7 +215,7 @@ def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
 
 
 def _listed(family: PulseFamily, parameters: Mapping[str, Any]) -> str:
-    """Return parameters of a pulse with their units and defaults."""
+    """Return the parameters of a pulse with units and defaults."""
     units = {name: f" ({family.unit(name)})" if family.unit(name) else "" for name in parameters}
     defaults = {
         name: "" if value is None else f" = {value:g}" if isinstance(value, float) else f" = {value}"

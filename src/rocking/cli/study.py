@@ -1,4 +1,4 @@
-"""`rocking study`: simulations too many for one sitting, from a text file to results."""
+"""`rocking study`: long runs of simulations, from a text file to results."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ from rocking.studies.study import Study, study_of
 
 study = App(name="study")
 
-#: Units that are named where some failed, at most.
+#: Maximum number of failed units that are named.
 _SHOWN: Final = 5
 
-#: What writes a study, by the end of the file's name.
+#: Writers of a study, by the suffix of the file.
 FORMATS: Final = {".nc": Study.to_netcdf, ".csv": Study.to_csv, ".parquet": Study.to_parquet}
 
 
 @study.command
 def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT] = QuietOptions()) -> None:
-    """Write a commented file to start from.
+    """Write a commented template of a study file.
 
     Parameters
     ----------
     file
-        TOML file to write; one that is there is left alone.
+        TOML file to write. An existing file is not replaced.
     """
     if file.exists():
         raise OutputError("the file is there already: choose another name, or remove it first", path=str(file))
@@ -61,16 +61,17 @@ def create(
     unit_blocks: Annotated[int | None, WHOLE] = None,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
-    """Create the study of a file in a folder; with the folder there, check that it is the same study.
+    """Create the study of a file in a folder; if the folder exists, check that it contains the same study.
 
     Parameters
     ----------
     file
-        TOML file, as `rocking study new` writes one.
+        TOML file, as created by `rocking study new`.
     folder
-        Folder where the study is kept.
+        Folder of the study.
     unit_blocks
-        Blocks of a unit, a multiple of 512, of one motion and scale; by default a unit takes about five seconds.
+        Number of blocks in a unit (one motion and scale), a multiple of 512. By default a unit runs for about five
+        seconds.
     """
     print(f"{folder}: {_created(file, folder, unit_blocks).status}; next: rocking study run {folder}")
 
@@ -84,18 +85,18 @@ def run(
     part: str | None = None,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
-    """Compute what is missing; after Ctrl-C, SIGTERM or anything else, run it again to go on.
+    """Compute the missing units; after Ctrl-C, SIGTERM or any other interruption, run it again to continue.
 
     Parameters
     ----------
     folder
-        Folder where the study is kept; or its TOML file, from which it is created first.
+        Folder of the study; or its TOML file, from which the study is created first.
     into
-        With a file, the folder where the study is kept; by default one beside the file, of its name without .toml.
+        With a file, the folder of the study. By default beside the file, with its name without .toml.
     threads
-        Number of threads; by default one for every core.
+        Number of threads, by default one for every core.
     part
-        Compute a fixed share of the units only, as 3/10; shares may run at the same time, as an array of jobs.
+        Fixed share of the units to compute, as 3/10. Shares may run at the same time, as an array of jobs.
     """
     if into is not None and not folder.endswith(".toml"):
         raise InvalidOption(f"{into} is for a study from a TOML file, which {folder} is not; name one place only")
@@ -113,12 +114,12 @@ def run(
 
 @study.command
 def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
-    """Say how far a study has come, also while it runs.
+    """Show the progress of a study, also while it runs.
 
     Parameters
     ----------
     folder
-        Folder where the study is kept.
+        Folder of the study.
     """
     state = Study(folder).status
     print_result({"folder": folder, **asdict(state)}, f"{folder}: {state}", as_json=output.as_json)
@@ -132,16 +133,16 @@ def verify(
     repair: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
-    """Read and check every unit; compute some units again and compare all bits.
+    """Read and check every unit, recompute some units and compare all bits.
 
     Parameters
     ----------
     folder
-        Folder where the study is kept.
+        Folder of the study.
     recompute
-        How many units, drawn at random, to compute again.
+        Number of units, drawn at random, to compute again.
     repair
-        Compute damaged units again and store them.
+        Recompute damaged units and store them.
     """
     found = Study(folder)
     faults = found.verify(recompute, repair=repair)
@@ -166,12 +167,12 @@ def export(
     Parameters
     ----------
     folder
-        Folder where the study is kept.
+        Folder of the study.
     file
-        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv) or Parquet (.parquet); units are in the
-        names of its columns.
+        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv) or Parquet (.parquet); its column names
+        contain the units.
     critical
-        Write the scales between which this verdict on a block changes instead.
+        Write the scales between which this outcome of a block changes instead.
     """
     if file.suffix not in FORMATS:
         raise InvalidOption(f"a study is exported to {', '.join(FORMATS)}, not to {file.name}", "file", value=file)
@@ -196,17 +197,17 @@ def report(
     Parameters
     ----------
     folder
-        Folder where the study is kept.
+        Folder of the study.
     out
-        Folder for what is made; by default the folder report in that of the study.
+        Folder for the results. By default the folder report in the folder of the study.
     limits
-        Limit states, with commas between: overturning, or NAME=ROTATION over slenderness, as half=0.5.
+        Limit states, separated by commas: overturning, or NAME=ROTATION divided by the slenderness, as half=0.5.
     together
         Fit one curve to the outcomes of all blocks together.
     confidence
         Probability of the intervals.
     fractiles
-        Shares of the motions that stay below the fractiles of the spectrum.
+        Fractions of the motions that stay below the fractiles of the spectrum.
     """
     found, made = Study(folder), dict[str, Result]()
     fit = found.fragility if together else found.block_fragilities

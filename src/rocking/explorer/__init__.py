@@ -1,6 +1,7 @@
-"""The explorer: a local page on which a block is seen to rock, chatter, rest and fall.
+"""Explorer: a local web page that shows how a block rocks, chatters, comes to rest and overturns.
 
-`parameters` specifies what a case can be given; `inputs` reads it from texts and writes it as Python and as a command;
-`core` makes arrays and words of it, `maps` grids of many; they know no web. `server` answers requests and knows no
-mechanics; `authentication` checks each request before; `launch` starts them. The page itself is in `page/`.
+`parameters` specifies the inputs of a case. `inputs` reads them from texts, and `code` writes them as Python and as a
+command. `core` computes arrays and words for a case, `maps` for grids of cases. Both are independent of the web.
+`server` answers requests without any mechanics; `authentication` checks each request first; `launch` starts them. The
+page itself is in `page/`.
 """

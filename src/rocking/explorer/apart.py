@@ -1,6 +1,6 @@
-"""A mesh of a foreign file, read by a process of its own: it has so much time and memory, and nothing beside the file.
+"""Read the mesh of an untrusted file in a separate process, with limited time and memory and no other input.
 
-Readers of meshes are many, and what hostile files make of them is not known; a process can be ended.
+There are many mesh readers, and their behaviour with malicious files is unknown; however, a process can be killed.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from rocking.solid.support import Sections, sections_of
 if TYPE_CHECKING:
     from rocking.solid.mesh import Mesh
 
-#: Triangles of a mesh at most: some six seconds of work.
+#: Maximum number of triangles of a mesh; about six seconds of work.
 MOST_TRIANGLES: Final = 500_000
 
-#: Processor time, s, and memory, bytes, that the process has; and how long it is waited for, s.
+#: Limits of the process: processor time, s, memory, bytes, and waiting time, s.
 _SECONDS: Final = 20
 _MEMORY: Final = 2 * 2**30
 _PATIENCE: Final = 60.0
 
-#: Libraries that would take memory for every processor.
+#: Libraries that would allocate memory for every processor.
 _ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
-#: What `rocking.Solid` is made from, and the sections of its outline.
+#: Arguments of `rocking.Solid`, and the sections of its outline.
 Made = tuple[dict[str, Any], Sections]
 
 
 def made_here(mesh: Mesh, options: Mapping[str, Any]) -> Made:
-    """Read a mesh with some arguments of `rocking.Solid.from_mesh`; it has `MOST_TRIANGLES` at most."""
+    """Read a mesh of up to `MOST_TRIANGLES` triangles with arguments of `rocking.Solid.from_mesh`."""
     given = {"density": None, "support": None, "tolerance": None, "up": None, "unit": "m", "turn": 0.0, **options}
     made, surfaces = properties(mesh, **given, most=MOST_TRIANGLES)
     return made, sections_of(surfaces)
 
 
 def made_apart(name: str, data: bytes, options: Mapping[str, Any]) -> Made:
-    """Read the content of a file in a process that ends after so much time or memory."""
+    """Read the content of a file in a process with limited time and memory."""
     head = json.dumps({"name": name, "options": dict(options)}).encode()
     places = os.pathsep.join(each for each in sys.path if each)
     environment = {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONPATH": places}
@@ -62,7 +62,7 @@ def made_apart(name: str, data: bytes, options: Mapping[str, Any]) -> Made:
 
 
 def made_of(answer: str | bytes) -> Made:
-    """Read what the process has answered."""
+    """Decode the answer of the process."""
     found = json.loads(answer)
     if "error" in found:
         kind, template, arguments, path = found["error"]
@@ -75,7 +75,7 @@ def made_of(answer: str | bytes) -> Made:
 
 
 def answered(data: bytes) -> dict[str, Any]:
-    """Read what `made_apart` sends, and return what it reads."""
+    """Decode the input from `made_apart`, read the mesh, and return the result."""
     head, _, content = data.partition(b"\n")
     asked = json.loads(head)
     stream = io.BytesIO(content)
@@ -90,7 +90,7 @@ def answered(data: bytes) -> dict[str, Any]:
 
 
 def _limit_this_process() -> None:
-    """Limit memory and time where the system can; where it cannot, the time is waited for."""
+    """Limit memory and time if the system can; otherwise only the waiting time is limited."""
     try:
         import resource
     except ImportError:  # Windows
@@ -100,7 +100,7 @@ def _limit_this_process() -> None:
         (resource.RLIMIT_CPU, _SECONDS, _SECONDS + 1),
         (resource.RLIMIT_CORE, 0, 0),
     ):
-        # A lower limit may be set already, and macOS refuses one of memory.
+        # A lower limit may be set already, and macOS rejects limits of memory.
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(kind, (soft, hard))
 

@@ -1,4 +1,4 @@
-"""An assessment of a case's block: fragility over the records of a list, friction, rules of thumb, margin; no web."""
+"""Assessment of a case's block: fragility over a list of records, friction, rules of thumb, margin. No web."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from rocking.response.mechanics import friction_coefficient
 from rocking.rules import overturning_velocity, rate
 from rocking.simulation.simulate import simulate
 
-#: Levels of a fragility, and points of its curve.
+#: Minimum and maximum number of levels of a fragility.
 _LEAST, _MOST = 2, 60
 
-#: Levels of the margin are this times the one before, from the lowest that lifts the block, as many at most, and so
-#: many are simulated at once; the first that overturns is then closed in on.
+#: Ratio of successive levels of the margin from the uplift level on, and the number of levels simulated at once; the
+#: first level that overturns is then refined.
 _STEP: Final = 1.05
 _AT_ONCE: Final = 16
 
-#: Rules of thumb that are shown, what each says, and where it comes from.
+#: Displayed rules of thumb and their sources.
 RULES: Final[Mapping[str, str]] = {
     "uplift": "Housner (1963), Bull. Seism. Soc. Am. 53(2), 403–417",
     "west": "Milne and Omori (1893), Seism. J. Japan 1, 59–86",
@@ -60,7 +60,7 @@ print(found.summary())
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """A case, the entries of its list of records with ``clusters`` by station, and the levels of a measure."""
+    """Case, entries of its list of records with ``clusters`` by station, and levels of a measure."""
 
     case: Case
     entries: list[dict[str, str]]
@@ -72,12 +72,12 @@ class Assessment:
 
     @property
     def stations(self) -> int | None:
-        """How many stations there are, where several entries are of one."""
+        """Number of stations if several entries share one, else None."""
         count = len(set(self.clusters))
         return count if count < len(self.entries) else None
 
     def record(self, k: int) -> Found:
-        """Read one record; the list is not held in memory as a whole."""
+        """Read one record, because the whole list is not stored in memory."""
         return read_motion(self.entries[k], self.uploads)
 
     def motion(self, k: int) -> Motion:
@@ -86,7 +86,7 @@ class Assessment:
 
 
 def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
-    """Read what is assessed: ``records`` as `catalogue.entries_of`, ``measure``, its levels, and ``friction``."""
+    """Read an assessment: ``records`` as in `catalogue.entries_of`, ``measure``, its levels, and ``friction``."""
     given = {name: texts[name].strip() for name in ASSESSMENT if texts.get(name, "").strip()}
     entries = entries_of(given.get("records", ""))
     if not entries:
@@ -122,7 +122,7 @@ def _measure(given: Texts) -> Measure:
 
 
 def described(assessment: Assessment) -> dict[str, Any]:
-    """Say what is assessed, and what is known before anything is computed."""
+    """Return a description of the assessment that needs no simulation."""
     case, measure = assessment.case, assessment.measure
     block = case.block
     notes = []
@@ -156,7 +156,7 @@ def described(assessment: Assessment) -> dict[str, Any]:
 
 
 def parts(assessment: Assessment) -> Generator[Payload]:
-    """Simulate one record after the other, fit what has come so far, and find the margin of the case in the end."""
+    """Simulate the records one by one, fit the outcomes so far, and finally compute the margin of the case."""
     case, count = assessment.case, len(assessment.entries)
     fallen: list[Floats] = []
     for k in range(count):
@@ -168,7 +168,7 @@ def parts(assessment: Assessment) -> Generator[Payload]:
 
 
 def _stripes(assessment: Assessment, motion: Motion) -> Floats:
-    """Return 1 where the block overturns, at each level and in each polarity, else 0; NaN where that is not known."""
+    """Return 1 (overturns), 0 or NaN (unknown) at each level and polarity."""
     case = assessment.case
     many = Blocks.of(case.block)
     table = simulate_levels(
@@ -182,8 +182,8 @@ def _stripes(assessment: Assessment, motion: Motion) -> Floats:
 
 
 def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Floats]) -> Payload:
-    """Return what is sent with a part: the curve through all outcomes so far, as `rocking.fragility` fits it."""
-    outcomes = np.stack(fallen, axis=1)  # level, motion, polarity, in the order of `rocking.fragility`
+    """Return the payload of a part: the curve of `rocking.fragility` through all outcomes so far."""
+    outcomes = np.stack(fallen, axis=1)  # level, motion, polarity, as in `rocking.fragility`
     levels = np.broadcast_to(assessment.levels[:, None, None], outcomes.shape).ravel()
     own = np.array(assessment.clusters[: len(fallen)])
     clusters = np.broadcast_to(own[None, :, None], outcomes.shape).ravel()
@@ -212,7 +212,7 @@ def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Floats]) 
 
 
 def _row(assessment: Assessment, motion: Motion) -> dict[str, Any]:
-    """Say what a record does as it is: what becomes of the block, and which friction it needs."""
+    """Return the outcome of an unscaled record and the friction that it requires."""
     case = assessment.case
     response = simulate(case.block, motion, model=case.model, chattering=case.treatment)
     friction = assessment.friction
@@ -228,7 +228,7 @@ def _row(assessment: Assessment, motion: Motion) -> dict[str, Any]:
 
 
 def _rated(case: Case, motion: Motion) -> dict[str, Any]:
-    """Measures of a motion, and demand over capacity by every rule."""
+    """Return measures of a motion, and demand divided by capacity by every rule."""
     ratings = rate(case.block, motion, ["west", "ishiyama"])
     found = {name: float(rating.ratio[0]) for name, rating in ratings.items()}
     uplift = motion.pga / min(case.block.uplift_thresholds(case.model))
@@ -238,7 +238,7 @@ def _rated(case: Case, motion: Motion) -> dict[str, Any]:
 def _margin(case: Case) -> dict[str, Any] | None:
     """Return the lowest factor on the case's motion that overturns the block, or None, and the peak acceleration.
 
-    Levels that overturn may be several bands; what is thinner than a step from the level of uplift is not seen.
+    Overturning levels may form several bands; bands thinner than a step from the uplift level are missed.
     """
     motion = case.motion
     if motion is None or motion.pga == 0.0:
@@ -273,13 +273,13 @@ def _motion(entry: Texts, uploads: UploadStore) -> Motion:
 
 
 def _sudden(case: Case) -> float:
-    """Sudden ground velocity after which the block just overturns, of the weaker side, m/s."""
+    """Return the sudden ground velocity, m/s, that just overturns the block on its weaker side."""
     return float(overturning_velocity(Blocks.of(case.block)).min())
 
 
 def _range(case: Case, measure: Measure, motions: Iterable[Motion]) -> tuple[float, float]:
-    """Levels from where the first record lifts the block to where half of them are strong enough to overturn it."""
-    # Twice the sudden velocity that overturns the block at one blow.
+    """Return the level at which the first record lifts the block, and one at which half of them may overturn it."""
+    # Twice the sudden velocity that overturns the block.
     lifting, sudden = min(case.block.uplift_thresholds(case.model)), 2.0 * _sudden(case)
     values = [(measure.value(motion), motion.pga, motion.pgv) for motion in motions]
     low = min(lifting * value / pga for value, pga, _ in values)
@@ -288,13 +288,13 @@ def _range(case: Case, measure: Measure, motions: Iterable[Motion]) -> tuple[flo
 
 
 def _rounded(level: float, towards: Any) -> float:
-    """Return an acceleration of two digits, in g."""
+    """Return an acceleration rounded to two digits, in g."""
     step = 10.0 ** (math.floor(math.log10(level / STANDARD_GRAVITY)) - 1)
     return float(f"{towards(level / STANDARD_GRAVITY / step) * step:.6g}") * STANDARD_GRAVITY
 
 
 def as_python(assessment: Assessment) -> str:
-    """Write a script that computes the same curve; it runs as it stands."""
+    """Write a complete script that computes the same curve."""
     case, measure = assessment.case, assessment.measure
     given = {
         "model": None if case.model == "nonlinear" else case.model,

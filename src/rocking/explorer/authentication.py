@@ -1,31 +1,32 @@
-"""Authentication of requests: one person's browser, on this machine, is let in, and nobody else.
+"""Authentication of requests: only the browser of one user on this machine has access.
 
-It is an ASGI application outside everything else. Each request, whatever its method and path,
+This is an ASGI application around all others. Each request, whatever its method and path,
 
-- names this server in its one Host header, else 421;
-- has no Origin header, or one that names this server, else 403; and where it does more than read, it has that header,
-  or Sec-Fetch-Site says that a page of this server sends it;
-- and carries the secret in its Authorization header, else 403, unless it only reads the page or one of its files, which
-  are the same for everybody and say nothing of what is shown.
+- names this server in exactly one Host header, else 421;
+- has no Origin header, or one that names this server, else 403. Requests that do more than read require this header,
+  or a Sec-Fetch-Site header that names a page of this server as the sender;
+- contains the secret in its Authorization header, else 403, unless it only reads the page or one of its files, which
+  are the same for all users and reveal nothing of the displayed case.
 
-The link that opens the page carries a token, in the part behind ``#``, which no browser sends: it is in no log and in
-no referrer. The page sends it once, in a header, takes it out of its address, and gets the secret for it, which it
-keeps in the storage of its origin (`page/secret.js`): so a reload, another tab, a bookmark and a notebook's frame know
-it, and pages of other ports do not, as they would know a cookie, which has no port. The secret ends with the server.
+The link that opens the page contains a token behind ``#``, a part that browsers never send, so it appears in no log
+and no referrer. The page sends the token once, in a header, removes it from its address, and receives the secret, which
+it stores in the storage of its origin (`page/secret.js`). Therefore a reload, another tab, a bookmark and a notebook's
+frame have the secret, and pages of other ports do not, whereas cookies are shared between ports. The secret expires
+with the server.
 
-Who is kept out, and by what:
+Who is denied access, and how:
 
-- other users and programs of this machine, who reach the port, read its traffic nowhere and see no headers: they have
-  no secret. A token is spent by whoever comes first, and who comes second is told so;
-- pages of other sites, of other ports and of sandboxed frames (Origin: null): they cannot read the secret, a browser
-  adds no header by itself, and asks first whether a page may (an OPTIONS request, which is refused);
-- a page of another name that was made to resolve to this address (DNS rebinding): its Host is another;
-- whoever serves another port, or the same one later: a browser sends neither secret nor token there by itself, and the
-  secret that it may have kept opens nothing any more.
+- other users and programs of this machine, who reach the port but read no traffic and see no headers: they lack the
+  secret. The first user of a token spends it, and the second is informed;
+- pages of other sites, of other ports and of sandboxed frames (Origin: null): they cannot read the secret, and a
+  browser adds no header by itself and first requests permission (OPTIONS), which is refused;
+- a page of another name that was made to resolve to this address (DNS rebinding): its Host differs;
+- another server on another port, or later on the same one: browsers send it neither secret nor token, and a secret
+  that it may have stored is no longer valid.
 
-Who is not kept out: programs of the same person; an administrator; whoever reads the line that was printed, or the
-arguments of the browser that was started with the link, before the page has opened; and, where another address than
-this machine's own was asked for, whoever reads the network.
+Who is not denied access: programs of the same user; an administrator; anyone who reads the printed line, or the
+arguments of the browser that was started with the link, before the page has opened; and, for other addresses than this
+machine's own, anyone who reads the network.
 """
 
 from __future__ import annotations
@@ -41,13 +42,13 @@ Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-#: Names of this machine as it calls itself.
+#: Names that this machine uses for itself.
 LOOPBACK: Final = ("127.0.0.1", "localhost", "[::1]")
 
-#: Where a token is exchanged for the secret.
+#: Path that exchanges a token for the secret.
 EXCHANGE: Final = "/api/secret"
 
-#: Links that were made and not opened yet, at most.
+#: Maximum number of unopened links.
 _LINKS: Final = 100
 
 _READING: Final = ("GET", "HEAD")
@@ -59,13 +60,13 @@ _UNKNOWN: Final = (
 
 
 class RequestAuthentication:
-    """ASGI application that passes on what it lets through, called at ``port`` by the names ``hosts``."""
+    """ASGI application that passes on authenticated requests to ``port`` at the names ``hosts``."""
 
     def __init__(self, application: Application, port: int, hosts: Iterable[str] = LOOPBACK) -> None:
         self._application = application
-        # Browsers write names in lower case, and leave out the port that they assume.
+        # Browsers write names in lower case, and omit the default port.
         names = [host.lower().encode() for host in hosts]
-        # The port of an address that names none.
+        # The default port of an address.
         self._hosts = frozenset([b"%s:%d" % (name, port) for name in names] + (names if port == 80 else []))
         self._secret = secrets.token_urlsafe(32)
         self._tokens: list[str] = []
@@ -79,7 +80,7 @@ class RequestAuthentication:
         return token
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or answer it with what is wrong."""
+        """Pass a request on, or answer it with the error."""
         if scope["type"] == "lifespan":
             await self._application(scope, receive, send)
         elif scope["type"] != "http":
@@ -101,7 +102,7 @@ class RequestAuthentication:
         origins, sites = _values(scope, b"origin"), _values(scope, b"sec-fetch-site")
         ours = [b"http://" + hosts[0]]
         if scope["method"] in _READING:
-            # A link may lead here from anywhere; what a page loads must be loaded by ours.
+            # Links may lead here from anywhere, but resources must be loaded by this page.
             navigates = _values(scope, b"sec-fetch-mode") == [b"navigate"]
             own = origins in ([], ours) and (navigates or sites in ([], [b"same-origin"], [b"none"]))
         else:
@@ -109,7 +110,7 @@ class RequestAuthentication:
         return None if own else (403, "only the page of this server may send this")
 
     def _redeemed(self, token: bytes) -> bool:
-        """Whether a token is known and was not used before; it is used then."""
+        """Whether a token is valid and unused, and mark it as used."""
         with self._lock:
             for known in self._tokens:
                 if hmac.compare_digest(known.encode(), token):
@@ -125,7 +126,7 @@ def _is_public(scope: Scope) -> bool:
 
 
 def _bearer(scope: Scope) -> bytes:
-    """Return what the one Authorization header carries; nothing where there is none, or another number of them."""
+    """Return the content of a single Authorization header; empty if there is none or several."""
     values = _values(scope, b"authorization")
     scheme, _, carried = values[0].partition(b" ") if len(values) == 1 else (b"", b"", b"")
     return carried if scheme == b"Bearer" else b""

@@ -1,4 +1,4 @@
-"""The list of records: those that ship and the files of the page, their measures, and what belongs to one station."""
+"""List of records: shipped ones and uploaded files, their measures, and their stations."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from rocking.errors import InvalidOption, RockingError
 from rocking.explorer.parameters import PARAMETERS, Texts, field_label, names_of
 from rocking.explorer.uploads import UploadStore, measures
 
-#: Entries of a list in an address at most, and their letters: forty records of two components, and as many again.
+#: Maximum number of entries and letters of a list in an address: forty records of two components, and as many again.
 MOST: Final = 160
 _LETTERS: Final = 40_000
 
-#: What names a component at the end of a file's name or of a channel: azimuths, directions, codes of instruments.
+#: Names of components at the end of a file's name or of a channel: azimuths, directions, instrument codes.
 _UP: Final = r"up|ud[12]?|dwn|down|vrt|vert(?:ical)?|u-d|[behls][hln]z|z|v"
 _LEVEL: Final = r"ns[12]?|ew[12]?|n-s|e-w|[behls][hln][ne123xy]|[nexy]|[nsew]\d{1,3}[nsew]|h[12]|[0-3]\d\d"
 _COMPONENT: Final = re.compile(
     rf"(?i)(?:^|[-_. ]|(?<=[a-z])(?=\d\d\d))(?:(?P<up>{_UP})|(?P<level>{_LEVEL}))(?: ?deg)?$"
 )
 
-#: The number of the sensor in the name of a component, and what its heading says: KiK-net has one in a borehole, 1, and
-#: one at the surface, 2, each with three components.
+#: Sensor number in a component name, and its heading: KiK-net has one sensor in a borehole, 1, and one at the surface,
+#: 2, each with three components.
 _SENSOR: Final = re.compile(r"(?i)(?:ns|ew|ud)([12])$")
 _DEEP: Final = " borehole"
 
 
 @dataclass
 class Component:
-    """A row of the list: texts that make it the case's motion, what it is called, and what is known of it."""
+    """Row of the list: texts that make it the case's motion, its name, and its known properties."""
 
     texts: Texts
     title: str
@@ -55,13 +55,13 @@ class Component:
     vertical: str = ""
 
     def described(self) -> dict[str, Any]:
-        """Return what the page shows of it."""
+        """Return the fields that the page shows."""
         names = ("texts", "title", "label", "is_up", "measures", "key", "file", "missing", "choices", "vertical")
         return {name: getattr(self, name) for name in names}
 
 
 def entries_of(text: str) -> list[dict[str, str]]:
-    """Read a list from an address: entries with ; between, each the texts of a motion as a query.
+    """Read a list from an address: entries separated by ;, each the texts of a motion as a query.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def entries_of(text: str) -> list[dict[str, str]]:
 
 
 def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, Any]:
-    """Return all records in groups, each of one station; ``answers`` are ``dt`` and ``units`` of each file's key."""
+    """Return all records grouped by station; ``answers`` contains ``dt`` and ``units`` by the key of a file."""
     known = {answer["key"]: answer for answer in answers if "key" in answer}
     files, problems = [], {}
     for key in uploads.kept():
@@ -102,7 +102,7 @@ def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, An
 
 
 def clusters_of(entries: list[dict[str, str]], uploads: UploadStore) -> list[int]:
-    """Return a number for each entry of a list, the same for components of one station, as the list groups them."""
+    """Return a number for each entry, equal for components that the list assigns to one station."""
     files = {entry["motion"].partition(":")[2]: entry for entry in entries if entry["motion"].startswith("file:")}
     components = [each for key, entry in files.items() for each in _of_file(uploads, key, entry)]
     homes: dict[tuple[str, str | None], object] = {}
@@ -115,7 +115,7 @@ def clusters_of(entries: list[dict[str, str]], uploads: UploadStore) -> list[int
 
 
 def title_of(texts: Texts, uploads: UploadStore) -> str:
-    """Return what the list calls the record of an entry."""
+    """Return the title of an entry's record in the list."""
     name, _, key = texts.get("motion", "").partition(":")
     if name != "file":
         return records.info(name).title if name in records.names() else texts.get("motion", "")
@@ -138,7 +138,7 @@ def _shipped() -> tuple[Component, ...]:
 
 
 def _of_file(uploads: UploadStore, key: str, answer: Texts) -> list[Component]:
-    """Return the channels of a file, read with what was answered."""
+    """Return the channels of a file, read with the user's answers."""
     dt = PARAMETERS["dt"].read(answer["dt"]) if answer.get("dt") else None
     given = {name: answer[name] for name in ("dt", "units") if answer.get(name)}
     told = uploads.contents(key, dt, answer.get("units") or None)
@@ -167,7 +167,7 @@ def _of_file(uploads: UploadStore, key: str, answer: Texts) -> list[Component]:
 
 
 def _parted(name: str, channel: str, azimuth: float | None, several: bool) -> tuple[str, str, bool, str]:
-    """Return a file's name without its component, what that is called, whether it is vertical, and of which sensor."""
+    """Return a file's name without its component, the component's label, whether it is vertical, and its sensor."""
     path = PurePath(name)
     whole = path.stem
     found = None
@@ -183,7 +183,7 @@ def _parted(name: str, channel: str, azimuth: float | None, several: bool) -> tu
 
 
 def _by_station(components: Iterable[Component]) -> list[list[Component]]:
-    """Put together what belongs to one sensor: horizontal components, two at most, and a vertical one after them."""
+    """Group the components of one sensor: up to two horizontal ones, followed by a vertical one."""
     groups: list[list[Component]] = []
     for each in components:
         home = next((group for group in groups if _belongs(each, group)), None)
@@ -201,7 +201,7 @@ def _by_station(components: Iterable[Component]) -> list[list[Component]]:
 
 
 def _belongs(one: Component, group: list[Component]) -> bool:
-    """Whether a component belongs to those of a group."""
+    """Whether a component belongs to a group."""
     first = group[0]
     if bool(one.key) != bool(first.key) or sum(each.is_up == one.is_up for each in group) >= (1 if one.is_up else 2):
         return False
@@ -223,7 +223,7 @@ def _belongs(one: Component, group: list[Component]) -> bool:
 
 
 def _as_vertical(upward: Component, beside: Component) -> str:
-    """Return the text with which a component is the vertical one of another."""
+    """Return the text that makes a component the vertical one of another."""
     name, channel = upward.texts["motion"], upward.texts.get("channel")
     if channel is None:
         return name

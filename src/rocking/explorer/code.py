@@ -1,4 +1,4 @@
-"""A case, and a map of it, as Python and as a command that compute the same."""
+"""Equivalent Python code and commands for cases and maps."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ found = np.array(
 )
 print(found)"""
 
-#: What is made of the response at a point of a map, as the map has it.
+#: Python code that computes the quantities of a map from the response at a point.
 _QUANTITY: Final = {
     "rest": """\
     # Time, s, from the first uplift to the first rest; NaN where the block never rests.
@@ -92,7 +92,7 @@ print(found.summary())
 
 
 def case_as_python(case: Case) -> str:
-    """Write the case as a script that runs as it stands.
+    """Write the case as a complete script.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def case_as_python(case: Case) -> str:
 
 
 def case_as_command(case: Case) -> str | None:
-    """Write the case as a command; None for what the command line does not do.
+    """Write the case as a command, or return None if the command line does not support it.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def case_as_command(case: Case) -> str | None:
 
 
 def map_as_python(grid: MapGrid, quantity: str) -> str:
-    """Write a script that computes a quantity of a map; it runs as it stands."""
+    """Write a complete script that computes a quantity of a map."""
     texts = {"x": grid.x.name, "y": grid.y.name, "xs": _values(grid.x), "ys": _values(grid.y)}
     before = grid.case.motion_before
     return _MAP.format(
@@ -161,7 +161,7 @@ def map_as_python(grid: MapGrid, quantity: str) -> str:
 
 
 def sweep_as_python(sweep: Sweep) -> str:
-    """Write a script that computes what a case settles on, and a sweep; it runs as it stands."""
+    """Write a complete script that computes the steady state of a case, and a sweep."""
     case, name = sweep.case, sweep.axis.name
     given = {"model": case.model, "chattering": case.texts.get("chattering")}
     return _SWEEP.format(
@@ -184,7 +184,7 @@ def _values(axis: Axis) -> str:
 
 
 def _block(grid: MapGrid) -> str:
-    """Call that makes the block, with the axes' names as arguments."""
+    """Return the call that creates the block, with the names of the axes as arguments."""
     varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution"}
     texts, sides = grid.case.texts, grid.case.block.sides
     if not varied:
@@ -209,7 +209,7 @@ def _pair(sides: list[str]) -> str:
 
 
 def _motion(grid: MapGrid) -> str:
-    """Call that makes the motion, with the names of the axes among its arguments."""
+    """Return the call that creates the motion, with the names of the axes among its arguments."""
     names, made = {grid.x.name, grid.y.name}, grid.case.motion_call
     text = grid.case.texts.get("motion", "")
     if "omega" in names and is_pulse(text):

@@ -1,4 +1,4 @@
-"""From a case, or two beside each other, to what a page shows: arrays, numbers and words. It knows no web."""
+"""Arrays, numbers and words that the page shows for one or two cases, independent of the web."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from rocking.explorer.simulated import (
 from rocking.explorer.uploads import Recent, UploadStore
 from rocking.response import active_span
 
-#: Responses that are kept; their steps and the samples of their motions, some hundreds of MB at most.
+#: Number of stored responses, and maximum size of their steps and motions, some hundreds of MB.
 _KEPT: Final = 48
 _KEPT_ROWS: Final = 2_000_000
 
-#: What a figure or a table can be written as, and the type of its content.
+#: File formats of figures and tables, and their content types.
 EXPORTS: Final[Mapping[str, str]] = {
     "svg": "image/svg+xml",
     "png": "image/png",
@@ -48,7 +48,7 @@ _TABLES: Final[Mapping[str, Any]] = {"csv": "histories", "events.csv": "events",
 
 
 class Explorer:
-    """Cases by their texts; keeps the last responses. Safe to use from several threads.
+    """Cases by their texts, with a thread-safe cache of the last responses.
 
     Examples
     --------
@@ -64,11 +64,11 @@ class Explorer:
         self._kept = Recent[Simulated](_KEPT_ROWS, _rows)
 
     def take_record(self, name: str, data: bytes) -> dict[str, Any]:
-        """Keep a record file, and say what it is."""
+        """Store a record file, and return its description."""
         return self.uploads.take(name, data)
 
     def take_mesh(self, name: str, data: bytes) -> dict[str, Any]:
-        """Keep a mesh, and say in which direction its body is lifted first; or what is wrong and may be corrected."""
+        """Store a mesh, and return the direction of first uplift, or an error that the user may correct."""
         uploads = self.uploads
         key = uploads.add_mesh(name, data)
         found = {"key": key, "name": uploads.file(key).name, "azimuth": 0.0}
@@ -81,7 +81,7 @@ class Explorer:
             return found
 
     def forget(self, key: str) -> dict[str, int]:
-        """Forget a file with the responses that are of it, and say how many files are kept."""
+        """Remove a file and its responses, and return the number of remaining files."""
         self.uploads.remove(key)
         self._kept.forget(f"file:{key}")
         return self.uploads.usage()
@@ -96,7 +96,7 @@ class Explorer:
         return self._kept.get(tuple(sorted(f"{name}={value}" for name, value in texts.items() if value)), simulated)
 
     def case(self, texts: Texts, window: tuple[float, float] | None = None) -> Payload:
-        """Return all that the page says of a case, and its arrays in a window (s; by default where it moves)."""
+        """Return all words on a case, and its arrays in a window (s; by default the time of its motion)."""
         shown = self.show(texts)
         response = shown.response
         start, end = shown_window(window, response.duration, active_span(response))
@@ -107,7 +107,7 @@ class Explorer:
     def window(
         self, texts: Texts, window: tuple[float, float], *, ground: bool = False, points: int = POINTS
     ) -> Payload:
-        """Return the arrays of a window (s), evaluated anew; with those of the ground's displacement."""
+        """Return the newly evaluated arrays of a window (s), with the ground displacement."""
         shown = self.show(texts)
         start, end = checked_window(window, shown.response.duration)
         arrays = lines_in(shown, start, end, min(max(points, 2), POINTS))
@@ -134,23 +134,23 @@ class Explorer:
         return Payload(header, arrays)
 
     def body(self, texts: Texts) -> Payload:
-        """Return what is shown of the body of a mesh: its plan, its resistance in every direction, and words."""
+        """Return plan, resistance in every direction, and words for the body of a mesh."""
         case = self.show(texts).case
         if case.body is None:
             raise InvalidOption("this block is of no {}: open one", "mesh")
         return described(case.body, case.azimuth)
 
     def summary(self, texts: Texts) -> list[tuple[str, str]]:
-        """Return the summary of a response row by row: what, and how much."""
+        """Return the summary of a response as rows of label and value."""
         return [(row.name, row.text) for row in self.show(texts).response.summary_rows()]
 
     def code(self, texts: Texts) -> dict[str, str | None]:
-        """Return a case as Python, and as a command where the command line does it."""
+        """Return a case as Python, and as a command if the command line supports it."""
         case = self.show(texts).case
         return {"python": case_as_python(case), "command": case_as_command(case)}
 
     def export(self, texts: Texts, form: str, window: tuple[float, float] | None = None) -> bytes:
-        """Return a response as the content of a file of one of `EXPORTS`; a figure shows a window (s)."""
+        """Return a response as the content of a file in one of `EXPORTS`; a figure shows a window (s)."""
         if form not in EXPORTS:
             raise InvalidOption(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
         response = self.show(texts).response
@@ -181,7 +181,7 @@ def _rows(shown: Simulated) -> int:
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
-    """Texts of a case with others in their place; a block's, or a motion's and its start's, go together."""
+    """Return the texts of a case with replacements. Texts of a block, or of motion and start, are replaced together."""
     together = [(names_of("block"), names_of("block")), (names_of("motion"), names_of("motion", "start"))]
     gone = {name for given, names in together if changed.keys() & {*given} for name in names}
     return {name: value for name, value in texts.items() if name not in gone} | dict(changed)

@@ -1,7 +1,7 @@
-"""What is simulated, read from texts, and written as texts again.
+"""Conversion of a case from texts and back.
 
-The texts are those of the page's address: names of the command line's options and values as people write them
-(``alpha=12deg``, ``pga=0.5g``), so that an address says what it shows.
+The texts come from the page's address and have the names and the format of the command line's options
+(``alpha=12deg``, ``pga=0.5g``), so that addresses are readable.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from rocking.motion.piecewise import STRONGEST, TOO_STRONG
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
-#: Product of both restitutions up to which a page waits for the block to come to rest.
+#: Maximum product of both restitutions for which a page waits until the block rests.
 _LIVELIEST: Final = 0.998
 
-#: Shortest duration, s: below it arithmetic, and not mechanics, says what is shown.
+#: Shortest duration, s; below it rounding errors dominate.
 _SHORTEST: Final = 1e-12
 
 
@@ -36,9 +36,9 @@ _SHORTEST: Final = 1e-12
 class Case:
     """Arguments of `rocking.simulate`, with the texts from which they were read.
 
-    ``block_call`` and ``motion_call`` (after the line ``motion_before``, if any) are expressions, ``block_options`` and
-    ``words`` the command line's; None where the motion cannot be named. The block of a mesh has the ``body`` of which
-    it is the plane of an ``azimuth``, degrees.
+    ``block_call`` and ``motion_call`` (after the line ``motion_before``, if any) are Python expressions.
+    ``block_options`` and ``words`` belong to the command line, and are None if the motion has no name. The block of a
+    mesh has a ``body`` and an ``azimuth``, degrees, of its plane.
     """
 
     texts: Texts
@@ -71,11 +71,11 @@ class Case:
 
 
 def read_case(texts: Texts, uploads: UploadStore) -> Case:
-    """Read what is simulated from texts by the names of `PARAMETERS`, with the command line's defaults.
+    """Read a case from texts named as in `PARAMETERS`, with the command line's defaults.
 
     ``motion`` is the name of a shipped record, a pulse (``sine:amplitude=0.3g,frequency=1,cycles=2.5``), ``file:KEY``,
-    ``given:KEY`` or ``none``; ``vertical`` is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a
-    channel of the motion's own file; ``mesh`` is the name of a shipped mesh, or ``file:KEY``.
+    ``given:KEY`` or ``none``. ``vertical`` is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a
+    channel of the motion's own file. ``mesh`` is the name of a shipped mesh, or ``file:KEY``.
 
     Examples
     --------
@@ -113,7 +113,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
 
 
 def require_rest(restitutions: Iterable[float]) -> None:
-    """Raise `InvalidOption` unless a block with these on its sides comes to rest before a page has waited for long."""
+    """Raise `InvalidOption` unless a block with these restitutions comes to rest within an acceptable time."""
     if math.prod(restitutions) > _LIVELIEST:
         raise InvalidOption(
             f"the product of {{}} on both sides is above {_LIVELIEST:g}, so that the block hardly comes to rest: lower "
@@ -123,13 +123,13 @@ def require_rest(restitutions: Iterable[float]) -> None:
 
 
 def require_possible(peak: float) -> None:
-    """Refuse the strongest peak acceleration, m/s^2, of motions that are still to be made where none can have it."""
+    """Reject a peak acceleration, m/s^2, that no motion can have, before the motions are created."""
     if peak > STRONGEST:
         raise InvalidMotion(TOO_STRONG)
 
 
 def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
-    """Write a response as the texts of its case; the store keeps its motion if no text can name it."""
+    """Write a response as the texts of its case; the store keeps a motion that no text can name."""
     block, motion = response.block, response.motion
     texts = _texts_of_block(block)
     texts |= {"motion": "none"} if motion is None else texts_of_motion(motion, uploads)
@@ -147,7 +147,7 @@ def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
 
 
 def _texts_of_block(block: Block) -> dict[str, str]:
-    """Sizes of a rectangular block, else the parameters of both sides."""
+    """Return the sizes of a rectangular block, else the parameters of both sides."""
     pairs = {name: [getattr(side, name) for side in block.sides] for name in ("p", "alpha", "restitution")}
     texts = {name: ",".join(repr(value) for value in pair) for name, pair in pairs.items()}
     if block.gravity != STANDARD_GRAVITY:
@@ -164,7 +164,7 @@ def _texts_of_block(block: Block) -> dict[str, str]:
 
 
 class _FoundBlock(NamedTuple):
-    """A block, how `rocking` makes it in Python, its options on the command line, and the body that it is of."""
+    """Block, its Python expression, its command-line options, and its body."""
 
     block: Block
     python: str
@@ -173,7 +173,7 @@ class _FoundBlock(NamedTuple):
 
 
 def _block(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
-    """Make the block."""
+    """Create the block."""
     chosen = values.keys() & BLOCK_NAMES - {"restitution"}
     shape = next((each for each in SHAPES if {*each.needed} <= chosen <= {*each.needed, *each.optional}), None)
     if shape is None:
@@ -191,7 +191,7 @@ def _block(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
 
 
 def _of_mesh(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
-    """Make the block that the body of a mesh is in the plane of an azimuth."""
+    """Create the block of a mesh in the plane of an azimuth."""
     body = uploads.body(given["mesh"], given, values.get("tolerance"), values.get("gravity"))
     azimuth, restitution = values["azimuth"], values.get("restitution")
     block = body.solid.block(azimuth, restitution=restitution)

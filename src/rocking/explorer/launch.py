@@ -1,4 +1,4 @@
-"""Starting the explorer: its socket, its link and its server, for the command line or for a notebook."""
+"""Start of the explorer: socket, link and server, for the command line and for notebooks."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
     from rocking.explorer.core import Explorer
     from rocking.explorer.studies import StudyView
 
-#: Address that nobody but this machine can reach.
+#: Address that only this machine can reach.
 HERE: Final = "127.0.0.1"
 
-#: Connections at the same time, and those that wait to be accepted.
+#: Maximum number of connections, and of connections waiting to be accepted.
 _MOST: Final = 400
 _WAITING: Final = 128
 
 
 def require_packages() -> None:
-    """Raise `InvalidOption` unless what the explorer needs is installed."""
+    """Raise `InvalidOption` unless the packages of the explorer are installed."""
     if any(util.find_spec(name) is None for name in ("starlette", "uvicorn", "bokeh")):
         raise InvalidOption(f"the explorer needs packages that are not installed: {install('explorer')}")
 
 
 @dataclass(frozen=True)
 class Server:
-    """A server that listens, and what opens its page."""
+    """Listening server with its authentication."""
 
     authentication: RequestAuthentication
     server: uvicorn.Server
@@ -57,7 +57,7 @@ class Server:
         return f"http://{self.host}:{self.port}/{query}#token={self.authentication.new_token()}"
 
     def run(self) -> None:
-        """Serve until it is interrupted."""
+        """Serve until interrupted."""
         with suppress(KeyboardInterrupt):
             self.server.run(sockets=[self.socket])
 
@@ -66,7 +66,7 @@ class Server:
         threading.Thread(target=self.run, name="rocking-explorer", daemon=True).start()
 
     def announce(self, *, open_browser: bool) -> None:
-        """Print the one line with the link, and open it in a browser once the server answers."""
+        """Print the link, and open it in a browser once the server answers."""
         link = self.link()
         print(f"rocking explorer: {link} (once, in one browser; Ctrl-C ends it)", flush=True)
         if open_browser:
@@ -87,7 +87,7 @@ def served(
     port: int = 0,
     framed_by: str = "'none'",
 ) -> Server:
-    """Bind the explorer's application to an address of this machine and a port; 0 is one that is free."""
+    """Bind the explorer's application to an address of this machine and a port (0: a free one)."""
     require_packages()
     import uvicorn
 
@@ -97,7 +97,7 @@ def served(
     listening = _bound(address, port)
     place, number = (listening.getsockname()[k] for k in (0, 1))
     host, bound = (f"[{each}]" if ":" in each else each for each in (address, place))
-    # A browser writes an address of numbers in one way, however it was given.
+    # Browsers normalise numeric addresses.
     authentication = RequestAuthentication(application, number, {*LOOPBACK, host, bound})
     config = uvicorn.Config(
         authentication,
@@ -119,7 +119,7 @@ def _bound(address: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise InvalidOption(f"{{}} must be a whole number from 0 to 65535, not {port}", "port", value=port)
     try:
-        # An empty address stands for every one.
+        # An empty address means all addresses.
         family, kind, _, _, place = socket.getaddrinfo(address or "::", port, type=socket.SOCK_STREAM)[0]
     except OSError as error:
         raise InvalidOption(
@@ -151,14 +151,18 @@ def _bound(address: str, port: int) -> socket.socket:
 
 @dataclass(frozen=True)
 class Frame:
-    """The page of a response; a notebook shows it in a frame.
+    """Page of a response, shown in a frame of a notebook.
 
     Attributes
     ----------
     texts : dict of str to str
-        The case, as the page's address has it.
+        Case in the format of the page's address.
     height : int
         Height of the frame, pixels.
+
+    See Also
+    --------
+    explore : Create a frame from a response.
     """
 
     texts: dict[str, str]
@@ -167,7 +171,7 @@ class Frame:
 
     @property
     def link(self) -> str:
-        """A link that opens the page once, in a browser on this machine."""
+        """Return a link that opens the page once, in a browser on this machine."""
         return self._link(self.texts)
 
     def _repr_html_(self) -> str:
@@ -182,24 +186,28 @@ _running: tuple[Explorer, Server] | None = None
 def explore(response: Response, *, height: int = 760) -> Frame:
     """Show a response in the explorer, in a frame of the notebook.
 
-    The page is served by this process on 127.0.0.1, and ends with it.
+    This process serves the page on 127.0.0.1 until it ends.
 
     Parameters
     ----------
     response : Response
-        From `rocking.simulate`.
+        Result of `rocking.simulate`.
     height : int
         Height of the frame, pixels.
 
     Returns
     -------
     Frame
-        As the last line of a cell it shows the page; `link` opens it in a browser.
+        Frame that is displayed as the last line of a cell; `link` opens the page in a browser.
 
     Raises
     ------
     InvalidOption
-        If it is not a response, or a package of the ``explorer`` extra is missing.
+        If `response` is not a response, or a package of the ``explorer`` extra is missing.
+
+    See Also
+    --------
+    simulate : Simulate one block under one motion.
 
     Examples
     --------
@@ -219,14 +227,14 @@ def explore(response: Response, *, height: int = 760) -> Frame:
 
 
 def _server_of_this_process() -> tuple[Explorer, Server]:
-    """Return the one server of this process; the first call starts it."""
+    """Return the server of this process; the first call starts it."""
     global _running
     from rocking.explorer.core import Explorer
 
     with _lock:
         if _running is None:
             explorer = Explorer()
-            # Notebooks that this machine serves.
+            # notebooks served by this machine
             server = served(explorer, {}, framed_by="http://localhost:* http://127.0.0.1:*")
             server.run_in_background()
             _running = explorer, server

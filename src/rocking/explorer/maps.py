@@ -1,4 +1,4 @@
-"""Maps of a case over two of its parameters, coarse to fine. They know no web."""
+"""Maps of a case over two of its parameters, from coarse to fine, independent of the web."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from rocking.inputs.pulses import pulse_texts
 from rocking.inputs.quantities import number
 from rocking.motion.motion import Motion
 
-#: Points of an axis.
+#: Minimum and maximum number of points of an axis.
 _FEWEST, _MOST = 8, 400
 
 
 @dataclass(frozen=True)
 class AxisKind:
-    """A parameter that a map may vary, and its first ranges: close for chattering, wide for overturning."""
+    """Parameter of a map, with its initial ranges: close for chattering, wide for overturning."""
 
     name: str
     unit: str
@@ -58,7 +58,7 @@ AXES: Final = {
 
 
 class Axis(NamedTuple):
-    """A parameter and its values."""
+    """Parameter and its values."""
 
     name: str
     values: Floats
@@ -66,7 +66,7 @@ class Axis(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MapGrid:
-    """A case, the motion that shakes it, and the two parameters over which it is mapped: to the right and upwards."""
+    """Case, its ground motion, and the two parameters of its map: horizontal and vertical."""
 
     case: Case
     motion: Motion
@@ -80,7 +80,7 @@ class MapGrid:
 
 
 class Part(NamedTuple):
-    """Some points of a map: how far apart the points of their level are, their numbers, and their quantities."""
+    """Some points of a map: spacing, indices, and quantities."""
 
     stride: int
     points: Integers
@@ -88,7 +88,7 @@ class Part(NamedTuple):
 
 
 def axes_of(case: Case) -> list[str]:
-    """Names of the axes that a case may be mapped over."""
+    """Return the names of the possible axes of a case."""
     if case.motion is None:
         return []
     pulse = is_pulse(case.texts.get("motion", ""))
@@ -100,19 +100,19 @@ def axes_of(case: Case) -> list[str]:
 
 
 def _has_one_slenderness(case: Case) -> bool:
-    """Whether blocks of another slenderness, the same on both sides, follow from this one."""
+    """Whether blocks of another slenderness, equal on both sides, can be derived from this one."""
     plus, minus = case.block.sides
     return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset", "mesh"} & case.texts.keys())
 
 
 def grid_of(case: Case, texts: Texts) -> MapGrid:
-    """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same of ``y``, and how many ``points`` each has."""
+    """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same for ``y``, and the number of ``points`` of each."""
     if case.motion is None or case.motion.pga == 0.0:
         raise InvalidOption("a map needs something that shakes the block: choose a record or a pulse", "motion")
     x, y = (_axis(which, case, texts) for which in ("x", "y"))
-    if x.name == y.name or {x.name, y.name} in ({"omega", "p"}, {"a", "pga"}):  # pairs that vary the same thing
+    if x.name == y.name or {x.name, y.name} in ({"omega", "p"}, {"a", "pga"}):  # pairs that vary the same quantity
         raise InvalidOption("{} and {} vary the same: choose another pair of axes", x.name, y.name)
-    # Blocks of a map over the restitution have one on both sides, and the highest comes to rest last.
+    # Blocks of a map over the restitution have equal sides, and the highest restitution comes to rest last.
     eta = [float(axis.values[-1]) for axis in (x, y) if axis.name == "restitution"]
     require_rest(eta * 2 or [side.restitution for side in case.block.sides])
     grid = MapGrid(case, case.motion, x, y)
@@ -122,7 +122,7 @@ def grid_of(case: Case, texts: Texts) -> MapGrid:
 
 
 def parts(grid: MapGrid, threads: int | None = None) -> Generator[Part]:
-    """Simulate the points of a grid, coarse to fine, and give them as they come."""
+    """Simulate the points of a grid from coarse to fine, and yield them as they are completed."""
     blocks, factors, scale = _points(grid)
     setup = Setup(blocks, grid.case.model, Certified())
     last: dict[tuple[tuple[float, float], float], float | None] = {}
@@ -150,15 +150,15 @@ def parts(grid: MapGrid, threads: int | None = None) -> Generator[Part]:
 
 
 def _passed(grid: MapGrid, thresholds: Floats, factor: float) -> tuple[tuple[float, float], float]:
-    """Thresholds (m/s^2) and gravity, divided, with a vertical component, by the factor of the motion."""
+    """Return thresholds (m/s^2), and gravity, divided by the factor of the motion if there is a vertical component."""
     gravity = grid.case.block.gravity
     return (float(thresholds[0]), float(thresholds[1])), gravity / factor if grid.motion.vertical else gravity
 
 
 def curves(grid: MapGrid) -> dict[str, Floats]:
-    """Critical amplitudes along the x axis of a symmetric block under a sine: exact, and by the paper's Eq. 76.
+    """Compute critical amplitudes of a symmetric block under a sine along the x axis: exact, and by the paper's Eq. 76.
 
-    NaN where the sine of that amplitude lifts the block as it begins, or is over before half a period.
+    NaN where the sine of that amplitude lifts the block at its start, or ends before half a period.
     """
     case = grid.case
     motion = case.texts.get("motion", "")
@@ -181,9 +181,9 @@ def curves(grid: MapGrid) -> dict[str, Floats]:
 
 
 def _is_lifted_in_time(a: Floats, *, cycles: float, phase: float = 0.0, **_: float) -> Flags:
-    """Whether a sine of amplitudes over the threshold passes it from below, more than half a period before its end."""
+    """Whether a sine of amplitudes above the threshold passes it from below, more than half a period before its end."""
     lifts = np.arcsin(1.0 / a)
-    begins = phase % math.pi  # each half of the sine is the mirror image of the last
+    begins = phase % math.pi  # each half of the sine is the mirror image of the previous one
     below = (begins < lifts) | (begins > math.pi - lifts)
     uplift = np.where(begins < lifts, lifts, math.pi + lifts) - begins
     found: Flags = below & (uplift + math.pi < 2.0 * math.pi * cycles)
@@ -191,7 +191,7 @@ def _is_lifted_in_time(a: Floats, *, cycles: float, phase: float = 0.0, **_: flo
 
 
 def texts_at(grid: MapGrid, x: float, y: float) -> dict[str, str]:
-    """Texts of the case at a point of the map, which begins at rest, goes on to its end, and has each rest proven."""
+    """Return the texts at a point of the map: start at rest, full duration, and proof of each rest."""
     gone = {*names_of("start", "treatment"), "duration"}
     texts = {name: text for name, text in grid.case.texts.items() if name not in gone}
     at = {grid.x.name: x, grid.y.name: y}
@@ -208,22 +208,22 @@ def texts_at(grid: MapGrid, x: float, y: float) -> dict[str, str]:
 
 
 def _peak_at(grid: MapGrid, at: Mapping[str, float]) -> float | None:
-    """Peak acceleration of the motion at a point of the map, m/s^2; None where it is the case's motion as it is."""
+    """Return the peak acceleration at a point of the map, m/s^2, or None if the motion is unchanged."""
     if "a" in at:
         return at["a"] * _lifting(grid, math.radians(at["alpha"]) if "alpha" in at else None)
     if "pga" in at:
         return at["pga"] * STANDARD_GRAVITY
-    # The amplitude of some pulses is no acceleration, and what scales a pulse may change with its frequency.
+    # The amplitude of some pulses is not an acceleration, and the scale of a pulse may depend on its frequency.
     return grid.motion.pga if "omega" in at else None
 
 
 def sign_of(texts: Texts) -> float:
-    """Return -1 where the scale of a case reverses its motion, else 1."""
+    """Return -1 if the scale of a case reverses its motion, else 1."""
     return math.copysign(1.0, number(texts.get("scale", "1"), "scale"))
 
 
 def described(grid: MapGrid) -> dict[str, Any]:
-    """Say what a map shows: its axes, what the numbers of outcomes and modes mean, what is other than in the case."""
+    """Describe a map: its axes, the meaning of outcome and mode numbers, and the differences from the case."""
     case, notes = grid.case, []
     begins = case.initial_rotation or case.initial_velocity
     if begins or case.duration is not None or str(case.treatment) != str(Certified()):
@@ -257,7 +257,7 @@ def _axis(which: str, case: Case, texts: Texts) -> Axis:
 
 
 def axis_of(name: str, texts: Texts, keys: tuple[str, str, str], ends: tuple[float, float]) -> Axis:
-    """Read the values of a parameter: the texts of the keys are its ends, by default these, and how many there are."""
+    """Read the values of a parameter; the texts of the keys are its ends (by default `ends`) and number of values."""
     low, high, count = (
         number(texts.get(key) or repr(usual), key) for key, usual in zip(keys, (*ends, 200), strict=True)
     )
@@ -271,7 +271,7 @@ def axis_of(name: str, texts: Texts, keys: tuple[str, str, str], ends: tuple[flo
 
 
 def _points(grid: MapGrid) -> tuple[Blocks, Floats, Floats]:
-    """Blocks of all points row by row, factors on the motion, and by what times are multiplied to be the case's."""
+    """Return blocks row by row, factors on the motion, and factors that convert times to the times of the case."""
     case = grid.case
     y, x = (values.ravel() for values in np.meshgrid(grid.y.values, grid.x.values, indexing="ij"))
     at = {grid.x.name: x, grid.y.name: y}
@@ -284,7 +284,7 @@ def _points(grid: MapGrid) -> tuple[Blocks, Floats, Floats]:
     if "p" in at:
         sides["p"] = at["p"][:, None] * (sides["p"] / slowest)
     if "omega" in at:
-        # A pulse of another frequency is the same block of another p, in other units of time.
+        # A pulse of another frequency is equivalent to another p, in other units of time.
         frequency = arguments_of(case.texts["motion"])["frequency"]
         resized = 2.0 * math.pi * frequency / at["omega"][:, None]
         scale = (resized / slowest)[:, 0]
@@ -304,20 +304,20 @@ def _points(grid: MapGrid) -> tuple[Blocks, Floats, Floats]:
 
 
 def _thresholds(alpha: Floats, grid: MapGrid) -> Floats:
-    """Ground accelerations, m/s^2, that lift blocks of these slendernesses, shape (n, 2)."""
+    """Return the uplift accelerations, m/s^2, of blocks of these slendernesses, shape (n, 2)."""
     steepness: Floats = alpha if grid.case.model == "linear" else np.tan(alpha)
     return grid.case.block.gravity * steepness
 
 
 def _lifting(grid: MapGrid, alpha: float | None) -> float:
-    """Smallest ground acceleration, m/s^2, that lifts the case's block, or one of another slenderness."""
+    """Return the smallest uplift acceleration, m/s^2, of the case's block, or for another slenderness."""
     if alpha is None:
         return min(grid.case.block.uplift_thresholds(grid.case.model))
     return float(_thresholds(np.array([[alpha]]), grid)[0, 0])
 
 
 def _tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
-    """Tasks level by level, row by row; points of a task share the factor on the motion."""
+    """Yield tasks by level and row; points of a task share the factor on the motion."""
     rows, columns = grid.shape
     for level, stride in enumerate((8, 4, 2, 1)):
         for row in range(0, rows, stride):
@@ -351,7 +351,7 @@ def _both(pair: list[float]) -> str:
 
 
 def change_pulse(texts: dict[str, str], **numbers: float) -> None:
-    """Change some parameters of the pulse in the texts of a case; one that is cut has as many cycles as before."""
+    """Change parameters of the pulse in the texts of a case; a truncated pulse keeps its number of cycles."""
     given = arguments_of(texts["motion"])
     if "duration" in given and "frequency" in numbers:
         numbers["duration"] = given["duration"] * given["frequency"] / numbers["frequency"]
@@ -361,7 +361,7 @@ def change_pulse(texts: dict[str, str], **numbers: float) -> None:
 
 
 def _change_amplitude(texts: dict[str, str], grid: MapGrid, peak: float) -> None:
-    """Bring the motion to a peak acceleration, m/s^2, in its polarity: a pulse by amplitude, a record by its scale."""
+    """Scale the motion to a peak acceleration, m/s^2, in its polarity: pulses by amplitude, records by scale."""
     scale, sign = number(texts.get("scale", "1"), "scale"), sign_of(texts)
     for name in SCALINGS:
         texts.pop(name, None)

@@ -1,4 +1,4 @@
-"""Bodies of meshes: read once, and what the page draws and says of them. They know no web."""
+"""Bodies of meshes: cached reading, drawings and descriptions, independent of the web."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
 #: Name and content of a file.
 _File = tuple[str, bytes]
 
-#: Held while a mesh is read, which takes much memory.
+#: Lock while a mesh is read, because this needs much memory.
 _reading = threading.Lock()
 
 #: Azimuths of the rose, degrees.
 _AZIMUTHS: Final = np.arange(0.0, 360.0, 2.0)
 
-#: Parts that are named at most.
+#: Maximum number of named parts.
 _NAMED: Final = 6
 
-#: What a case says of a body, and how each text is read as an argument of `rocking.Solid.from_mesh`.
+#: Texts that describe a body, and how each is read as an argument of `rocking.Solid.from_mesh`.
 _READERS: Final[Mapping[str, Callable[[str], Any]]] = {
     "density": lambda text: densities(text, "density"),
     "up": str,
@@ -45,7 +45,7 @@ _READERS: Final[Mapping[str, Callable[[str], Any]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body of a mesh, its file's name and outline; ``call`` is the expression that makes it."""
+    """Body of a mesh, with its file name and outline; ``call`` is the Python expression."""
 
     solid: Solid
     sections: Sections
@@ -53,17 +53,17 @@ class Body:
 
     @cached_property
     def rose(self) -> Rose:
-        """Its resistance in every direction."""
+        """Resistance of the body in every direction."""
         return self.solid.rose(_AZIMUTHS)
 
     def across(self, azimuth: float) -> Floats:
-        """Return its outline as it is seen along the axis across an azimuth, from its centre of mass; shape (n, 6)."""
+        """Return its outline seen along the axis perpendicular to an azimuth, from its centre of mass; shape (n, 6)."""
         outline = self.sections.across(azimuth)
         outline[:, 2:] -= float(self.solid.centre[:2] @ np.asarray(directions(azimuth)[0]))
         return outline
 
     def plane(self, azimuth: float) -> dict[str, Any]:
-        """Say where it is cut by the plane of an azimuth: the edges that it rocks about, from its centre of mass, m."""
+        """Describe the section in the plane of an azimuth: the rocking edges, m from its centre of mass."""
         plane = plane_of(self.solid, azimuth)
         distance, low, high = (np.asarray(each).tolist() for each in plane.pivots)
         return {
@@ -74,7 +74,7 @@ class Body:
 
 
 def described(body: Body, azimuth: float) -> Payload:
-    """Return what the page shows of a body: its plan, its rose, and what is said of it; m from its centre of mass."""
+    """Return plan, rose and description of a body for the page; m from its centre of mass."""
     solid, rose = body.solid, body.rose
     pieces = body.sections.hulls[:: -(-len(body.sections.hulls) // 40)]
     corners = np.vstack(pieces) - solid.centre[:2]
@@ -106,20 +106,20 @@ def described(body: Body, azimuth: float) -> Payload:
 
 
 def pivots_of(body: Body, azimuth: float) -> tuple[tuple[float, float], float, float]:
-    """Return the distances of its pivots, the height of its centre of mass and its radius of gyration in a plane, m."""
+    """Return the pivot distances, height of mass and radius of gyration of a body in a plane, m."""
     plane: Plane = plane_of(body.solid, azimuth)
     plus, minus = plane.pivots.distance.tolist()
     return (plus, minus), plane.height, plane.gyration
 
 
 def options_of(texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> dict[str, Any]:
-    """Read the texts that a case has of a body as arguments of `rocking.Solid.from_mesh`."""
+    """Read the texts that describe a body as arguments of `rocking.Solid.from_mesh`."""
     given = {name: read(texts[name]) for name, read in _READERS.items() if name in texts}
     return given | {name: each for name, each in (("tolerance", tolerance), ("gravity", gravity)) if each is not None}
 
 
 def read_body(name: str, upload: _File | None, given: Mapping[str, Any]) -> Body | RockingError:
-    """Read a mesh, one at a time; what is wrong with it is returned, to be kept, as it would take as long again."""
+    """Read a mesh, one at a time; errors are returned for the cache, because a second attempt would take as long."""
     options = {each: value for each, value in given.items() if each != "gravity"}
     written = "".join(f", {each}={value!r}" for each, value in given.items())
     try:
@@ -132,7 +132,7 @@ def read_body(name: str, upload: _File | None, given: Mapping[str, Any]) -> Body
 
 
 def _about(solid: Solid) -> dict[str, Any]:
-    """Say what a body is."""
+    """Describe a body."""
     count, name, size = len(solid.regions), solid.description, {"height": solid.height, "volume": solid.volume}
     names = ", ".join(each.name for each in solid.regions[:_NAMED]) + ", ..." * (count > _NAMED)
     whole = phrase("body.parts", name=name, count=count, names=names) if count > 1 else name

@@ -1,4 +1,4 @@
-"""Motions of the page: read from texts, and written as texts again."""
+"""Motions of the page, read from texts and written as texts."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from rocking.inputs.texts import as_option, as_path
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
-#: Longest pulse, cycles: a page shows no more, and memory is bounded.
+#: Longest pulse, cycles, which bounds memory.
 MOST_SHOWN: Final = 1000.0
 
 
 class Found(NamedTuple):
-    """A motion, how Python makes it, how the command line names it, and the line that Python needs before it."""
+    """Motion, its Python expression, its command-line name, and a preceding line of Python."""
 
     motion: Motion | None
     python: str
@@ -35,13 +35,13 @@ class Found(NamedTuple):
 
 
 def read_motion(texts: Texts, uploads: UploadStore) -> Found:
-    """Read the texts of a motion alone, as `read_case` does those of a case."""
+    """Read the texts of a motion alone, as `read_case` does for a case."""
     given = {name: text for name, text in given_texts(texts).items() if name in names_of("motion")}
     return motion_of(given, {name: PARAMETERS[name].read(text) for name, text in given.items()}, uploads)
 
 
 def motion_of(given: Texts, values: Values, uploads: UploadStore) -> Found:
-    """Make the motion of a case, with its vertical component and scaled as the texts say."""
+    """Create the motion of a case, scaled and with its vertical component."""
     target = scaling({name: given[name] for name in SCALINGS if name in given}, _level)
     name = values["motion"]
     found = _unscaled(name, values, uploads)
@@ -66,7 +66,7 @@ def _scaling_as_python(level: float, measure: Measure) -> str:
     return f"scaled_to({level!r}" + ("" if measure.name == "pga" else f", {kind}") + ")"
 
 
-# These are made once while only the block is changed.
+# cached while only the block changes
 _scaled = functools.lru_cache(maxsize=4)(Motion.scaled_to)
 _together = functools.lru_cache(maxsize=4)(Motion.with_vertical)
 _shipped = functools.cache(records.load)
@@ -103,7 +103,7 @@ def _unscaled(name: str, values: Values, uploads: UploadStore) -> Found:
         return Found(pulse_of(name), call, ("--pulse", name))
     if kind == "given":
         motion = uploads.motion(key)
-        name = "".join(letter for letter in motion.name if letter.isprintable())  # a new line would end the comment
+        name = "".join(letter for letter in motion.name if letter.isprintable())  # a line break would end the comment
         variable = f"given_{key[:6]}"
         return Found(motion, variable, (), f"{variable} = ...  # {name}: the motion that this page was opened with")
     if kind == "file":
@@ -124,12 +124,12 @@ def _from_file(key: str, values: Values, channel: str | None, uploads: UploadSto
 
 
 def is_pulse(text: str) -> bool:
-    """Whether a text names a pulse that the page has."""
+    """Whether a text names a pulse of the page."""
     return text.partition(":")[0] in PULSES
 
 
 def arguments_of(text: str) -> dict[str, Any]:
-    """Read the parameters of a pulse, in SI units; one that is longer than the page shows is refused.
+    """Read the parameters of a pulse, in SI units; reject pulses longer than the maximum.
 
     Examples
     --------
@@ -157,12 +157,12 @@ def pulse_text(text: str, arguments: Mapping[str, Any]) -> str:
 
 
 def pulse_of(text: str) -> Motion:
-    """Make the pulse that a text names."""
+    """Create the pulse that a text names."""
     return pulse_values(text)[0].motion(arguments_of(text))
 
 
 def pulse_call(text: str, arguments: Mapping[str, str]) -> str:
-    """Write the call that makes a pulse of the same family with these arguments, as Python has them."""
+    """Write the call that creates a pulse of the same family with these arguments, as Python expressions."""
     written = ", ".join(f"{name}={value}" for name, value in arguments.items())
     return f"rocking.pulses.{pulse_values(text)[0].make.__name__}({written})"
 

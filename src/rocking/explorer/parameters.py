@@ -1,7 +1,7 @@
-"""The parameters of a case: fields of the page, and what an address may contain.
+"""Parameters of a case: fields of the page, and possible contents of an address.
 
-`rocking.inputs.declared` declares what a simulation takes; here stand what only the page has, and `specification`, from
-which the page builds its address and its forms.
+`rocking.inputs.declared` declares the inputs of simulations. This module adds the inputs of the page alone, and
+`specification`, from which the page creates its address and forms.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _LONGEST_TEXT: Final = 300
 
 
 def _of(group: str, numbers: str, **texts: str) -> dict[str, Input]:
-    """Declare names of an address, in their order: numbers, but for some texts with their defaults."""
+    """Declare names of an address in order: numbers, except for some texts with their defaults."""
     return {
         name: Input(
             name,
@@ -46,7 +46,7 @@ def _of(group: str, numbers: str, **texts: str) -> dict[str, Input]:
     }
 
 
-#: What an address says about a map, of a case or of a study.
+#: Texts for a map of a case or of a study.
 MAP: Final = _of(
     "map",
     "x x_from x_to y y_from y_to points quantity motion_index polarity_index scale_index "
@@ -54,15 +54,15 @@ MAP: Final = _of(
     x="", y="", quantity="",
 )  # fmt: skip
 
-#: What an address says about a sweep under periodic motion.
+#: Texts for a sweep under periodic motion.
 SWEEP: Final = _of("sweep", "sweep sweep_from sweep_to sweep_points", sweep="a")
 
-#: What an address says about the time that is read.
+#: Text for the time of a reading.
 READING: Final = by_name(Input("at", "reading", "duration", "", "s"))
 
-#: Kinds of files that are read as meshes, by the ends of their names.
+#: File name extensions of meshes.
 MESH_KINDS: Final = ("obj", "ply", "stl", "glb", "gltf")
-#: What an address says about an assessment, and about the list of records it is made of.
+#: Texts for an assessment and its list of records.
 ASSESSMENT: Final = by_name(
     Input("records", "assessment", "text"),
     Input("measure", "assessment", "text", default="pga"),
@@ -73,19 +73,19 @@ ASSESSMENT: Final = by_name(
     Input("friction", "assessment"),
 )
 
-#: Units that the page shows lengths, angles and accelerations in, and the default of each first.
+#: Units of lengths, angles and accelerations on the page; the first is the default.
 SHOWN_IN: Final[Mapping[str, tuple[str, ...]]] = {
     "length_in": ("m", "cm", "ft", "in"),
     "angle_in": ("deg", "rad"),
     "acceleration_in": ("g", "m/s2"),
 }
 
-#: The case that is shown when nothing is asked for: it chatters, rests and rocks on several times.
+#: Default case: it chatters, rests and rocks on several times.
 DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
 
 
 class Shape(NamedTuple):
-    """A way to describe a block on the page: its name, and which parameters it needs and takes."""
+    """Description of a block on the page: name, and required and optional parameters."""
 
     name: str
     needed: tuple[str, ...]
@@ -112,7 +112,7 @@ _CHOICES: Final[Mapping[str, dict[str, Any]]] = {
 
 
 def _fields(pulse: str) -> tuple[Input, ...]:
-    """Return the parameters of a pulse that have a field: those that it needs, and numbers with a default."""
+    """Return the parameters of a pulse that have a field: required ones, and numbers with a default."""
     family = FAMILIES[pulse]
     numbers = (name for name, default in family.optional.items() if isinstance(default, float))
     return tuple(family.parameter(name) for name in (*family.needed, *numbers))
@@ -125,7 +125,7 @@ PULSES: Final[Mapping[str, dict[str, Any]]] = {
 
 
 def _limited(name: str, unit: str, default: str, text: str) -> dict[str, Any]:
-    """Return a treatment with the field of its limit, and the limit that it has where a text names none."""
+    """Return a treatment with the field of its limit, and its default limit."""
     limit = Input("limit", "treatment", "number", "", unit, default, 1e-9, 0.1, True, text=text)
     return {"name": name, "limit": limit.described(), "unnamed": str(treatment(name)).partition("=")[2]}
 
@@ -161,7 +161,7 @@ BLOCK_NAMES: Final = frozenset(names_of("block"))
 
 
 def given_texts(texts: Texts) -> dict[str, str]:
-    """Texts that are not empty, of names that a case has."""
+    """Return the texts of a case that are not empty."""
     given = {name: value.strip() for name, value in texts.items() if value.strip()}
     for name, value in given.items():
         if name not in NAMES:
@@ -172,10 +172,10 @@ def given_texts(texts: Texts) -> dict[str, str]:
 
 
 def field_label(name: str, motion: str = "", texts: Mapping[str, Any] | None = None) -> str:
-    """Return what a message on the page calls an argument: the label of its field, where it has one.
+    """Return the label of an argument's field for messages, or the argument itself.
 
-    A parameter of a pulse is called as the pulse that `motion` names has it, or as all that have it do. The labels are
-    those of ``texts``, by default the English ones.
+    A parameter of a pulse has the label for the pulse in `motion`, or the labels of all pulses that have it. The labels
+    come from ``texts``, by default the English ones.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def field_label(name: str, motion: str = "", texts: Mapping[str, Any] | None = N
 
 @functools.cache
 def specification() -> dict[str, Any]:
-    """Return all of this in plain values, as the page takes it."""
+    """Return these declarations as plain values for the page."""
     return {
         "version": VERSION,
         "default": DEFAULT,

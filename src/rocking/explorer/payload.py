@@ -1,4 +1,4 @@
-"""What is sent to the page: plain values, arrays and the keys of texts (the page has the words), and their bytes."""
+"""Data for the page (plain values, arrays, and keys of the page's texts) and their encoding."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.core.tables import plain
 
-#: Places of the page that are filled in with a text.
+#: Placeholders of the page for texts.
 _PLACE: Final = re.compile(r"\{([a-z]+\.[a-z_]+)\}")
 
 
 @dataclass(frozen=True, eq=False)
 class Payload:
-    """What is sent: plain values, and arrays of floats by name."""
+    """Plain values, and arrays of floats by name."""
 
     header: dict[str, Any]
     arrays: dict[str, Floats] = field(default_factory=dict)
 
 
 def pack(payload: Payload) -> bytes:
-    """Return a payload as bytes: length of the header (4 bytes), header as JSON, arrays of doubles from multiples of 8.
+    """Return a payload as bytes: length of the header (4 bytes), JSON header, arrays of doubles aligned to 8 bytes.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def pack(payload: Payload) -> bytes:
 
 
 def phrase(key: str, **values: Any) -> dict[str, Any]:
-    """Return something that the page says: the key of a text, and what is put at its places.
+    """Return a phrase for the page: the key of a text, and the values of its placeholders.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def phrase(key: str, **values: Any) -> dict[str, Any]:
 
 
 def filled(page: str, texts: Mapping[str, Any]) -> str:
-    """Return the page with its texts: each ``{key}`` is its text, and all texts stand in it for its scripts.
+    """Return the page with each ``{key}`` replaced by its text, and with all texts for its scripts.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def filled(page: str, texts: Mapping[str, Any]) -> str:
 
 @functools.cache
 def english() -> dict[str, Any]:
-    """Return the English texts by their keys; one that has several forms is a dictionary of them."""
+    """Return the English texts by key; a text with several forms is a dictionary of them."""
     file = resources.files("rocking.explorer") / "page" / "texts.json"
     found: dict[str, Any] = json.loads(file.read_text("utf-8"))
     return found

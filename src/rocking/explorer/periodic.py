@@ -1,4 +1,4 @@
-"""A case under a sine that never ends: its phase plane, and sweeps of a parameter. It knows no web."""
+"""A case under an infinite sine: phase plane and parameter sweeps, independent of the web."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
-#: Periods that a sweep lets pass at each value, and states after them that it keeps.
+#: Transient periods at each value of a sweep, and states stored after them.
 PASSED: Final = 300
 KEPT: Final = 64
 
-#: Longest period that `period_of` finds in the kept states.
+#: Longest period that `period_of` detects in the stored states.
 LONGEST: Final = KEPT // 2
 
-#: Periods after which a case is said to have none, and states of it that are drawn then.
+#: Periods after which a case counts as aperiodic, and states that are then drawn.
 _PATIENCE: Final = 8000
 _CLOUD: Final = 1024
 
-#: Points of a trajectory; an impact of less speed than this part of the greatest leaves no gap in it.
+#: Points of a trajectory, and the fraction of the greatest speed below which an impact leaves no gap.
 _POINTS: Final = 6000
 _SEEN: Final = 2e-3
 
 
 class Sine(NamedTuple):
-    """A sine by its parameters in SI units: ``cycles`` of it, of which a single one repeats for ever."""
+    """Sine by its parameters in SI units, with ``cycles``; a single cycle repeats for ever."""
 
     amplitude: float
     frequency: float
@@ -51,18 +51,18 @@ class Sine(NamedTuple):
     cycles: float
 
     def motion(self, cycles: float = 1.0) -> Motion:
-        """Return so many cycles of it."""
+        """Return a motion of some cycles of the sine."""
         return pulses.sine(self.amplitude, self.frequency, cycles=cycles, phase=self.phase)
 
     @property
     def text(self) -> str:
-        """The text of a case that names it."""
+        """Text that names the sine in a case."""
         given = {name: value for name, value in self._asdict().items() if value or name != "phase"}
         return "sine:" + ",".join(f"{name}={value!r}" for name, value in given.items())
 
 
 class Settled(NamedTuple):
-    """The states of one period, or the last ones; ``after`` is the number of periods, ``course`` the drawn part."""
+    """States of one period, or the last ones; ``after`` is the number of periods, ``course`` the drawn part."""
 
     states: Floats
     period: int
@@ -73,22 +73,22 @@ class Settled(NamedTuple):
 
 
 def lifting(case: Case) -> float:
-    """Smallest ground acceleration, m/s^2, that lifts the block."""
+    """Return the smallest uplift acceleration of the block, m/s^2."""
     return min(case.block.uplift_thresholds(case.model))
 
 
 def slowest(case: Case) -> float:
-    """Frequency parameter of the block, rad/s; the smaller one of two."""
+    """Return the (smaller) frequency parameter of the block, rad/s."""
     return min(side.p for side in case.block.sides)
 
 
 def values_of(case: Case, sine: Sine) -> dict[str, float]:
-    """Return the parameters that may be swept by name: amplitude over the uplift threshold, and frequency 2 pi f/p."""
+    """Return the sweep parameters: amplitude divided by the uplift acceleration, and frequency 2 pi f/p."""
     return {"a": sine.amplitude / lifting(case), "omega": 2.0 * math.pi * sine.frequency / slowest(case)}
 
 
 def sine_of(case: Case) -> Sine | None:
-    """Return the sine of a case, scaled as its motion is; None where something else shakes it."""
+    """Return the sine of a case, scaled like its motion; None for other motions."""
     text = case.texts.get("motion", "")
     if case.motion is None or text.partition(":")[0] != "sine":
         return None
@@ -100,7 +100,7 @@ def sine_of(case: Case) -> Sine | None:
 
 
 def nearest_sine(case: Case) -> Sine:
-    """Return the sine of the pulse's peak acceleration and frequency (or else velocity), or one above uplift."""
+    """Return a sine with the pulse's peak acceleration (or else velocity) and frequency, or a sine above uplift."""
     if case.motion is None or case.motion.pga == 0.0:
         return Sine(1.5 * lifting(case), 1.5 * slowest(case) / math.pi, 0.0, 10.0)
     text, pga = case.texts.get("motion", ""), case.motion.pga
@@ -115,7 +115,7 @@ def map_of(case: Case, sine: Sine) -> StroboscopicMap:
 
 
 def settled(rock: StroboscopicMap, start: ArrayLike, periods: int, kept: int = KEPT) -> Settled:
-    """Return what a state becomes within so many periods."""
+    """Return the steady state, or overturning, that follows a state within a number of periods."""
     first, count = np.asarray(start, dtype=float), min(kept, periods)
     last = states_after(rock, first[None], periods - count, count)[0][0]
     if np.isnan(last[-1, 0]):
@@ -133,7 +133,7 @@ def settled(rock: StroboscopicMap, start: ArrayLike, periods: int, kept: int = K
 
 
 def settled_case(case: Case, sine: Sine) -> tuple[Settled, StroboscopicMap]:
-    """Return what a case settles on, if need be after thousands of periods, and the map that says so."""
+    """Return the steady state of a case, if necessary after thousands of periods, and its map."""
     rock = map_of(case, sine)
     start: Floats = np.array([case.initial_rotation, case.initial_velocity])
     passed = 0
@@ -148,9 +148,9 @@ def settled_case(case: Case, sine: Sine) -> tuple[Settled, StroboscopicMap]:
 
 
 def orbit(case: Case) -> Payload:
-    """Return the phase plane of a case whose sine never ends, over slenderness, and what it settles on in words.
+    """Return the normalised phase plane of a case under an infinite sine, and its steady state in words.
 
-    For another motion the header has nothing but ``offer``: the text, amplitude (m/s^2) and frequency (Hz) of a sine.
+    For another motion the header contains only ``offer``: text, amplitude (m/s^2) and frequency (Hz) of a sine.
     """
     sine = sine_of(case)
     if sine is None:
@@ -184,7 +184,7 @@ def _followed(case: Case, sine: Sine, start: Floats, periods: int) -> Response:
 
 
 def sentence(found: Settled, response: Response) -> dict[str, Any]:
-    """Say what a case settles on; the response is that of one period of it."""
+    """Describe the steady state of a case; the response covers one period of it."""
     if found.fate == Fate.OVERTURNED:
         return phrase("orbit.overturns", after=found.after)
     if found.fate == Fate.UNFINISHED:
@@ -201,7 +201,7 @@ def sentence(found: Settled, response: Response) -> dict[str, Any]:
 
 
 def _about(case: Case, sine: Sine, found: Settled, rock: StroboscopicMap) -> dict[str, Any]:
-    """Say how stable that is, and how it began."""
+    """Return the stability of the steady state, and its start."""
     released = case.initial_rotation or case.initial_velocity
     start = phrase("orbit.from_rest")
     if released:
@@ -221,7 +221,7 @@ def _about(case: Case, sine: Sine, found: Settled, rock: StroboscopicMap) -> dic
 
 
 def scaled(case: Case, states: Floats) -> Floats:
-    """Return rotations over slenderness and velocities over p times slenderness, of the sides that they are on."""
+    """Return rotations divided by slenderness, and velocities divided by p times slenderness, of their sides."""
     plus, minus = case.block.sides
     side = np.where((states[..., 0] < 0.0) | ((states[..., 0] == 0.0) & (states[..., 1] < 0.0)), -1, 1)
     units = np.where((side > 0)[..., None], [plus.alpha, plus.alpha * plus.p], [minus.alpha, minus.alpha * minus.p])
@@ -236,16 +236,16 @@ def _states(case: Case, response: Response, end: float) -> tuple[Floats, Floats]
 
 
 def _trajectory(case: Case, response: Response) -> dict[str, Floats]:
-    """Return a response in the phase plane, with a gap at each impact, and what is across the gaps."""
+    """Return a response in the phase plane, with a gap at each impact, and the lines across the gaps."""
     end = response.duration
     if response.overturned:
-        fallen = np.abs(_states(case, response, end)[1][:, 0]) > 1.5  # of the slenderness
+        fallen = np.abs(_states(case, response, end)[1][:, 0]) > 1.5  # relative to the slenderness
         end *= np.argmax(fallen) / (_POINTS - 1) if fallen.any() else 1.0
     times, states = _states(case, response, end)
     impacts = response.impacts[response.impacts["time"] <= end]
     seen = impacts[impacts["speed_before"] > _SEEN * impacts["speed_before"].max(initial=0.0)]
     jumps = [np.stack([np.zeros(len(seen)), seen["side"] * seen[f"speed_{when}"]], -1) for when in ("before", "after")]
-    # The velocity before an impact belongs to the side that is left, the one after it to the side that is entered.
+    # The velocities before and after an impact belong to the old and the new side, respectively.
     before, after = scaled(case, jumps[0] * [1.0, -1.0]) * [1.0, -1.0], scaled(case, jumps[1])
     gaps = np.stack([before, np.full_like(before, np.nan), after], axis=1).reshape(-1, 2)
     order = np.argsort(np.concatenate([times, np.repeat(seen["time"], 3)]), kind="stable")
@@ -253,7 +253,7 @@ def _trajectory(case: Case, response: Response) -> dict[str, Floats]:
     return {"rotation": line[:, 0], "velocity": line[:, 1], "before": before[:, 1], "after": after[:, 1]}
 
 
-#: Values of a sweep that come at once.
+#: Values of a sweep in one part.
 _AT_ONCE: Final = 10
 
 _FROM_REST: Final = (0.0, 0.0)
@@ -261,7 +261,7 @@ _FROM_REST: Final = (0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A case, its sine, and the parameter that is swept: ``a`` or ``omega`` of `maps.AXES`."""
+    """Case, its sine, and the sweep parameter: ``a`` or ``omega`` of `maps.AXES`."""
 
     case: Case
     sine: Sine
@@ -269,7 +269,7 @@ class Sweep:
 
     @property
     def value(self) -> float:
-        """The parameter's value of the case itself."""
+        """Value of the parameter in the case itself."""
         return values_of(self.case, self.sine)[self.axis.name]
 
     def sine_at(self, value: float) -> Sine:
@@ -280,7 +280,7 @@ class Sweep:
 
 
 class Part(NamedTuple):
-    """Values of a sweep by number, in one direction of one level, with results and ``share`` of the work."""
+    """Values of a sweep by index, in one direction of one level, with results and ``share`` of the work."""
 
     stride: int
     direction: str
@@ -290,7 +290,7 @@ class Part(NamedTuple):
 
 
 def sweep_of(case: Case, texts: Texts) -> Sweep:
-    """Read what is swept: ``sweep`` (``a`` or ``omega``), ``sweep_from``, ``sweep_to``, and ``sweep_points``."""
+    """Read a sweep: ``sweep`` (``a`` or ``omega``), ``sweep_from``, ``sweep_to``, and ``sweep_points``."""
     sine = sine_of(case)
     if sine is None:
         raise InvalidOption("a diagram needs a sine, of which one period repeats for ever: choose one", "motion")
@@ -305,7 +305,7 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
 
 
 def parts(sweep: Sweep) -> Generator[Part]:
-    """Sweep the parameter up and down from rest in ever smaller steps, on from the last state unless it overturned."""
+    """Sweep up and down from rest in decreasing steps, each from the last state unless it overturned."""
     values, maps, done = sweep.axis.values, {}, 0
     every = [(stride, order) for stride in (8, 4, 2, 1) for order in (1, -1)]
     whole = sum(len(values[::stride]) for stride, _ in every)
@@ -325,7 +325,7 @@ def parts(sweep: Sweep) -> Generator[Part]:
 
 
 def part_payload(sweep: Sweep, part: Part) -> Payload:
-    """Return a part as it is sent: at each value a number of states, with their rotations over slenderness."""
+    """Return the payload of a part: the number of states at each value, and their normalised rotations."""
     states = np.concatenate([found.states for found in part.found])
     header = {
         "stride": part.stride,
@@ -351,13 +351,13 @@ def _in_words(found: Settled) -> dict[str, Any]:
 
 
 def described(sweep: Sweep) -> dict[str, Any]:
-    """Say what is swept."""
+    """Describe a sweep."""
     kind = AXES[sweep.axis.name]
     return {"name": kind.name, "label": phrase(f"axis.{kind.name}"), "values": sweep.axis.values.tolist()}
 
 
 def texts_at(sweep: Sweep, value: float, state: tuple[float, float] | None) -> dict[str, str]:
-    """Texts of the case at a value of the parameter, released from a state (rotation, velocity) or from rest."""
+    """Return the texts of the case at a value of the parameter, from a state (rotation, velocity) or from rest."""
     gone = {*SCALINGS, "initial_rotation", "initial_velocity"}
     texts = {name: text for name, text in sweep.case.texts.items() if name not in gone}
     sine, given = sweep.sine_at(value), arguments_of(texts["motion"])
@@ -369,7 +369,7 @@ def texts_at(sweep: Sweep, value: float, state: tuple[float, float] | None) -> d
 
 
 def call_at(sweep: Sweep) -> str:
-    """Write the call that makes one period of the sine at a value of the parameter, which has that name."""
+    """Write the call that creates one period of the sine; the parameter is a variable of its own name."""
     given: Mapping[str, str] = {
         name: repr(value) for name, value in sweep.sine._asdict().items() if value or name != "phase"
     }

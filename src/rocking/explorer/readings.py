@@ -1,4 +1,4 @@
-"""What is read from a case beside its histories: its phase plane and energy, one instant, a thumbnail. No web here."""
+"""Further views of a case: phase plane and energy, one instant, a thumbnail. Independent of the web."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payl
 
 
 def at(explorer: Explorer, texts: Texts, time: str, window: tuple[float, float] | None = None) -> dict[str, Any]:
-    """Return what a case is at a time, as its text says it, in the response that a window (s) shows.
+    """Return the state of a case at a time (text), in the response of a window (s).
 
     Examples
     --------
@@ -84,7 +84,7 @@ def at(explorer: Explorer, texts: Texts, time: str, window: tuple[float, float] 
 
 
 def _state(response: Response, time: float, rotation: float) -> dict[str, Any]:
-    """Say what the block does at a time."""
+    """Return a phrase for the state of the block at a time."""
     rests = response.rest_intervals
     if np.any((rests[:, 0] <= time) & (time < rests[:, 1])):
         return phrase("state.rests")
@@ -94,7 +94,7 @@ def _state(response: Response, time: float, rotation: float) -> dict[str, Any]:
 
 
 def _ground(shown: Simulated, time: float) -> dict[str, float | None]:
-    """Ground accelerations at a time, g; None where there is no such motion."""
+    """Return the ground accelerations at a time, g, or None for missing motions."""
     motion = shown.case.motion
     both = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}
     return {
@@ -104,7 +104,7 @@ def _ground(shown: Simulated, time: float) -> dict[str, float | None]:
 
 
 def thumbnail(explorer: Explorer, texts: Texts) -> Payload:
-    """Return what becomes of a case, in one line, and its rotation over the slenderness where it moves, in few points.
+    """Return the outcome of a case in one line, and its normalised rotation while it moves, in few points.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The application: requests to calls of the core, payloads to bytes. It knows no mechanics."""
+"""Web application: converts requests to calls of the core, and payloads to bytes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ PATIENCE: Final = 10.0
 #: Prefix of the texts of the case that is compared with.
 OTHER: Final = "other."
 
-#: Types of the page's own files.
+#: Content types of the page's own files.
 TYPES: Final = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -51,7 +51,7 @@ TYPES: Final = {
     ".svg": "image/svg+xml",
 }
 
-#: Files of the plotting library, in the order in which they are loaded.
+#: Files of the plotting library, in loading order.
 LIBRARY: Final = ("bokeh.min.js", "bokeh-api.min.js")
 
 _SENT_WITH_ALL: Final = {
@@ -70,27 +70,27 @@ def page_files() -> dict[str, bytes]:
 
 
 def library_folder() -> Path:
-    """Return where the plotting library lies in its installed package, without importing that."""
+    """Return the folder of the plotting library in its installed package, without importing the package."""
     return Path(str(metadata.distribution("bokeh").locate_file("bokeh/server/static/js")))
 
 
 class Query:
-    """What an address says, read when it is asked for."""
+    """Query of an address, parsed on access."""
 
     def __init__(self, given: Mapping[str, str]) -> None:
         self.given = given
 
     def texts(self, prefix: str = "") -> dict[str, str]:
-        """Texts of a case."""
+        """Return the texts of a case."""
         return {name: self.given[prefix + name] for name in PARAMETERS if self.given.get(prefix + name)}
 
     @cached_property
     def others(self) -> dict[str, str]:
-        """All that does not belong to the case."""
+        """Return all texts that do not belong to the case."""
         return {name: value for name, value in self.given.items() if name not in PARAMETERS}
 
     def number(self, name: str) -> float | None:
-        """Return a finite number; None where it is not given."""
+        """Return a finite number, or None if it is missing."""
         text = self.given.get(name)
         if not text:
             return None
@@ -100,7 +100,7 @@ class Query:
         return value
 
     def numbers(self, first: str, second: str) -> tuple[float, float]:
-        """Return two numbers that are needed."""
+        """Return two required numbers."""
         found = self.number(first), self.number(second)
         if found[0] is None or found[1] is None:
             raise InvalidOption("{} and {} are needed", first, second)
@@ -108,12 +108,12 @@ class Query:
 
     @property
     def window(self) -> tuple[float, float] | None:
-        """Ends of a stretch of time, s; None where they are not given."""
+        """Return the ends of a time window, s, or None if they are missing."""
         return self.numbers("from", "to") if self.given.get("from") and self.given.get("to") else None
 
 
 class Download(NamedTuple):
-    """A file to be saved: its form, one of `EXPORTS`, and its content."""
+    """File to save: its form, one of `EXPORTS`, and its content."""
 
     form: str
     content: bytes
@@ -146,7 +146,7 @@ class BoundedProtocol(H11Protocol):
 
 
 class App:
-    """The explorer's application; ``opening`` are a bare address's texts, ``framed_by`` pages that may frame it."""
+    """Application; ``opening`` contains the texts of a bare address, ``framed_by`` the pages that may frame it."""
 
     def __init__(
         self,
@@ -162,7 +162,7 @@ class App:
         self.files = page_files()
         self.html = filled(self.files["index.html"].decode(), json.loads(self.files["texts.json"]))
         self.library = {name: (library_folder() / name).read_bytes() for name in LIBRARY}
-        self._threads = anyio.CapacityLimiter(4)  # the other computations wait
+        self._threads = anyio.CapacityLimiter(4)  # other computations wait
         self._streams = anyio.CapacityLimiter(2)
         answers: dict[str, Callable[[Query], Any]] = {
             "/api/start": self._start,
@@ -207,7 +207,7 @@ class App:
         self.asgi.router.redirect_slashes = False
 
     async def page(self, _: Request) -> Response:
-        """Return the page, with a nonce of its own."""
+        """Return the page, with a new nonce."""
         nonce = secrets.token_urlsafe(16)
         policy = (
             "default-src 'none'; script-src 'self'; connect-src 'self'; "
@@ -226,7 +226,7 @@ class App:
         return _static(self.library, request.path_params["name"], _FOR_GOOD)
 
     def _answering(self, work: Callable[[Query], Any]) -> Callable[[Request], Awaitable[Response]]:
-        """Return what answers a request with a payload, a file, or plain values, made in a thread."""
+        """Return a handler that responds with a payload, a file, or plain values, computed in a thread."""
 
         async def answer(request: Request) -> Response:
             query = Query({**request.query_params, **request.path_params})
@@ -244,7 +244,7 @@ class App:
         return await anyio.to_thread.run_sync(work, limiter=self._threads)
 
     def _start(self, _: Query) -> dict[str, Any]:
-        """Return the specification of the page and what it opens with."""
+        """Return the specification of the page and its initial case."""
         return {
             **specification(),
             "axes": [asdict(axis) | {"label": phrase(f"axis.{axis.name}")} for axis in maps.AXES.values()],
@@ -268,7 +268,7 @@ class App:
         return Download(form, self.explorer.export(query.texts(), form, query.window))
 
     def _record(self, query: Query) -> dict[str, Any]:
-        """Say what a file that is kept is, read with the step and the units that are given now."""
+        """Describe a stored file, read with the step and the units of the query."""
         units = query.given.get("units") or None
         return self.explorer.uploads.contents(query.given["key"], query.number("dt"), units)
 
@@ -285,7 +285,7 @@ class App:
         return maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y"))
 
     def _point_of_sweep(self, query: Query) -> dict[str, str]:
-        """Return the texts of the case at a value of the parameter, released from a state where one is given."""
+        """Return the texts of the case at a value of the parameter, released from a state, if any."""
         value, _ = query.numbers("at", "at")
         return periodic.texts_at(self._sweep(query), value, query.numbers("u", "v") if query.given.get("u") else None)
 
@@ -312,7 +312,7 @@ class App:
         return _Stream(assessment.described(found), assessment.parts(found), pack)
 
     def _streaming(self, begin: Callable[[Query], _Stream]) -> Callable[[Request], Awaitable[Response]]:
-        """Return what answers a request part by part, coarse to fine: what is shown, then the parts."""
+        """Return a handler that responds part by part, from coarse to fine: a description, then the parts."""
 
         async def answer(request: Request) -> Response:
             stream = await self._in_thread(lambda: begin(Query(request.query_params)))
@@ -322,7 +322,7 @@ class App:
         return answer
 
     async def _parts(self, stream: _Stream, motion: str) -> AsyncIterator[bytes]:
-        """Parts of a stream as bytes; the work ends with the reader."""
+        """Yield the parts of a stream as bytes; the computation stops when the reader disconnects."""
         yield _framed(json.dumps({**stream.about, "problem": None}).encode())
         async with self._streams:
             try:
@@ -333,7 +333,7 @@ class App:
                     await anyio.to_thread.run_sync(stream.parts.close)
 
     def _receiving(self, take: Callable[[str, bytes], dict[str, Any]]) -> Callable[[Request], Awaitable[Response]]:
-        """Return what takes a file, the raw body, and says what it is."""
+        """Return a handler that accepts a file as the raw body and describes it."""
 
         async def receive(request: Request) -> Response:
             stated = request.headers.get("content-length", "0")
@@ -354,7 +354,7 @@ class App:
 
 
 class _Stream(NamedTuple):
-    """What comes in parts: what is said of it first, the parts, and how one is written."""
+    """Response in parts: description, parts, and the encoder of a part."""
 
     about: dict[str, Any]
     parts: Generator[Any]
@@ -362,7 +362,7 @@ class _Stream(NamedTuple):
 
 
 def _next(stream: _Stream, motion: str) -> bytes | None:
-    """Return the next part as bytes, or what went wrong; None when all have come."""
+    """Return the next part or an error as bytes, or None at the end."""
     try:
         part = next(stream.parts, None)
     except RockingError as error:
@@ -376,7 +376,7 @@ def _part_of_map(part: maps.Part) -> bytes:
 
 
 def _framed(data: bytes) -> bytes:
-    """Return data behind its length, filled up so that what follows starts at a multiple of 4."""
+    """Return data behind their length, padded to a multiple of 4."""
     padded = data + b" " * (-len(data) % 4)
     return struct.pack("<I", len(padded)) + padded
 
@@ -389,7 +389,7 @@ def _static(files: Mapping[str, bytes], name: str, headers: Mapping[str, str]) -
 
 
 def _problem(error: RockingError, motion: str) -> dict[str, str | None]:
-    """Return the sentence of an error, in which fields are called as the page calls them, and the argument."""
+    """Return the message of an error, with the page's names of the fields, and the argument."""
     return {"problem": error.text(lambda name: field_label(name, motion)), "argument": error.argument}
 
 

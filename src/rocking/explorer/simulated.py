@@ -1,4 +1,4 @@
-"""A case with its response: its numbers and words, and the lines that a page draws of it, whole or in a window."""
+"""Case with its response: numbers, words, and the lines that the page draws, complete or in a window."""
 
 from __future__ import annotations
 
@@ -21,53 +21,53 @@ from rocking.inputs.notes import block_notes, motion_notes
 from rocking.motion.motion import Motion
 from rocking.response import Response, in_words, known_ratio
 
-#: Times at which a rotation is evaluated across a window, and points of a line that are sent.
+#: Evaluation times of a rotation in a window, and points of a line in a payload.
 _TIMES: Final = 12_000
 POINTS: Final = 3_000
 
-#: Narrowest window, s: times have no more digits; and what is shown of a response that lasts no time.
+#: Narrowest window, s, because of the precision of times; also the width for a response of zero duration.
 _NARROWEST: Final = 1e-12
 
-#: Impacts of a window whose times are added to the line's.
+#: Maximum number of impacts in a window whose times are added to the line.
 _MARKED: Final = 2_000
 
-#: Bracket on a time of rest, s, with which impacts are resolved for a window close to it: some nanoseconds are left.
+#: Bracket on a time of rest, s, to resolve impacts in a window close to it; some nanoseconds remain.
 _FINEST: Final = Certified(1e-40)
 
-#: Ground motion of longer periods than this (s) is not drawn where a record's baseline would drift.
+#: Longest drawn period of ground motion, s, for records whose baseline would drift.
 _LONGEST_PERIOD: Final = 10.0
 
-#: Properties of a response that the page shows as they are.
+#: Properties of a response that the page shows unchanged.
 _ANSWERS: Final = ("duration", "overturned", "overturn_time", "peak_rotation", "peak_time", "time_at_rest")
 
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """A case with its response, and what is made of it when it is first asked for."""
+    """Case with its response, and cached results."""
 
     case: Case
     response: Response
 
     @functools.cached_property
     def fine(self) -> Response:
-        """The same response with more impacts resolved before each proven rest."""
+        """Same response with more impacts resolved before each proven rest."""
         if self.case.treatment.name != _FINEST.name:
             return self.response
         fine = replace(self.case, treatment=_FINEST).simulate()
         return fine if fine.stalled == self.response.stalled else self.response
 
     def resolved(self, start: float, end: float) -> Response:
-        """Return the response whose impacts are resolved as far as a window shows."""
+        """Return the response with impacts resolved as finely as a window shows."""
         return self.fine if unresolved(self.response, start, end) else self.response
 
     @functools.cached_property
     def outline(self) -> Floats | None:
-        """Trapezoids of the outline of a mesh, in the plane in which it rocks; None of another block."""
+        """Trapezoids of a mesh's outline in its rocking plane; None for other blocks."""
         return None if self.case.body is None else self.case.body.across(self.case.azimuth)
 
     @functools.cached_property
     def ground(self) -> Motion | None:
-        """The horizontal motion whose displacement is drawn: of a record the part that does not drift away."""
+        """Horizontal motion whose displacement is drawn; records are filtered against drift."""
         if self.case.motion is None:
             return None
         motion = self.case.motion.with_vertical(None)
@@ -75,7 +75,7 @@ class Simulated:
 
 
 def unresolved(response: Response, start: float, end: float) -> list[float]:
-    """Return the times, s, from the last resolved impact to the rest, of sequences whose end is seen in a window."""
+    """Return the times, s, from the last resolved impact to the rest, for sequences that end in a window."""
     ends = np.asarray(response.chattering["end"], dtype=float)
     impact_times = np.asarray(response.impacts["time"], dtype=float)
     last = impact_times[np.searchsorted(impact_times, ends, side="right") - 1]
@@ -84,13 +84,13 @@ def unresolved(response: Response, start: float, end: float) -> list[float]:
 
 
 def drifts(motion: Motion) -> bool:
-    """Whether the displacement of a motion is that of a record, and can be filtered."""
+    """Whether a motion has the displacement of a record, which can be filtered."""
     long_enough = motion.step is not None and motion.duration > 2.0 * _LONGEST_PERIOD > 20.0 * motion.step
     return long_enough and motion.coefficients.shape[1] == 2 and not motion.jumps
 
 
 def facts(shown: Simulated) -> dict[str, Any]:
-    """Return the numbers that a page shows of a case, and the sentence above them."""
+    """Return the numbers of a case on the page, and the sentence above them."""
     case, response = shown.case, shown.response
     block, motion = case.block, case.motion
     return {
@@ -118,7 +118,7 @@ def facts(shown: Simulated) -> dict[str, Any]:
 
 
 def verdict(response: Response, thresholds: tuple[float, float]) -> dict[str, Any] | str:
-    """Say in one sentence what becomes of a block lifted by these accelerations (m/s^2): first whether it falls."""
+    """Describe the outcome of a block with these uplift accelerations (m/s^2) in one sentence, overturning first."""
     if response.stopped:
         words = in_words(response, "")
         return f"{words[0].upper()}{words[1:]}."
@@ -146,14 +146,14 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> dict[str, An
     if unproven:
         resting = phrase("verdict.unproven", rests=resting, unproven=unproven)
     ratio = known_ratio(response)
-    # Two digits, and four about the whole, where they decide.
+    # Two digits, or four near 100 %, where they matter.
     share = phrase("verdict.percent" if ratio < 0.99 else "verdict.near_percent", value=100.0 * ratio)
     return phrase("verdict.stays", share=share, resting=resting)
 
 
 @functools.lru_cache(maxsize=4)
 def _motion_facts(motion: Motion) -> dict[str, Any]:
-    """Say what a motion is, found once while only the block is changed."""
+    """Return facts on a motion, cached while only the block changes."""
     return {
         "name": motion.name,
         "duration": motion.duration,
@@ -165,7 +165,7 @@ def _motion_facts(motion: Motion) -> dict[str, Any]:
 
 
 def _outline(block: Block, outline: Floats | None) -> dict[str, Any]:
-    """Corners of the block as it stands (m), or trapezoids (n, 6), its centre of mass at distance 0, and its extent."""
+    """Return the corners of the standing block (m) or trapezoids (n, 6), centre of mass at distance 0, and extent."""
     right, left = (side.radius * math.sin(side.alpha) for side in block.sides)
     heights = [side.radius * math.cos(side.alpha) for side in block.sides]
     centre = 0.5 * (heights[0] + heights[1])
@@ -176,7 +176,7 @@ def _outline(block: Block, outline: Floats | None) -> dict[str, Any]:
 
 
 def checked_window(window: tuple[float, float], duration: float) -> tuple[float, float]:
-    """Return the ends of a window, s, within a response that lasts so long; refuse what is none."""
+    """Return the ends of a window, s, within a response of this duration; reject invalid windows."""
     start, end = window
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
         raise InvalidOption("the window must go from a time to a later one, both in s", value=window)
@@ -191,12 +191,12 @@ def checked_window(window: tuple[float, float], duration: float) -> tuple[float,
 def shown_window(
     window: tuple[float, float] | None, duration: float, usual: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return a window, s, or the usual one where none is given or it was chosen for a longer response."""
+    """Return a window, s, or the default if it is missing or was chosen for a longer response."""
     return usual if window is None or window[0] >= duration else checked_window(window, duration)
 
 
 def about_window(shown: Simulated, start: float, end: float) -> dict[str, Any]:
-    """Say what a window shows: its ends, how many impacts, and how long before a rest the last one is, s."""
+    """Describe a window: its ends, number of impacts, and time from the last one to a rest, s."""
     response = shown.resolved(start, end)
     times = response.impacts["time"]
     count = np.searchsorted(times, end, "right") - np.searchsorted(times, start, "left")
@@ -205,12 +205,12 @@ def about_window(shown: Simulated, start: float, end: float) -> dict[str, Any]:
 
 
 def ends_of(start: float, end: float) -> dict[str, float]:
-    """Return the ends of what is shown, s, apart also where a response lasts no time."""
+    """Return distinct ends of the display, s, also for a response of zero duration."""
     return {"from": start, "to": end if end > start else start + 1.0}
 
 
 def lines_in(shown: Simulated, start: float, end: float, points: int = POINTS) -> dict[str, Floats]:
-    """Lines in a window; times count from its start, so that they keep their digits however narrow it is."""
+    """Return the lines in a window; times count from its start to keep their precision in narrow windows."""
     response = shown.resolved(start, end)
     impact_times = response.impacts["time"]
     inside = impact_times[(impact_times >= start) & (impact_times <= end)]
@@ -228,7 +228,7 @@ def lines_in(shown: Simulated, start: float, end: float, points: int = POINTS) -
 
 
 def extremes(values: Floats, most: int) -> Integers:
-    """Return where at most so many values of a line are: the least and the greatest of each stretch of neighbours.
+    """Return the indices of at most `most` values of a line: minimum and maximum of each group of neighbours.
 
     Examples
     --------
@@ -247,7 +247,7 @@ def extremes(values: Floats, most: int) -> Integers:
 
 
 def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Floats]:
-    """Ground acceleration in a window, standard g; with a vertical component, the weight that multiplies thresholds."""
+    """Return the ground acceleration in a window, g; with a vertical component, also the factor on thresholds."""
     motion = case.motion
     if motion is None:
         return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
@@ -265,7 +265,7 @@ def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Flo
 
 
 def ground_in(shown: Simulated, start: float, end: float) -> dict[str, Floats]:
-    """Displacement of the ground in a window, m."""
+    """Return the displacement of the ground in a window, m."""
     times = np.linspace(start, end, POINTS // 4)
     ground = shown.ground
     moved = np.zeros_like(times) if ground is None else ground.displacement(np.minimum(times, ground.duration))
@@ -273,7 +273,7 @@ def ground_in(shown: Simulated, start: float, end: float) -> dict[str, Floats]:
 
 
 def lines_of(response: Response) -> dict[str, Floats]:
-    """Return what no window changes: impacts with their intervals, rests, uplifts, chattering sequences."""
+    """Return the lines common to all windows: impacts with intervals, rests, uplifts, chattering sequences."""
     intervals, ratios = _intervals(response)
     sequences = response.chattering
     columns = [np.asarray(sequences[name], dtype=float) for name in ("start", "end", "lower", "upper", "impacts")]
@@ -290,7 +290,7 @@ def lines_of(response: Response) -> dict[str, Floats]:
 
 
 def _uncertain(response: Response) -> Floats:
-    """Return how far the rest of each sequence moves in the repeated simulations, s; NaN where it is not in all."""
+    """Return the spread of each sequence's rest in the repeated simulations, s; NaN if missing in one of them."""
     if not len(response.chattering):
         return np.empty(0)
     rests = np.searchsorted(response.events["time"], response.chattering["end"])
@@ -298,7 +298,7 @@ def _uncertain(response: Response) -> Floats:
 
 
 def _intervals(response: Response) -> tuple[Floats, Floats]:
-    """Time from each impact to the next, and the ratio of the next interval but one to it (to eta^2); or NaN."""
+    """Return the time from each impact to the next, and the ratio of the next interval but one to it (or NaN)."""
     impact_times = np.asarray(response.impacts["time"], dtype=float)
     intervals = np.append(np.diff(impact_times), np.nan)[: len(impact_times)]
     uplifts = response.events["time"][response.events["kind"] == "uplift"]

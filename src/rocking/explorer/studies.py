@@ -1,4 +1,4 @@
-"""A study as maps: its outcomes over two of the parameters that it varies."""
+"""Study as maps: its outcomes over two of its parameters."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from rocking.motion.scaling import FACTOR
 #: Largest map, points.
 _MOST: Final = 1_000_000
 
-#: Values of an axis that are named, or offered to choose from, at most.
+#: Maximum number of axis values that are named or offered as choices.
 _NAMED: Final = 1000
 
-#: Parameters of a block, and the units in which a study has them.
+#: Parameters of a block, and their units in a study.
 _PARAMETERS: Final = {"p": "rad/s", "alpha": "rad", "restitution": ""}
 
-#: What is drawn for a block of which it is not known whether it overturns: the simulation was given up, or stopped.
+#: Value of blocks with unknown outcome, because the simulation was abandoned or stopped.
 OPEN: Final = -1.0
 
-#: Quantities of a study that are drawn.
+#: Quantities of a study that can be drawn.
 QUANTITIES: Final = ("overturned", "peak_rotation", "impacts", "rests", "time_at_rest")
 
 
 class StudyView:
-    """A study in a folder, slice by slice, over the parameters of its blocks' grid, or else by their number."""
+    """Slices of a study in a folder, over the parameters of its blocks' grid, or else over their number."""
 
     def __init__(self, folder: Path) -> None:
         self.name = folder.name
@@ -67,14 +67,14 @@ class StudyView:
             )
 
     def axes(self) -> dict[str, Floats]:
-        """Values of what the study varies."""
+        """Values of the varied parameters."""
         found = {name: np.unique(values) for name, values in self._columns.items()}
         found["scale"] = np.unique(self._scales)
         found["motion"] = np.arange(1.0, len(self.study.product.motions) + 1.0)
         return {name: values for name, values in found.items() if values.size > 1}
 
     def describe(self) -> dict[str, Any]:
-        """Say what the study holds."""
+        """Describe the study."""
         product, axes = self.study.product, self.axes()
         return {
             "name": self.name,
@@ -88,7 +88,7 @@ class StudyView:
         }
 
     def slice(self, texts: Mapping[str, str]) -> Payload:
-        """Return one quantity over two parameters ``x`` and ``y``; texts as ``motion_index``, ``fix_p`` fix others."""
+        """Return one quantity over ``x`` and ``y``; texts such as ``motion_index`` and ``fix_p`` fix the others."""
         axes = self.axes()
         x, y = (texts.get(which, "") for which in ("x", "y"))
         for which, name in {"x": x, "y": y}.items():
@@ -109,7 +109,7 @@ class StudyView:
             name: np.searchsorted(axes[name], self._columns[name][blocks]) for name in (x, y) if name in self._columns
         }
         for scale, motion in itertools.product(scales, motions):
-            level = np.searchsorted(np.unique(self._scales), self._scales[scale])  # a study has them in any order
+            level = np.searchsorted(np.unique(self._scales), self._scales[scale])  # a study's scales may be unsorted
             at |= {"scale": np.full(blocks.size, level), "motion": np.full(blocks.size, motion)}
             chosen = {"motion": motion, "scale": scale, "polarity": self._index(texts, "polarity_index")}
             found = results.isel({name: k for name, k in chosen.items() if name in results.dims})
@@ -144,7 +144,7 @@ class StudyView:
         return found if product.duration is None else found | {"duration": repr(product.duration)}
 
     def _at(self, texts: Mapping[str, str], which: str) -> float:
-        """Return a coordinate of a point of a slice: a number, and on an axis of numbers of things one of these."""
+        """Return a coordinate of a point of a slice; on an axis of indices it must be one of them."""
         at = number(texts.get(f"at_{which}", ""), f"at_{which}")
         last = {"motion": len(self.study.product.motions), "block": len(self.study.product.blocks)}.get(
             texts.get(which, ""), 0
@@ -155,12 +155,12 @@ class StudyView:
         return float(round(at)) if last else at
 
     def _parameters(self, block: float) -> dict[str, list[float]]:
-        """Parameters of a block by its number: one value each, or two where the sides differ."""
+        """Return the parameters of a block by its number: one value each, or two if the sides differ."""
         pairs = {name: getattr(self.study.product.blocks, name)[round(block) - 1] for name in _PARAMETERS}
         return {name: list(dict.fromkeys(map(float, pair))) for name, pair in pairs.items()}
 
     def _drawn(self, quantity: str) -> Any:
-        """Outcome that is drawn; a verdict that a simulation left open is `OPEN`, and not that the block stands."""
+        """Return the outcome to draw, or `OPEN` if the simulation left it open."""
         results = self.study.results()
         found = results[quantity]
         if quantity != "overturned":
@@ -169,13 +169,13 @@ class StudyView:
         return found.astype(float).where(~is_open, OPEN)
 
     def _value(self, name: str, texts: Mapping[str, str]) -> float:
-        """Value of the study that is nearest to what a text says, or the first."""
+        """Return the value of the study that is nearest to a text, or the first."""
         values = np.unique(self._columns[name])
         wanted = texts.get(f"fix_{name}")
         return float(values[0] if not wanted else values[np.argmin(np.abs(values - number(wanted, name)))])
 
     def _index(self, texts: Mapping[str, str], name: str) -> int:
-        """Return the number of the scale, the motion or the polarity that a text chooses, or 0."""
+        """Return the index of the scale, motion or polarity in a text, or 0."""
         count = len(self._chosen_from[name])
         wanted = number(texts.get(name) or "0", name)
         if not (0 <= wanted < count and math.floor(wanted) == wanted):
@@ -197,7 +197,7 @@ class StudyView:
         return found | {"names": self._names(name)} if named else found
 
     def _names(self, axis: str) -> list[str]:
-        """Say what stands behind the numbers of blocks or motions."""
+        """Return the names of numbered blocks or motions."""
         if axis == "motion":
             return [str(name) for name in self.study.results().motion.values]
         blocks = map(self._parameters, self._columns["block"])

@@ -1,4 +1,4 @@
-"""Records and meshes that were given: files in memory within bounds, each known by a hash of its content."""
+"""Uploaded records and meshes: files in limited memory, identified by a hash of their content."""
 
 from __future__ import annotations
 
@@ -32,45 +32,45 @@ TOO_LARGE: Final = (
     f"a file may be {LARGEST // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
 )
 
-#: Files that are kept, forty stations of three components, and their bytes; of records more are refused, since none
-#: goes unseen.
+#: Maximum number of files, forty stations of three components, and their bytes. Further records are rejected, so that
+#: none disappears unnoticed.
 MOST: Final = 120
 ALL: Final = 256 * 2**20
 
-#: Bodies of meshes that are kept.
+#: Maximum number of cached bodies of meshes.
 _BODIES: Final = 12
 
-#: Samples of one channel at most: an hour and a half at a hundred a second. A motion takes some 120 bytes for each.
+#: Maximum number of samples in a channel: 1.5 hours at 100 Hz. A motion takes some 120 bytes per sample.
 LONGEST: Final = 500_000
 
-#: Samples of the motions that stay in memory once they are read, of 120 bytes each; those used longest ago go first.
+#: Maximum number of samples of cached motions, of 120 bytes each; the least recently used are removed first.
 READ: Final = 3_000_000
 
-#: Lines of a file at most: two such channels with a line for each sample. Samples that may be compressed in one.
+#: Maximum number of lines in a file (two such channels with a line per sample), and of possibly compressed samples.
 _MOST_LINES, _MOST_SAMPLES = 2 * LONGEST, 8 * LONGEST
 
 #: Letters of a name, and of a hash.
 _NAME, _HASH = 80, 24
 
-#: What a file is read with to learn its channels while it is not known what it leaves out.
+#: Placeholder arguments for reading the channels of a file with missing metadata.
 _STAND_INS: Final[dict[str, Any]] = {"dt": 1.0, "units": "m/s2"}
 
 
 class Upload(NamedTuple):
-    """A file: its name without folders, and its content."""
+    """File name without folders, and content of a file."""
 
     name: str
     data: bytes
 
     def stream(self) -> io.BytesIO:
-        """Return its content as readers take it: a stream that has the file's name."""
+        """Return the content as a stream with the name of the file, for readers."""
         stream = io.BytesIO(self.data)
         stream.name = self.name
         return stream
 
 
 class Recent(Generic[V]):
-    """Values that were used last, as many as their weights allow; safe to use from several threads."""
+    """Thread-safe least-recently-used cache with limited total weight."""
 
     def __init__(self, most: float, weight: Callable[[V], float] = lambda _: 1.0) -> None:
         self._most, self._weight = most, weight
@@ -78,7 +78,7 @@ class Recent(Generic[V]):
         self._values: OrderedDict[tuple[str, ...], V] = OrderedDict()
 
     def get(self, key: tuple[str, ...], make: Callable[[], V]) -> V:
-        """Return the value of a key, made now unless it is kept."""
+        """Return the value of a key, created unless it is cached."""
         with self._lock:
             if key in self._values:
                 self._values.move_to_end(key)
@@ -91,14 +91,14 @@ class Recent(Generic[V]):
         return value
 
     def forget(self, name: str) -> None:
-        """Forget all values whose keys contain a name."""
+        """Remove all values whose keys contain a name."""
         with self._lock:
             for key in [key for key in self._values if any(name in part for part in key)]:
                 del self._values[key]
 
 
 class UploadStore:
-    """Files and motions by keys; safe to use from several threads."""
+    """Thread-safe store of files and motions by keys."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -109,7 +109,7 @@ class UploadStore:
         self._bodies = Recent["Body | RockingError"](_BODIES)
 
     def add_file(self, name: str, data: bytes) -> str:
-        """Keep a record, and return its key."""
+        """Store a record, and return its key."""
         upload = Upload(bare_name(name), data)
         if (lines := max(data.count(b"\n"), data.count(b"\r"))) > _MOST_LINES and b"\0" not in data:
             raise UnreadableRecord(
@@ -119,7 +119,7 @@ class UploadStore:
         return self._kept(upload)
 
     def add_mesh(self, name: str, data: bytes) -> str:
-        """Keep a mesh, and return its key."""
+        """Store a mesh, and return its key."""
         upload = Upload(bare_name(name), data)
         if not _is_mesh(upload.name):
             kinds = ", ".join(MESH_KINDS)
@@ -147,7 +147,7 @@ class UploadStore:
         return key
 
     def take(self, name: str, data: bytes) -> dict[str, Any]:
-        """Keep a file, and say what it is; one that cannot be read is not kept."""
+        """Store a file, unless it is unreadable, and describe it."""
         key = self.add_file(name, data)
         try:
             return self.contents(key)
@@ -156,7 +156,7 @@ class UploadStore:
             raise
 
     def remove(self, key: str) -> None:
-        """Forget a file, and all that was made of it."""
+        """Remove a file and its results."""
         self.file(key)
         with self._lock:
             self._files.pop(key, None)
@@ -164,18 +164,18 @@ class UploadStore:
             store.forget(key)
 
     def kept(self) -> tuple[str, ...]:
-        """Return the keys of the records that are kept, in the order in which they came."""
+        """Return the keys of the stored records, in order of upload."""
         with self._lock:
             return tuple(key for key, each in self._files.items() if not _is_mesh(each.name))
 
     def usage(self) -> dict[str, int]:
-        """Say how many files are kept, of how many bytes, and how many may be."""
+        """Return number and bytes of the stored files, and their limits."""
         with self._lock:
             held = sum(len(each.data) for each in self._files.values())
             return {"files": len(self._files), "bytes": held, "most_files": MOST, "most_bytes": ALL}
 
     def add_motion(self, motion: Motion) -> str:
-        """Keep a motion of the program's own, and return its key."""
+        """Store a motion of the program, and return its key."""
         components = [motion] if motion.vertical is None else [motion, motion.vertical]
         parts = [
             part
@@ -188,20 +188,20 @@ class UploadStore:
         return key
 
     def motion(self, key: str) -> Motion:
-        """Return a motion of the program's own."""
+        """Return a motion of the program."""
         if key not in self._motions:
             raise UnreadableRecord("this link names a motion of another program: open the page from there again")
         return self._motions[key]
 
     def file(self, key: str, what: str = "record") -> Upload:
-        """Return a file that is kept."""
+        """Return a stored file."""
         with self._lock:
             if key not in self._files:
                 raise UnreadableRecord(f"this {what} is not here any more: drop its file on the page again")
             return self._files[key]
 
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
-        """Return the motion of a file; arguments as for `rocking.read`."""
+        """Return the motion of a file, with the arguments of `rocking.read`."""
         upload = self.file(key)
         request = _request(dt, units, channel)
         return self._read.get(
@@ -209,7 +209,7 @@ class UploadStore:
         )
 
     def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> Body:
-        """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts that a case has of it."""
+        """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts of a case."""
         upload = self.file(name.removeprefix("file:"), "mesh") if name.startswith("file:") else None
         if upload is None:
             checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED])
@@ -221,7 +221,7 @@ class UploadStore:
         return found
 
     def contents(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
-        """Say what a file is: its format, its channels, and which arguments it needs before it can be read."""
+        """Describe a file: its format, channels, and arguments that reading requires."""
         upload = self.file(key)
         return self._told.get((key, str(dt), str(units)), lambda: self._contents(key, upload, dt, units))
 
@@ -249,7 +249,7 @@ class UploadStore:
 
 
 def _about(channel: Channel) -> dict[str, Any]:
-    """Return what the file says of a channel."""
+    """Return the metadata of a channel."""
     said = {name: getattr(channel, name) for name in ("number", "name", "station", "event", "azimuth")}
     return {**said, "samples": len(channel.acceleration), "step": channel.dt}
 
@@ -259,7 +259,7 @@ def _request(dt: float | None, units: str | None, channel: str | None = None) ->
 
 
 def _shown(upload: Upload, channel: Channel) -> Motion:
-    """Return a channel as a motion, unless it is longer than the page shows."""
+    """Return a channel as a motion; reject motions longer than the limit of the page."""
     samples = len(channel.acceleration)
     if samples > LONGEST:
         raise InvalidMotion(f"{samples} samples; at most {LONGEST} are shown here", path=upload.name)
@@ -267,7 +267,7 @@ def _shown(upload: Upload, channel: Channel) -> Motion:
 
 
 def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
-    """Say what looks like a mistake in a channel; or what it would be with each choice of what is missing."""
+    """Return likely mistakes in a channel and its measures, or the effect of each choice of missing metadata."""
     if not missing:
         return {"notes": list(motion_notes(motion)), "choices": {}, "measures": measures(motion)}
     choices: dict[str, list[tuple[str, dict[str, float]]]] = {}
@@ -282,7 +282,7 @@ def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
 
 
 def measures(motion: Motion) -> dict[str, float]:
-    """Return what a list of records shows of each: PGA (m/s^2), PGV (m/s), 5-95 % duration and whole duration (s)."""
+    """Return the listed measures of a record: PGA (m/s^2), PGV (m/s), 5-95 % duration and total duration (s)."""
     return {
         "pga": motion.pga,
         "pgv": motion.pgv,
@@ -296,7 +296,7 @@ def _is_mesh(name: str) -> bool:
 
 
 def bare_name(name: str) -> str:
-    r"""Return a file's name without folders and control characters, not too long.
+    r"""Return a file's name without folders and control characters, truncated.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""Figures drawn from arrays; this layer knows no class of the package."""
+"""Figures drawn from arrays, independent of the classes of the package."""

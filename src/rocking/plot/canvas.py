@@ -1,4 +1,4 @@
-"""What all figures share: colours, where a figure is drawn and who knows of it, its title, labels and legend."""
+"""Common parts of all figures: colours, creation and display, titles, labels and legends."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Luminances differ, so that the figures read in grey as well.
+# Luminances differ, so that figures are legible in greyscale.
 INK: Final = "#10243e"
 GROUND: Final = "#94a0ad"
 REST: Final = "#e3e6ea"
 ABOVE: Final = "#b0390c"
 
-#: Curves of one figure: luminances differ, and so do the dashes.
+#: Styles of the curves of one figure; luminances and dashes differ.
 CURVES: Final[tuple[dict[str, Any], ...]] = (
     {"color": INK, "linestyle": "-"},
     {"color": ABOVE, "linestyle": (0, (5, 1.5))},
@@ -37,7 +37,7 @@ CURVES: Final[tuple[dict[str, Any], ...]] = (
     {"color": "#b8860b", "linestyle": (0, (6, 1.5, 1, 1.5))},
 )
 
-#: Where a scale of colours is still seen on white.
+#: Lightest value of a colour scale that is visible on white.
 _LIGHTEST: Final = 0.85
 
 STYLE: Final[dict[Any, Any]] = {
@@ -56,24 +56,24 @@ STYLE: Final[dict[Any, Any]] = {
     "legend.frameon": False,
 }
 
-#: A number with more decimals than anybody reads.
+#: A number with too many decimals.
 _LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
 
-#: Width of a letter over the size of its font: mean, and of a short label; letters that a line of a legend's handle
-#: and gaps take.
+#: Letter width relative to the font size: mean, and for short labels; letters that the handle
+#: and gaps of a legend line take.
 _LETTER: Final = 0.52
 _WIDE_LETTER: Final = 0.53
 _HANDLE: Final = 5
 
-#: Longest line of a label over its axis, of which the layout will make the upright one shorter for title and legend.
+#: Maximum label length relative to its axis; the vertical axis is shortened later by title and legend.
 _LINE: Final = (0.9, 0.6)
 _FEWEST_LETTERS: Final = 12
 
-#: What is written of each decade of an axis, where there is less than one, and where there are more.
+#: Tick values of each decade on axes of less than one decade, and of more.
 _DIGITS: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 _FEW_DIGITS: Final = (1.0, 2.0, 5.0)
 
-#: Where titles begin, in widths of the figure.
+#: Left end of titles, in widths of the figure.
 _TITLE_AT: Final = 0.02
 
 
@@ -81,13 +81,13 @@ _TITLE_AT: Final = 0.02
 def figure_for(
     ax: Axes | None, default: tuple[float, float], figsize: tuple[float, float] | None = None, title: str = ""
 ) -> Iterator[Figure]:
-    """Yield the figure to draw in: that of `ax` where there is one, in its own style, else a new one in this package's.
+    """Yield the figure to draw in: the figure of `ax`, if any, in its own style, else a new one in the package's style.
 
-    Its size (inches) is `figsize`, or else the default, which suits what is drawn.
+    The size (inches) is `figsize` or a default that suits the content.
 
-    A new figure is made through pyplot if that is loaded, or in a notebook, so that `pyplot.show()` shows it. Elsewhere
-    no global state knows of it, and it is forgotten with its last reference. A notebook shows each figure once, as a
-    cell's value or at its end.
+    If pyplot is loaded, or in a notebook, a new figure is created through pyplot, so that `pyplot.show()` shows it.
+    Elsewhere no global state refers to the figure, and it is freed with its last reference. A notebook shows each
+    figure once, as the value of a cell or at its end.
     """
     short = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title)
     if ax is not None:
@@ -110,12 +110,12 @@ def figure_for(
         yield figure
         _make_ticks(figure)
         interactive = mpl.is_interactive()
-    # The context undoes what a notebook chose if pyplot was loaded in it: to show figures at the end of a cell.
+    # The context would undo the notebook's setting to show figures at the end of a cell if pyplot was loaded in it.
     mpl.interactive(interactive)
 
 
 class Place(TypedDict, total=False):
-    """Where and under which title a figure is drawn: options of every figure."""
+    """Options of every figure: axes, title and size."""
 
     title: str
     ax: Axes | None
@@ -123,7 +123,7 @@ class Place(TypedDict, total=False):
 
 
 class Page:
-    """Figure that is being drawn: its panels, and the handles of its legend where labels do not tell them all."""
+    """Figure in progress, with its panels and additional legend handles."""
 
     def __init__(self, figure: Figure, ax: Axes | None) -> None:
         self.figure, self.ax = figure, ax
@@ -131,14 +131,14 @@ class Page:
         self.handles: list[Any] | None = None
 
     def panels(self, places: Any = "A", **options: Any) -> list[Axes]:
-        """Make panels at the letters of a mosaic, the main one first, or return the caller's axes alone."""
+        """Create panels at the letters of a mosaic, the main one first, or return the caller's axes alone."""
         self.drawn = [self.ax] if self.ax else [*self.figure.subplot_mosaic(places, **options).values()]
         return self.drawn
 
 
 @contextmanager
 def page_for(default: tuple[float, float], **place: Unpack[Place]) -> Iterator[Page]:
-    """Yield a page on a figure as of `figure_for`, whose legend names all that has a label in its panels."""
+    """Yield a page on a figure of `figure_for`; its legend lists all labelled artists of the panels."""
     ax = place.get("ax")
     with figure_for(ax, default, place.get("figsize"), place.get("title", "")) as figure:
         page = Page(figure, ax)
@@ -147,25 +147,25 @@ def page_for(default: tuple[float, float], **place: Unpack[Place]) -> Iterator[P
 
 
 def _letters(width: float, dpi: float, letter: float = _LETTER) -> int:
-    """Return how many letters of the style's font a width, in pixels, has space for."""
+    """Return the number of letters in the style's font that fit in a width in pixels."""
     return max(_FEWEST_LETTERS, int(width / (letter * dpi * float(STYLE["font.size"]) / 72.0)))
 
 
 def magnified(largest: float) -> tuple[float, str]:
-    """Return a power of a thousand by which values up to this one are drawn, and the words for it in a label."""
+    """Return a power of a thousand that scales values up to `largest`, and its words for a label."""
     power = 3 * max(0, math.ceil((-math.log10(largest) - 0.5) / 3.0)) if largest > 0.0 else 0
     return 10.0**power, f"$10^{{{power}}}$ " if power else ""
 
 
 def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
-    """Name both axes, in lines about as long as they are."""
+    """Label both axes, with lines about as long as the axes."""
     lengths = _LINE[0] * axes.bbox.width, _LINE[1] * axes.bbox.height
     for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
         axis.set_label_text(textwrap.fill(label, _letters(length, axes.figure.dpi), break_long_words=False))
 
 
 def styles_of(count: int) -> list[dict[str, Any]]:
-    """Return a colour and dashes for each of so many curves; those of more than four go from dark to light in order."""
+    """Return a colour and dashes for each curve; more than four go from dark to light in order."""
     if count <= len(CURVES):
         return [*CURVES[:count]]
     from matplotlib import colormaps
@@ -176,18 +176,18 @@ def styles_of(count: int) -> list[dict[str, Any]]:
 
 
 def write(axes: Axes, text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> None:
-    """Write a text so many points off a place."""
+    """Write a text at an offset in points from a position."""
     axes.annotate(text, at, xytext=off, textcoords="offset points", **look)
 
 
 def add_ticks(axes: Axes, places: Floats, height: float, marker: str = "|", **look: Any) -> None:
-    """Mark places along an axis, all at one height over that of the axes; short ticks unless another look is given."""
+    """Mark positions along an axis at one height, relative to the axes; short ticks by default."""
     shown: dict[str, Any] = {"color": INK, "markersize": 6, "markeredgewidth": 0.5} | look
     axes.plot(places, np.full(places.size, height), marker, transform=axes.get_xaxis_transform(), **shown)
 
 
 def cell_edges(x: Floats) -> Floats:
-    """Edges of the cells about some places: midway between them; of one place alone a tenth of it away."""
+    """Return the edges of the cells around positions: the midpoints, or a tenth away from a single position."""
     if x.size == 1:
         half = max(0.1 * abs(float(x[0])), 1e-9)
         return np.array([x[0] - half, x[0] + half])
@@ -196,7 +196,7 @@ def cell_edges(x: Floats) -> Floats:
 
 
 def scale_by_ratio(axes: Axes, x: Floats) -> None:
-    """Scale an axis that these numbers go along logarithmically, with as many numbers as fit."""
+    """Make the axis of these numbers logarithmic, with as many tick labels as fit."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     decades = abs(float(np.log10(x[-1] / x[0]))) if x.size > 1 else 0.0
@@ -207,7 +207,7 @@ def scale_by_ratio(axes: Axes, x: Floats) -> None:
 
 
 def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> None:
-    """Put the legend below all panels of a figure of its own, where it covers no data; else into the caller's axes."""
+    """Put the legend below the panels of a new figure, where it covers no data, or into the caller's axes."""
     if ax is not None and handles:
         ax.legend(handles=handles)
     elif handles:
@@ -219,7 +219,7 @@ def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> No
 
 
 def handles_of(*panels: Axes) -> list[Artist]:
-    """Collect the handles of all that has a label in these panels, each label once."""
+    """Collect the handles of labelled artists, each label once."""
     named: dict[str, Artist] = {}
     for panel in panels:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
@@ -243,19 +243,19 @@ def _new_figure(figsize: tuple[float, float]) -> Figure:
 
     figure = plt.figure(figsize=figsize, layout="constrained")
     if _shows_at_the_end_of_cells():
-        # The cell shows the figure as its value; what pyplot still holds is shown once more after it.
+        # The cell shows the figure as its value, so pyplot must not show it again.
         plt.close(figure)
     return figure
 
 
 def _shows_at_the_end_of_cells() -> bool:
-    """Whether a notebook shows what pyplot holds when a cell ends, and then forgets it."""
+    """Whether a notebook shows and then closes pyplot's figures at the end of a cell."""
     pyplot: Any = sys.modules.get("matplotlib.pyplot")
     return pyplot is not None and "inline" in pyplot.get_backend()
 
 
 def _show_once(figure: Figure) -> None:
-    """Have a caller's figure forgotten by pyplot as it is first shown: else the value of a cell is shown twice."""
+    """Make pyplot forget a figure when it is first shown, so that cells do not show it twice."""
     if _shows_at_the_end_of_cells():
         vars(figure)["_ipython_display_"] = functools.partial(_show, figure)
 
@@ -271,7 +271,7 @@ def _show(figure: Figure) -> None:
 
 
 def _is_shown() -> bool:
-    """Whether there is a pyplot that somebody may ask to show the figure; windows belong to the main thread alone."""
+    """Whether pyplot can show the figure; windows require the main thread."""
     ipython = sys.modules.get("IPython")
     in_notebook = ipython is not None and hasattr(ipython.get_ipython(), "kernel")
     is_main = threading.current_thread() is threading.main_thread()
@@ -279,7 +279,7 @@ def _is_shown() -> bool:
 
 
 def _make_ticks(figure: Figure) -> None:
-    """Make the first tick of every axis: it takes the style of the moment, and all later ones are made after it."""
+    """Create the first tick of every axis in the current style, which all later ticks copy."""
     for axes in (one for panel in figure.axes for one in (panel, *panel.child_axes)):
         for axis in (axes.xaxis, axes.yaxis):
             axis.get_major_ticks(1)

@@ -1,4 +1,4 @@
-"""Curves with bands and dots: fragility, risk, spectra, incremental dynamic analyses, calibrations."""
+"""Curves with bands and points: fragility, risk, spectra, incremental dynamic analyses, calibrations."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _DOT: Final[dict[str, Any]] = {"markersize": 4.0, "markerfacecolor": "none"}
 
 
 class FragilityLine(NamedTuple):
-    """A fitted curve with its confidence band, and the shares seen among outcomes of about one intensity.
+    """Fitted curve with its confidence band, and the observed fractions in groups of similar intensity.
 
-    seen_at, seen (groups,) : mean intensity of each group of outcomes, and the share of them that exceeds the limit
+    seen_at, seen (groups,) : mean intensity of each group of outcomes, and its fraction that exceeds the limit
     """
 
     label: str
@@ -41,14 +41,14 @@ def fragility_figure(
     probability_label: str = "probability",
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw fitted fragility curves with their confidence bands, and the shares that were seen."""
+    """Draw fitted fragility curves with their confidence bands and the observed fractions."""
     with page_for((5.6, 4.2), **place) as page:
         (axes,) = page.panels()
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
             axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
             axes.plot(line.intensity, line.probability, linewidth=1.5, label=as_written(line.label), **style)
-            # Every limit state has a mark of its own.
+            # Every limit state has its own marker.
             axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
         is_bounded = any(np.any(line.lower < line.upper) for line in lines)
         axes.fill_between([], [], color=GROUND, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
@@ -62,7 +62,7 @@ def fragility_figure(
 def dispersions_figure(
     *, names: Sequence[str], dispersion: Floats, low: Floats, high: Floats, **place: Unpack[Place]
 ) -> Figure:
-    """Draw the dispersion of the intensity at overturning, with its interval, for each measure by name."""
+    """Draw the dispersion of the overturning intensity, with its interval, for each named measure."""
     with page_for((5.6, 0.8 + 0.32 * len(names)), **place) as page:
         (axes,) = page.panels()
         row = np.arange(len(names))
@@ -77,22 +77,22 @@ def dispersions_figure(
     return page.figure
 
 
-#: Shares of a rate are shown from this part of the highest one on.
+#: Fractions of a rate are shown from this part of the largest fraction on.
 _LEAST = 1e-3
 
-#: Rates are shown from this part of the lowest of the hazard curve to so many times its highest.
+#: Range of the shown rates: factors on the lowest and highest rate of the hazard curve.
 _MARGIN = 10.0
 
 
 class HazardLine(NamedTuple):
-    """Annual rates at which intensities are exceeded, and the ends of the curve, beyond which it is extended."""
+    """Annual exceedance rates of intensities, and the ends of the curve, beyond which it is extrapolated."""
 
     rate: Floats
     known: tuple[float, float]
 
 
 class RiskLine(NamedTuple):
-    """Which share of a limit state's rate comes from about each intensity, for each factor of e in intensity."""
+    """Fraction of a limit state's rate from each intensity, per factor of e in intensity."""
 
     label: str
     share: Floats
@@ -101,7 +101,7 @@ class RiskLine(NamedTuple):
 def risk_figure(
     *, intensity: Floats, hazard: HazardLine, lines: Sequence[RiskLine], intensity_label: str, **place: Unpack[Place]
 ) -> Figure:
-    """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from."""
+    """Draw a hazard curve, and below it the contributions to each limit state's rate."""
     with page_for((5.6, 5.2), **place) as page:
         *curves, shares = page.panels("A;B", sharex=True)
         for axes in curves:
@@ -132,7 +132,7 @@ def survival_figure(
     intensity_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw the largest annual rates of motions that fit with a block that still stands, and a hazard curve."""
+    """Draw a hazard curve and the largest annual rates consistent with a standing block."""
     with page_for((5.6, 3.6), **place) as page:
         (axes,) = page.panels()
         scale_by_ratio(axes, intensity)
@@ -154,7 +154,7 @@ def _inside(intensity: Floats, known: tuple[float, float]) -> np.ndarray[tuple[i
 
 
 def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
-    """Draw a hazard curve, dotted where it is extended."""
+    """Draw a hazard curve, dotted where it is extrapolated."""
     inside = _inside(intensity, hazard.known)
     label = "hazard curve (dotted: extended)" if not inside.all() else "hazard curve"
     axes.plot(intensity, hazard.rate, color=GROUND, linewidth=1.0, linestyle=":")
@@ -164,24 +164,24 @@ def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
     add_labels(axes, "", "exceeded, times a year")
 
 
-#: So many curves leave space for all of their fractiles, and so many for every motion.
+#: Maximum number of curves that are drawn with all fractiles, and with every motion.
 _WITH_ALL_FRACTILES: Final = 2
 _WITH_ALL_MOTIONS: Final = 4
 
-#: Most curves that the legend names.
+#: Maximum number of curves in the legend.
 _NAMED: Final = 8
 
-#: What marks an end of a line beyond which blocks overturn.
+#: Marker at the end of a line beyond which blocks overturn.
 _END: Final[dict[str, Any]] = {"marker": "x", "linestyle": "none", "markersize": 4.0, "markeredgewidth": 1.0}
 
 
 class SpectrumCurves(NamedTuple):
-    """Curves of one slenderness and restitution over the spectrum's abscissa; infinite where the block overturns.
+    """Curves of one slenderness and restitution against the abscissa; infinite where the block overturns.
 
-    label : what the legend says of them; none if empty
-    singles (motions, points) : peak rotation over slenderness of every motion
-    fractiles (fractiles, points) : their fractiles, the middle one drawn thickest
-    overturned (points,) : share of the motions that overturn the block
+    label : legend label; none if empty
+    singles (motions, points) : normalised peak rotation of every motion
+    fractiles (fractiles, points) : their fractiles; the middle one is drawn thickest
+    overturned (points,) : fraction of the motions that overturn the block
     """
 
     label: str
@@ -199,11 +199,11 @@ def spectrum_figure(
     x_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw peak rotations over the abscissa, and below them the share of motions that overturn the block.
+    """Draw peak rotations against the abscissa, and below them the fraction of motions that overturn the block.
 
-    One curve alone needs no label, and of more than eight some are named. Motions are drawn with up to four curves, and
-    all fractiles with one or two, else the middle one. A fractile, and the line of a single motion, ends in a cross
-    where the block of the next point overturns. In `ax`, the peak rotations are drawn without the shares.
+    A single curve needs no label, and if there are more than eight, some are labelled. Up to four curves are drawn
+    with all motions, up to two with all fractiles, more with the middle fractile. A fractile, and the line of a single
+    motion, ends in a cross if the block of the next point overturns. In `ax`, only the peak rotations are drawn.
     """
     middle = min(fractiles, key=lambda share: abs(share - 0.5))
     chosen = fractiles if len(motions) > 1 and len(curves) <= _WITH_ALL_FRACTILES else [middle]
@@ -241,7 +241,7 @@ def spectrum_figure(
 
 
 def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, Any]) -> None:
-    """Draw a line with gaps where its values are infinite, and mark its ends there."""
+    """Draw a line with gaps at infinite values, and mark its ends there."""
     finite = np.isfinite(values)
     shown = np.where(finite, values, np.nan)
     axes.plot(x, shown, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
@@ -250,12 +250,12 @@ def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, 
         axes.plot(x[ends], values[ends], color=style["color"], label="beyond: overturns", **_END)
 
 
-#: Shares of the motions that fractiles are of, and their lines.
+#: Fractiles of the motions, and their line styles.
 _FRACTILES: Final[Mapping[float, Any]] = {0.16: (0, (1, 1)), 0.5: "-", 0.84: (0, (5, 1.5))}
 
 
 class ScaledMotion(NamedTuple):
-    """One motion scaled up: levels, peak rotation over slenderness, and the bands (n, 2) of levels that overturn."""
+    """Levels, normalised peak rotations, and bands (n, 2) of overturning levels of one scaled motion."""
 
     label: str
     levels: Floats
@@ -266,7 +266,7 @@ class ScaledMotion(NamedTuple):
 def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Unpack[Place]) -> Figure:
     """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
 
-    More than four motions are drawn alike, with the fractiles of the levels that reach a peak rotation.
+    More than four motions are drawn in one style, with the fractiles of the levels that reach a peak rotation.
     """
     few = len(motions) <= len(CURVES)
     names = [as_written(motion.label) for motion in motions]
@@ -283,7 +283,7 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
             curves.plot(peak, motion.levels, label=names[k] if few else "each motion", **look)
             for panel in strips:
                 for band in motion.bands:
-                    # The ends are lines, so that the thinnest strip is seen.
+                    # Lines at the ends keep the thinnest strip visible.
                     color = style["color"] if few else INK
                     panel.plot([k, k], band, "_-", color=color, linewidth=5.0, markersize=5.0, solid_capstyle="butt")
         if not few:
@@ -291,7 +291,7 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
             peaks = np.linspace(0.0, float(np.max(every[np.isfinite(every)], initial=0.0)), 200)[1:]
             reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
             for share, linestyle in _FRACTILES.items():
-                # The lowest level that is enough for this share of the motions.
+                # Lowest level that suffices for this fraction of the motions.
                 level = reached[int(np.ceil(share * len(motions))) - 1]
                 look = {"linestyle": linestyle, "label": f"level that suffices for {100 * share:g} % of them"}
                 curves.plot(peaks, np.where(np.isfinite(level), level, np.nan), color=ABOVE, **look)
@@ -307,7 +307,7 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
 
 
 def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
-    """Lowest level at which a motion reaches each of these peak rotations; infinite where it never does."""
+    """Return the lowest level at which a motion reaches each peak rotation; infinite if never."""
     overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
     below = motion.levels < overturns
     level, peak = motion.levels[below], motion.peak[below]
@@ -328,10 +328,10 @@ _DOTS: Final[dict[str, Any]] = {"linestyle": "", "markersize": 3.2, "markeredgew
 
 
 class Parameter(NamedTuple):
-    """One parameter of the blocks that explain the outcomes: values (blocks, sides), and what is known of each side.
+    """One parameter of the blocks that explain the outcomes: values (blocks, sides) and estimates.
 
     estimates (sides, 3) : median, lower and upper end of its interval
-    bounds : lowest and highest value that was thinkable
+    bounds : lowest and highest plausible value
     """
 
     label: str
@@ -348,11 +348,11 @@ def outcomes_figure(
     weights: Floats,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw the outcome of every test against its fitted probability, and the blocks behind that by parameters."""
+    """Draw the outcome of every test against its fitted probability, and the parameters of the blocks."""
     with page_for((7.0, 4.6), **place) as page:
         below = "ABCDEFGHI"[: len(parameters)]
         tests, *panels = page.panels(f"{'T' * len(parameters)};{below}", height_ratios=(1.2, 1.0))
-        # In increasing order, and each outcome where a sure prediction would put it.
+        # Sorted, with each outcome at a probability of 0 or 1.
         order = np.argsort(probabilities, kind="stable")
         number, fell = np.arange(1, order.size + 1), overturned[order]
         tests.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
@@ -372,7 +372,7 @@ def outcomes_figure(
 def measured_figure(
     *, time: Floats, measured: Floats, residual: Floats, fitted_time: Floats, fitted: Floats, **place: Unpack[Place]
 ) -> Figure:
-    """Draw a measured rotation history (rad, over s), that of the fitted block, and what is left between them."""
+    """Draw measured and fitted rotation histories (rad, against s) and their residual."""
     with page_for((7.0, 4.0), **place) as page:
         main, *others = page.panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
         main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")
@@ -388,7 +388,7 @@ def measured_figure(
 
 
 def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
-    """Draw how the blocks are distributed, and above that the median of the population's centre and its interval."""
+    """Draw the distribution of the blocks, and the median and interval of the population's centre."""
     sides = parameter.values.shape[1]
     drawn = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}
     edges = np.histogram_bin_edges(parameter.values, _BINS)
@@ -410,7 +410,7 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
 def reliability_figure(
     *, predicted: Floats, observed: Floats, band_lower: Floats, band_upper: Floats, **place: Unpack[Place]
 ) -> Figure:
-    """Draw observed shares against predicted ones (bins,), with the bands of right predictions."""
+    """Draw observed against predicted fractions (bins,), with the bands of correct predictions."""
     with page_for((3.7, 3.7), **place) as page:
         (axes,) = page.panels()
         axes.plot([0.0, 1.0], [0.0, 1.0], color=GROUND, linewidth=0.8, linestyle=(0, (4, 2)))
@@ -424,7 +424,7 @@ def reliability_figure(
 
 
 def draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float) -> None:
-    """Draw an acceleration over time, about a line at zero."""
+    """Draw an acceleration against time, with a line at zero."""
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, acceleration, color=GROUND, linewidth=linewidth, label="_ground acceleration")
 
@@ -432,7 +432,7 @@ def draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float
 def motion_figure(
     *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **place: Unpack[Place]
 ) -> Figure:
-    """Draw a ground acceleration (g) over time (s), and a vertical one below it; in `ax`, the horizontal one alone."""
+    """Draw a ground acceleration (g) against time (s), and below it the vertical one, which is omitted in `ax`."""
     traces = {"ground acceleration (g)": acceleration_g}
     if vertical_g is not None and place.get("ax") is None:
         traces["vertical acceleration (g)"] = vertical_g

@@ -1,4 +1,4 @@
-"""Maps over two parameters: outcomes, regions, basins, a number for each block; and roses over all directions."""
+"""Maps over two parameters (outcomes, regions, basins, numbers for blocks) and roses over all directions."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-#: From harmless to the worst, each darker than the one before; the last stands out.
+#: From harmless to worst, each darker than the previous one; the last stands out.
 _COLOURS: Final = ("#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c")
 
-#: Colour of the hatch over what overturns later.
+#: Colour of the hatch over points that overturn later.
 _LATER: Final = "#b0390c"
 
-#: Colour and hatch of regions in which the block stays, and of those in which it overturns after 0, 1, ... impacts,
-#: from darkest to lightest: hatched, so that none is taken for one of the others in grey. The second one of those in
-#: which it stays is the darkest, as it is often a strip and must be seen between the others.
+#: Colours and hatches of regions in which the block stays, and in which it overturns after 0, 1, ... impacts, from
+#: darkest to lightest; hatches distinguish them in greyscale. The second of the regions in which it stays is the
+#: darkest, because it is often a strip that must remain visible between the others.
 _STAYS: Final = (("#ffffff", ""), ("#5d7da6", ""), ("#dde7f0", ""))
 _OVERTURNS_AFTER_REST: Final = ("#b0390c", "ooo")
 _UNFINISHED: Final = ("#b5b5b5", "++")
@@ -40,14 +40,14 @@ _OVERTURNS: Final = (
     ("#fbe7cd", "...."),
 )
 
-#: Share of the frame below which nobody sees a region, and share of its height below which lines would hide one.
+#: Fraction of the frame below which a region is invisible, and of its height below which lines hide it.
 _LEAST_SEEN: Final = 1e-3
 _STRIP: Final = 1e-2
 
-#: Share of the frame's height beyond which boundaries of two columns are no longer one.
+#: Fraction of the frame's height beyond which boundaries of two columns are not connected.
 _SAME: Final = 0.25
 
-#: The ends of a frame around one value, over it.
+#: Ends of a frame around one value, relative to the value.
 _AROUND: Final = np.array([0.9, 1.1])
 
 
@@ -62,7 +62,7 @@ def outcome_figure(
     y_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw which of up to six outcomes each point of a grid has: numbers of shape (len(y), len(x))."""
+    """Draw which of up to six outcomes each point of a grid has: integers of shape (len(y), len(x))."""
     from matplotlib import rc_context
     from matplotlib.colors import ListedColormap
 
@@ -72,7 +72,7 @@ def outcome_figure(
         page.handles = [_patch((_COLOURS[k], ""), meanings[k]) for k in np.unique(outcome)]
         if later.any():
             cells = np.ma.masked_where(~later, outcome)
-            # Two hatches over each other are seen on the lightest colours and on the darkest.
+            # Two overlaid hatches are visible on the lightest and the darkest colours.
             for ink, width in (("#ffffff", 2.0), (_LATER, 0.9)):
                 look: dict[str, Any] = {"cmap": ListedColormap(["none"]), "edgecolor": ink, "linewidth": 0.0}
                 with rc_context({"hatch.linewidth": width}):
@@ -85,7 +85,7 @@ def outcome_figure(
 def _colour_cells(
     axes: Axes, x: Floats, y: Floats, numbers: NDArray[np.integer], colours: Sequence[str], first: int = 0
 ) -> None:
-    """Fill the cells about the points of a grid, each with the colour of its number, of which `first` is the first."""
+    """Fill the cells around grid points by number, from `first` on."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     norm = BoundaryNorm(np.arange(len(colours) + 1) + first - 0.5, len(colours))
@@ -104,15 +104,15 @@ def regions_figure(
     y_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw regions between boundaries that are known at increasing abscissae x, shape (n,).
+    """Draw regions between boundaries at increasing abscissae x, shape (n,).
 
-    At each abscissa, `edges` are the ordinates of the boundaries, increasing, and `regions` those below, between and
-    above them: negative ones, from -5 on, where the block stays, the others where it overturns after so many impacts.
-    Boundaries between the same regions are joined straight; a region that a neighbour does not have ends half way to
-    it. Regions that can be seen are in the legend by their names.
+    At each abscissa, `edges` contains the increasing ordinates of the boundaries, and `regions` the regions below,
+    between and above them: the number of impacts before overturning, or -5 to -1 for other outcomes (see `_look`).
+    Boundaries between the same regions are connected by straight lines. A region without counterpart in the next
+    column ends half way to it. The legend names the visible regions.
     """
     low, high = y_range
-    # One column, or one level, fills the frame.
+    # A single column or level fills the frame.
     if x.size == 1:
         x, edges, regions = x * _AROUND, [*edges] * 2, [*regions] * 2
     if low == high:
@@ -156,7 +156,7 @@ def regions_figure(
 def _half_way(
     k: int, beside: int, edges: Sequence[Floats], regions: Sequence[Sequence[int]], farthest: float
 ) -> Floats:
-    """Boundaries of a column half way to one beside it: to the nearest between the same regions, or a tip, or as is."""
+    """Return a column's boundaries half way to its neighbour: matched to the nearest alike, closed, or unchanged."""
     one, other = np.array(edges[k], dtype=float), np.array(edges[beside], dtype=float)
     pairs = [*pairwise(regions[beside])]
     alike = np.array([[mine == theirs for theirs in pairs] for mine in pairwise(regions[k])], dtype=bool)
@@ -174,7 +174,7 @@ def _half_way(
 
 
 def _look(region: int) -> tuple[str, str]:
-    """Colour and hatch of a region: from -5, not finished, and -4, overturns after a rest, to n impacts."""
+    """Return colour and hatch of a region: -5 unfinished, -4 overturns after a rest, -3 to -1 stays, else impacts."""
     if region < 0:
         return (_UNFINISHED, _OVERTURNS_AFTER_REST, *_STAYS)[region + 5]
     return _OVERTURNS[min(region, len(_OVERTURNS) - 1)]
@@ -186,7 +186,7 @@ def _patch(look: tuple[str, str], label: str) -> Patch:
     return Patch(facecolor=look[0], hatch=look[1], edgecolor=INK, linewidth=0.5, label=label)
 
 
-#: Width and height of one panel, inches, and how many stand side by side.
+#: Width and height of one panel, inches, and the number of panels in a row.
 _PANEL: Final = (3.5, 2.9)
 _BESIDE: Final = 2
 
@@ -200,7 +200,7 @@ def blocks_figure(
     missing_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw a number for each block as the colour of a mark, in one panel or several with the same colours."""
+    """Draw a number for each block as the colour of a marker, in one or several panels with one colour scale."""
     if place.get("ax") is not None and len(panels) > 1:
         raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
     names, columns = [*panels], min(len(panels), _BESIDE)
@@ -223,14 +223,14 @@ def blocks_figure(
     return page.figure
 
 
-#: Shades by kind, each of another luminance; those of orbits from the largest basin on, of which the last is repeated.
+#: Shades by kind, with different luminances; orbits are ordered by basin size, and the last shade is repeated.
 _SHADES: Final = {
     "orbit": ("#f4f7fb", "#c3d3e6", "#8fabcd", "#6488b3", "#e8d9a8", "#bda55d"),
     "overturns": ("#8c3410", "#3f1404"),
     "unsettled": ("#7a7f85",),
 }
 
-#: Marks of the points of orbits, those of one orbit alike.
+#: Markers of orbit points, one for each orbit.
 _MARKS: Final = ("o", "^", "s", "D", "v", "P")
 
 
@@ -246,7 +246,7 @@ def basins_figure(
     y_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw which attractor each state of a grid goes to: numbers of shape (len(y), len(x)), -1 where unknown."""
+    """Draw the attractor of each state of a grid: integers of shape (len(y), len(x)), -1 if unknown."""
     seen = [kinds[:k].count(kind) for k, kind in enumerate(kinds)]
     shades = [_SHADES[kind][min(k, len(_SHADES[kind]) - 1)] for k, kind in zip(seen, kinds, strict=True)]
     with page_for((5.4, 4.6), **place) as page:
@@ -275,7 +275,7 @@ def rose_figure(
     weakest: tuple[float, float],
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw the acceleration that lifts a body in each direction, g, around its support; slenderness and p beside it."""
+    """Draw the uplift acceleration, g, of a body in each direction around its support, and its slenderness and p."""
     from matplotlib.patches import Polygon
 
     with page_for((6.8, 4.0), **place) as page:
@@ -297,7 +297,7 @@ def rose_figure(
 
 
 def shares_figure(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **place: Unpack[Place]) -> Figure:
-    """Draw shares, shape (curves, azimuths), over the azimuth: towards the north up, and the full circle is all."""
+    """Draw fractions, shape (curves, azimuths), against the azimuth; north is up, and the full circle is 1."""
     with page_for((4.8, 4.8), **place) as page:
         (axes,) = page.panels()
         _look_down(axes, 1.0)
@@ -309,19 +309,19 @@ def shares_figure(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **p
 
 
 def _closed(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Values over the azimuth, with the first once more a turn later."""
+    """Return values over the azimuth, with the first repeated after a full turn."""
     return np.append(azimuth, azimuth[0] + 360.0), np.append(values, values[0])
 
 
 def _around(azimuth: Floats, values: Floats) -> Floats:
-    """Places at distances towards azimuths, in a closed line; shape (2, n)."""
+    """Return points at distances and azimuths as a closed line, shape (2, n)."""
     turned, distances = _closed(azimuth, values)
     angle = np.deg2rad(turned)
     return np.asarray(distances * np.array([np.sin(angle), np.cos(angle)]))
 
 
 def _look_down(axes: Axes, most: float) -> None:
-    """Show as far as a distance to every side, with the distance from the middle on both axes."""
+    """Set equal limits, and label both axes with the distance from the centre."""
     axes.set(aspect="equal", xlim=(-1.1 * most, 1.1 * most), ylim=(-1.1 * most, 1.1 * most))
     axes.locator_params(nbins=5)
     axes.grid(True)

@@ -1,4 +1,4 @@
-"""Periodic orbits, branches of them, bifurcation diagrams, and intervals between the impacts of a sequence."""
+"""Periodic orbits, their branches, bifurcation diagrams, and intervals between impacts."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: How stable and unstable orbits are drawn.
+#: Line styles of stable and unstable orbits.
 _STABLE: Final[dict[str, Any]] = {"color": INK, "linewidth": 1.4, "linestyle": "-"}
 _IMPACT: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.8, "linestyle": (0, (1, 1.5))}
 _UNSTABLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
-#: Marks of bifurcations by their names, and what marks others.
+#: Markers of bifurcations by name, and of other bifurcations.
 _MARKS: Final = {
     "fold": "o",
     "flip": "D",
@@ -43,11 +43,11 @@ def orbit_figure(
     labels: tuple[str, str],
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw a periodic orbit: velocity against coordinate with its impacts, and the coordinate over time."""
+    """Draw a periodic orbit: velocity against coordinate with its impacts, and coordinate against time."""
     with page_for((7.0, 3.2), **place) as page:
         plane, *histories = page.panels("AB")
-        # Arcs end at impacts: a jump of the velocity is no part of the course.
-        at = np.searchsorted(time, impact_times, side="right") - 1  # division may have made two times one
+        # Arcs end at impacts, so that no line is drawn across a jump of the velocity.
+        at = np.searchsorted(time, impact_times, side="right") - 1  # two times may be equal after division
         x, v = (np.insert(each, at, np.nan) for each in (coordinate, velocity))
         plane.plot(x, v, label="orbit", **_STABLE)
         before = np.maximum(at - 1, 0)
@@ -73,11 +73,11 @@ def branch_figure(
     labels: tuple[str, str],
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw branches of periodic orbits: stable ones as full lines, unstable ones dashed, and bifurcations by marks."""
+    """Draw branches of periodic orbits: stable ones solid, unstable ones dashed, bifurcations as markers."""
     with page_for((5.2, 3.6), **place) as page:
         (axes,) = page.panels()
         for chosen, name, style in ((stable, "stable", _STABLE), (~stable, "unstable", _UNSTABLE)):
-            # Dashes reach to the points where full lines begin.
+            # Dashes extend to the points where solid lines begin.
             joined = chosen | np.append(chosen[1:], False) | np.insert(chosen[:-1], 0, False)
             shown = chosen if name == "stable" else joined
             if np.any(chosen & ~np.isnan(values)):
@@ -97,8 +97,8 @@ def branch_figure(
     return page.figure
 
 
-#: Colour of each way through the values, and area of its marks, points squared; of two the first is the larger, so that
-#: the second is seen on it, and the first around it.
+#: Colour and marker area (points squared) of each sweep direction. The first of two is larger, so that both are
+#: visible.
 _LOOKS: Final = ((INK, 4.0), (ABOVE, 0.9))
 _ALONE: Final = ((INK, 0.9),)
 
@@ -115,7 +115,7 @@ def bifurcation_figure(
     y_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw states, shape (len(value), n), of each direction against a parameter; NaN where there is none."""
+    """Draw states, shape (len(value), n), of each direction against a parameter; NaN if there are fewer."""
     with page_for((5.6, 3.8), **place) as page:
         (axes,) = page.panels()
         looks = _ALONE if len(states) == 1 else _LOOKS
@@ -133,16 +133,16 @@ def bifurcation_figure(
 
 _DOTS: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "markersize": 3.2, "markeredgewidth": 0.6}
 
-#: Space beside the first and the last impact, over their number.
+#: Margin beside the first and the last impact, relative to their number.
 _MARGIN: Final = 0.03
 
 
 def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -> Figure:
-    """Draw the dimensionless intervals between the impacts of a chattering sequence, and the ratios of every second."""
+    """Draw the dimensionless intervals between the impacts of a chattering sequence, and ratios of every second one."""
     from matplotlib.ticker import MaxNLocator
 
     with page_for((7.0, 3.2), **place) as page:
-        # Panels are beside each other where the figure is wider than high.
+        # Panels are side by side if the figure is wider than high.
         panels = page.panels("AB" if page.figure.get_figwidth() > page.figure.get_figheight() else "A;B")
         number = np.arange(1, intervals.size + 1)
         margin = max(0.5, _MARGIN * intervals.size)
@@ -163,7 +163,7 @@ def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -
 
 
 def _draw(axes: Axes, number: Integers, values: Floats) -> None:
-    """Draw values by the number of the impact; those of the first side filled, those of the second open."""
+    """Draw values against the impact number, with filled markers on the first side and open ones on the second."""
     axes.plot(number, values, color=INK, linewidth=0.4, alpha=0.6, label="_in turn")
     for first, face, label in ((1, INK, "impacts 1, 3, ..."), (0, "white", "impacts 2, 4, ...")):
         chosen = number % 2 == first

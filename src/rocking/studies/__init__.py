@@ -1,4 +1,4 @@
-"""Studies too long for one sitting: what is simulated, where it is kept, who runs it."""
+"""Studies: simulations in restartable runs, their storage and their execution."""
 
 import lazy_loader
 

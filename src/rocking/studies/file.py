@@ -1,4 +1,4 @@
-"""A study as a text file: bodies, motions, scales and rules in TOML, every mistake with its line."""
+"""Study files: bodies, motions, scales and rules in TOML; errors report the line."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.named import expanded, is_there, named_motion
 from rocking.simulation.ensemble import Product, Scales
 
-#: A file to start from, with comments.
+#: Template of a study file, with comments.
 TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")
 
-#: What motions may be scaled to, and how levels are read.
+#: Measures for scaling motions, and how their levels are read.
 _MEASURES: Final[Mapping[str, quantities.Quantity]] = {
     "factor": quantities.number,
     "pga": noted_acceleration,
@@ -39,7 +39,7 @@ _MEASURES: Final[Mapping[str, quantities.Quantity]] = {
     "sa": noted_acceleration,
 }
 
-#: Keys of restraints: of those that are tables one word for several.
+#: Keys of restraints; keys of tables are plurals.
 _HELD: Final = tuple(f"{name}s" if name in FORCES else name for name in HELD)
 
 #: Tables of a file and their keys.
@@ -50,7 +50,7 @@ SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
     "simulation": ("model", "chattering", "duration"),
 }
 
-#: Keys whose values are no numbers, and what these must be, or must be lists of.
+#: Keys whose values are not numbers, and the required type (also of the items of a list).
 _TYPES: Final[Mapping[str, tuple[Any, str]]] = {
     **dict.fromkeys(("csv", "vertical", "units", "polarity", "model", "chattering"), (str, "text")),
     **dict.fromkeys(("one_sided", "skip_unreadable"), (bool, "true or false")),
@@ -60,7 +60,7 @@ _TYPES: Final[Mapping[str, tuple[Any, str]]] = {
     "records": ([str], "a list of texts"),
 }
 
-#: What both sides of a block may have of their own, in columns of a table that end so.
+#: Parameters that may differ between the two sides, in table columns with these suffixes.
 _SIDES: Final = ("_plus", "_minus")
 
 
@@ -73,9 +73,9 @@ class StudyFile:
     product : Product
         Blocks, motions, scales and rules.
     skipped : tuple of str
-        A sentence for each record that could not be read, where the file says to go on.
+        A sentence for each record that could not be read, if the file allows skipping.
     records : tuple of str
-        Name of the record of each motion, relative to the file; empty of a pulse.
+        Name of the record of each motion, relative to the file; empty for a pulse.
     """
 
     product: Product
@@ -84,22 +84,22 @@ class StudyFile:
 
 
 def read_study(path: str | Path) -> StudyFile:
-    """Read the description of a study; names of files in it are relative to it.
+    """Read the description of a study from a TOML file.
 
     Parameters
     ----------
     path : path
-        A TOML file; `TEMPLATE` is one with comments.
+        TOML file. File names in it are relative to its folder. `TEMPLATE` is an example with comments.
 
     Returns
     -------
     StudyFile
-        Its product, and the records that it is of.
+        Product and records of the study.
 
     Raises
     ------
     StudyError
-        If the file cannot be read, or a line of it is wrong: `path`, `line` and `argument` (the key) of the error.
+        If the file or one of its lines is invalid; `path`, `line` and `argument` (the key) locate the error.
     UnreadableRecord
         If a record cannot be read.
 
@@ -125,7 +125,7 @@ def read_study(path: str | Path) -> StudyFile:
 
 
 def _check_tables(tables: Tables) -> None:
-    """Check names of tables and keys, and that values which are no numbers are what they must be."""
+    """Check table names, keys, and types of non-numeric values."""
     for table, content in tables.tables.items():
         if table not in SCHEMA:
             raise tables.wrong(table, None, f"there is no table [{{}}]; {nearest(table, SCHEMA)}", table)
@@ -145,7 +145,7 @@ def _check_tables(tables: Tables) -> None:
 
 
 def _bodies(tables: Tables) -> Bodies:
-    """Bodies of all combinations of what [blocks] gives, or of the table that it names."""
+    """Return the bodies of all combinations in [blocks], or of its table."""
     given = tables.table("blocks")
     if "csv" in given:
         if len(given) > 1:
@@ -184,7 +184,7 @@ def _made(
     reader: Callable[[str], quantities.Quantity | None],
     make: Callable[[dict[str, Any]], Any],
 ) -> list[Any]:
-    """Make what the k-th table of a name describes: one thing, or several where its numbers are lists or ranges."""
+    """Create the object of the k-th table, or several for lists or ranges."""
     axes: dict[str, Any] = {}
     for key, value in given.items():
         with tables.located(table, key=key, occurrence=k):
@@ -258,11 +258,11 @@ def _scales(tables: Tables) -> Scales:
 
 
 def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
-    """Motions that can be read and scaled, their records, and a sentence for each that cannot, if it may be so."""
+    """Return the motions, their records, and a sentence for each skipped record."""
     given, folder = tables.table("motions"), tables.file.parent
     if "vertical" in given and not given.get("records"):
         raise tables.wrong("motions", "vertical", "{} is that of the records, and there are none", "vertical")
-    found: dict[str, str] = {}  # by their paths or names, what stands for each in the file
+    found: dict[str, str] = {}  # names in the file by path or record name
     for name in given.get("records", []):
         with tables.located_record(name):
             found |= dict.fromkeys(_records_of(folder, name), name)
@@ -271,7 +271,7 @@ def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], l
         try:
             with tables.located_record(name):
                 motion = _record(tables, path, several=len(found) > 1)
-                scales.factors(motion)  # it can be scaled
+                scales.factors(motion)  # raises if the motion cannot be scaled
         except (UnreadableRecord, InvalidMotion) as error:
             if not given.get("skip_unreadable", False):
                 raise
@@ -292,7 +292,7 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
     about = {name: given[name] for name in ("dt", "units") if name in given}
     if "channel" in given:
         about["channel"] = str(given["channel"])
-    if "vertical" in given:  # a file beside the study's own, or the name of anything else
+    if "vertical" in given:  # a file beside the study file, or any other name
         beside = str(tables.file.parent / given["vertical"])
         about["vertical"] = beside if is_there(beside) else given["vertical"]
     motion = named_motion(path, **about, several=several)
@@ -302,11 +302,11 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
 
 
 def _records_of(folder: Path, name: str) -> list[str]:
-    """Files beside the study's own that a name, a folder or a pattern stands for, or a shipped record."""
+    """Return the matching files beside the study file, or a shipped record."""
     path = str(folder / name)
     if glob.has_magic(name) and not is_there(path):
         return expanded([str(Path(glob.escape(str(folder))) / name)])
     if is_there(path):
         return expanded([path])
-    # A file of this name in the folder of the call is not meant; without one the name alone tells more.
+    # Not a file in the working folder; the bare name gives a better message.
     return [path if is_there(name) and name not in records.names() else name]

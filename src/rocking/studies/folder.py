@@ -1,4 +1,4 @@
-"""The folder of a study: its inputs and units, each in a file that is whole or not there, and the lock of its runs."""
+"""Folder of a study: inputs and units in atomically written files, and a lock."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import IO, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-import rocking.dynamics.bodies  # noqa: F401 -- its kinds are known from then on
+import rocking.dynamics.bodies  # noqa: F401 -- registers its kinds
 from rocking.block.body import KINDS
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -33,7 +33,7 @@ if sys.platform == "win32":
     import msvcrt
 
     def _lock(file: IO[bytes], shared: bool) -> None:
-        if not shared:  # there is no other kind
+        if not shared:  # only exclusive locks exist
             file.seek(0)
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
 else:
@@ -43,16 +43,16 @@ else:
         fcntl.flock(file, fcntl.LOCK_NB | (fcntl.LOCK_SH if shared else fcntl.LOCK_EX))
 
 
-#: File that describes a study; its number grows when other programs cannot read it.
+#: File that describes a study; its number increases when other versions cannot read it.
 _INPUTS: Final = "study.npz"
 _FORMAT: Final = 4
 
-#: Folder of the units in that of the study.
+#: Folder of the units, inside the folder of the study.
 _UNITS: Final = "units"
 
 
 class Store:
-    """Outcomes of a product in a folder, in units of a grid that are done when their files exist."""
+    """Outcomes of a product in a folder, in units of a grid; a unit is done if its file exists."""
 
     def __init__(self, path: str | Path) -> None:
         self.folder = folder_of(path)
@@ -70,7 +70,7 @@ class Store:
         if about["format"] != _FORMAT:
             raise StudyError(f"the study is of format {about['format']}, this program reads {_FORMAT}", path=str(path))
         self.program: str = about["program"]
-        #: Name of the record of each motion, empty of a pulse; none at all where they are not known.
+        #: Record name of each motion, empty for a pulse; an empty sequence if unknown.
         self.records: tuple[str, ...] = tuple(about["records"])
         self.product = _product(self.inputs)
         self.grid = UnitGrid(self.product.shape, tuple(about["unit"]))
@@ -78,14 +78,14 @@ class Store:
 
     @staticmethod
     def create(path: str | Path, product: Product, unit: Sequence[int], records: Sequence[str]) -> None:
-        """Write an empty store where nothing else is."""
+        """Write a new store into an empty folder."""
         buffer, about = io.BytesIO(), {"format": _FORMAT, "program": program(), "unit": unit, "records": records}
         arrays: dict[str, Any] = _arrays(product) | {"about": np.array(json.dumps(about))}
         np.savez_compressed(buffer, **arrays)
         put(folder_of(path) / _INPUTS, sealed(buffer.getvalue()))
 
     def check_program(self) -> None:
-        """Check that this program computes what the store holds, to the last bit; a StudyError if not."""
+        """Raise a StudyError unless this program computes the same bits as the store."""
         if self.program != program():
             raise StudyError(
                 f"the study was made by {self.program}, this is {program()}: run it with that version, or create it "
@@ -94,7 +94,7 @@ class Store:
             )
 
     def check_inputs(self, product: Product) -> None:
-        """Check that these are the inputs of the store; a StudyError says in which parts they differ."""
+        """Check the inputs against the store; a StudyError names the parts that differ."""
         now, then = _arrays(product), self.inputs
         changed = [
             "/".join(name.split("/")[:2])
@@ -111,11 +111,11 @@ class Store:
             )
 
     def file_of(self, key: Key) -> Path:
-        """File of a unit."""
+        """Return the file of a unit."""
         return self.folder / _UNITS / name_of(key)
 
     def done(self) -> set[Key]:
-        """Keys of the units that are done."""
+        """Return the keys of the units that are done."""
         with contextlib.suppress(FileNotFoundError), os.scandir(self.folder / _UNITS) as entries:
             names = {entry.name for entry in entries}
             return {key for key in self.grid if name_of(key) in names}
@@ -131,7 +131,7 @@ class Store:
             )
 
     def outcomes(self, key: Key) -> Mapping[str, Floats] | None:
-        """Outcomes of a full unit by name; None where it is not done, a StudyError if it is damaged."""
+        """Return the outcomes of a full unit by name, or None; raise a StudyError if it is damaged."""
         data = read(self.file_of(key))
         if data is None:
             return None
@@ -141,13 +141,13 @@ class Store:
         return dict(zip(OUTCOMES, values, strict=True))
 
     def work(self, key: Key) -> Work:
-        """Return all that a worker needs for a unit."""
+        """Return the complete input of a worker for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
         return Work(setup_of(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
 
     def _factors_of(self, unit: int) -> Floats:
-        """Factors on the motions of a unit, shape (motions, scales, polarities)."""
+        """Return the factors on the motions of a unit, shape (motions, scales, polarities)."""
         motions = self.product.motions[self.grid.ranges((unit, 0, 0, 0))[0]]
         factors = np.array([self.product.scales.factors(motion) for motion in motions])
         return factors[:, :, None] * np.array(self.product.signs, dtype=np.float64)
@@ -163,12 +163,12 @@ def folder_of(path: str | Path) -> Path:
 
 
 def exists(path: str | Path) -> bool:
-    """Whether there is a study in a folder."""
+    """Whether a folder contains a study."""
     return (folder_of(path) / _INPUTS).exists()
 
 
 def require_free(path: str | Path) -> None:
-    """Check that there is nothing in a folder but what a creation leaves that was cut off."""
+    """Check that a folder is empty except for remains of a creation."""
     folder = folder_of(path)
     others = sorted({each.name for each in folder.glob("[!.]*")} - {"lock"})
     if others:
@@ -177,7 +177,7 @@ def require_free(path: str | Path) -> None:
 
 
 def read(file: Path) -> bytes | None:
-    """Read a file; None where there is none."""
+    """Read a file; return None if it does not exist."""
     try:
         return file.read_bytes()
     except FileNotFoundError:
@@ -187,11 +187,11 @@ def read(file: Path) -> bytes | None:
 
 
 def put(file: Path, data: bytes) -> None:
-    """Write a file, whole or not at all, and its name to the disk."""
+    """Write a file atomically, and flush its name to the disk."""
     with _refused("written", file):
         file.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(file, data)
-        if os.name != "nt":  # folders cannot be opened there; its file system keeps a journal of names
+        if os.name != "nt":  # Windows cannot open folders; their file system keeps a journal of names
             handle = os.open(file.parent, os.O_RDONLY)
             try:
                 os.fsync(handle)
@@ -201,7 +201,7 @@ def put(file: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def locked(path: str | Path, *, shared: bool = False) -> Iterator[None]:
-    """Hold the lock of a folder while the process lives: alone, or shared with others that run parts of the study."""
+    """Lock a folder, exclusively or shared with runs of other parts."""
     folder = folder_of(path)
     with _refused("locked", folder / "lock"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -211,7 +211,7 @@ def locked(path: str | Path, *, shared: bool = False) -> Iterator[None]:
             try:
                 _lock(file, shared)
             except (BlockingIOError, PermissionError):
-                # On Windows nobody else can read the byte that is locked: the name begins at the second one.
+                # On Windows the locked byte is unreadable, so the name begins at the second byte.
                 file.seek(1)
                 holder = file.read().decode(errors="replace") or "another process"
                 raise StudyError(
@@ -220,14 +220,14 @@ def locked(path: str | Path, *, shared: bool = False) -> Iterator[None]:
                 ) from None
             file.truncate(0)
             file.write(f" process {os.getpid()} on {socket.gethostname()}".encode())
-            for left in () if shared else folder.rglob(".*.part*"):  # half-written, when a process was killed
+            for left in () if shared else folder.rglob(".*.part*"):  # remains of a killed process
                 left.unlink(missing_ok=True)
         yield
 
 
 @contextlib.contextmanager
 def _refused(done: str, file: Path) -> Iterator[None]:
-    """Raise an OutputError where the system refuses to do something to a file."""
+    """Raise an OutputError if the system rejects an operation on a file."""
     try:
         yield
     except OSError as error:
@@ -235,7 +235,7 @@ def _refused(done: str, file: Path) -> Iterator[None]:
 
 
 def _arrays(product: Product) -> dict[str, NDArray[Any]]:
-    """Return all inputs as arrays by name, the name of their part first."""
+    """Return all inputs as arrays by part and name."""
     bodies, scales = product.bodies, product.scales
     arrays = {f"{bodies.kind}/{name}": values for name, (values, _) in bodies.parameters().items()}
     arrays[f"{bodies.kind}/gravity"] = np.array(bodies.gravity)
@@ -254,7 +254,7 @@ def _arrays(product: Product) -> dict[str, NDArray[Any]]:
 
 
 def _product(arrays: Mapping[str, NDArray[Any]]) -> Product:
-    """Return inputs from their arrays."""
+    """Return the inputs from their arrays."""
     kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in KINDS), "")
     if not kind:
         raise StudyError("the bodies of this study are of a kind that is not known here: import its module first")

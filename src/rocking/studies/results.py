@@ -1,4 +1,4 @@
-"""Results of a study: arrays read from its folder when they are needed, tables, critical scales, fragility, spectra."""
+"""Results of a study: lazily read arrays, tables, critical scales, fragility, spectra."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Simulations that are held in memory at a time.
+#: Maximum number of simulations in memory.
 _HELD: Final = 4_000_000
 
 _EVERYTHING: Final = slice(None)
@@ -61,7 +61,7 @@ StudyVerdict = Literal["overturning", "complete_chattering"]
 
 
 def results_of(store: Store) -> xr.Dataset:
-    """Return the outcomes so far, read when they are needed; of floats, NaN where a unit is not done, if some are."""
+    """Return the outcomes so far, read lazily; if units are missing, variables are floats, with NaN for those units."""
     done, grid = store.done(), store.grid
     complete = len(done) == len(grid)
     outcomes: dict[str, Any] = {name: _lazy_outcome(store, name, complete) for name in OUTCOMES}
@@ -73,7 +73,7 @@ def results_of(store: Store) -> xr.Dataset:
 
 
 def _with_records(store: Store, data: xr.Dataset) -> xr.Dataset:
-    """Name each motion by its record, too, where the study knows that."""
+    """Add the record to the name of each motion, if the study contains it."""
     return data.assign_coords(record=("motion", list(store.records))) if store.records else data
 
 
@@ -87,7 +87,7 @@ def _lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
         return values.astype(OUTCOME[name]) if complete else values
 
     class Outcome(BackendArray):
-        """Reads the units that a selection touches."""
+        """Lazy array that reads the selected units."""
 
         shape = store.grid.shape
         dtype = OUTCOME[name] if complete else np.dtype(np.float64)
@@ -101,7 +101,7 @@ def _lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
 
 
 def _selected(store: Store, names: Sequence[str], complete: bool, key: _Selection) -> list[Floats]:
-    """Read a selection of some outcomes; NaN where a unit is missing, if the study is not complete."""
+    """Read a selection of outcomes, with NaN for missing units."""
     grid = store.grid
     axes = [np.arange(size)[part] for size, part in zip(grid.shape, key, strict=True)]
     wanted = [np.atleast_1d(axis) for axis in axes]
@@ -121,7 +121,7 @@ def _selected(store: Store, names: Sequence[str], complete: bool, key: _Selectio
 
 
 def write_table(kind: str, path: str | Path, dataset: xr.Dataset, step: int, progress: bool | None) -> None:
-    """Write a row for each simulation or change as CSV or Parquet, a range of the first dimension at a time."""
+    """Write a row for each simulation or change as CSV or Parquet, in chunks of the first dimension."""
     along = next(iter(dataset.sizes))
     table, count = _for_tables(dataset), max(1, dataset.sizes[along])
     with Progress("writing", count, show=progress) as bar:
@@ -136,7 +136,7 @@ def write_table(kind: str, path: str | Path, dataset: xr.Dataset, step: int, pro
 
 
 def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
-    """Name the scales as factors or values of a measure, and impacts as in other tables."""
+    """Name the scales as factors or values of a measure, and the impacts as in other tables."""
     measure = dataset.scale.attrs["measure"] if "scale" in dataset.dims else dataset.attrs.get("measure")
     names = {"scale": measure, "impacts": "impacts_resolved", "low": f"{measure}_low", "high": f"{measure}_high"}
     return dataset.rename({name: other for name, other in names.items() if name in dataset.variables})
@@ -162,7 +162,7 @@ def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
 
 
 def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
-    """Label the changes of a verdict in a study whose units are done, as `Study.critical_scales`."""
+    """Compute `Study.critical_scales` of a complete study."""
     import xarray as xr
 
     checks.one_of(verdict, "verdict", InvalidOption, get_args(StudyVerdict))
@@ -178,8 +178,8 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
         holds[part], known[part] = overturned, ~(unfinished | stopped)
         if verdict == "complete_chattering":
             holds[part], known[part] = completes, (known[part] | rests) & ~stalled
-    # An unknown verdict takes the last known one below: else a change with unknown verdicts inside would be lost.
-    below = np.zeros(store.grid.shape, np.int64)  # number of that scale; -1 where no verdict is known so far
+    # Unknown outcomes inherit the last known one below, so that no change is lost.
+    below = np.zeros(store.grid.shape, np.int64)  # index of that scale; -1 if no outcome is known so far
     for k in range(product.scales.count):
         below[:, k] = np.where(known[:, k], k, below[:, k - 1] if k else -1)
         np.copyto(holds[:, k], holds[:, k - 1], where=~known[:, k])
@@ -217,9 +217,9 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
 
 
 def _peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
-    """Peak rotation over slenderness (motions, scales, polarities, blocks), infinite if overturned, by blocks.
+    """Yield normalised peak rotations (motions, scales, polarities, blocks) by slices of blocks.
 
-    It is NaN where the simulation was given up.
+    Values are infinite if the block overturned and NaN if the simulation was abandoned.
     """
     store.require_complete()
     *others, count = store.product.shape
@@ -239,7 +239,7 @@ def _peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
 
 
 def _repeated(bodies: Bodies, polarities: int) -> Flags:
-    """Whether a polarity (polarities, bodies) repeats the first one: a symmetric body does the same in both."""
+    """Whether a polarity repeats the first one by symmetry, shape (polarities, bodies)."""
     repeated = np.zeros((polarities, len(bodies)), bool)
     if polarities > 1:
         repeated[1] = [bodies.select(slice(k, k + 1)).is_symmetric for k in range(len(bodies))]
@@ -248,12 +248,12 @@ def _repeated(bodies: Bodies, polarities: int) -> Flags:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BlockTable(DatasetResult):
-    """Numbers of each block of a study; from `Study.spectrum` and `Study.block_fragilities`.
+    """Numbers for each block of a study; from `Study.spectrum` and `Study.block_fragilities`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Variables over ``block`` and other dimensions, the one that is drawn first. Parameters of the blocks are
+        Variables over ``block`` and other dimensions; ``plot`` draws the first one. Parameters of the blocks are
         coordinates.
     """
 
@@ -261,7 +261,7 @@ class BlockTable(DatasetResult):
 
     @property
     def block_parameters(self) -> dict[str, Floats]:
-        """Parameters of the blocks by name, SI units: those that tables list."""
+        """Return the parameters of the blocks in the tables, by name, in SI units."""
         return {str(name): one.values for name, one in self.data.coords.items() if one.dims == ("block",)}
 
     def summary(self) -> str:
@@ -281,7 +281,7 @@ class BlockTable(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the first variable of each block over its p and slenderness, in up to four panels; of fractiles one."""
+        """Draw the first variable against p and slenderness, in up to four panels, or one fractile."""
         from rocking.plot.maps import blocks_figure
 
         drawn, parameters = next(iter(self.data.data_vars.values())), self.block_parameters
@@ -309,7 +309,7 @@ class BlockTable(DatasetResult):
 
 
 def study_spectrum(store: Store, fractiles: Sequence[float], progress: bool | None) -> BlockTable:
-    """Fractiles over motions and polarities of peak rotation over slenderness, for each scale and block."""
+    """Compute fractiles of the normalised peak rotation for each scale and block."""
     import xarray as xr
 
     given = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
@@ -347,7 +347,7 @@ def pooled_fragility(
     weights: ArrayLike | None,
     clusters: ArrayLike | None,
 ) -> Fragility:
-    """Fit one curve to the outcomes of all blocks, each of which may have a weight."""
+    """Fit one curve to the outcomes of all blocks, with optional weights."""
     product, bodies = store.product, store.product.bodies
     units, which = np.unique(units_of(bodies, measure, product.model), return_inverse=True)
     shares = weights_of(weights, len(bodies))
@@ -387,7 +387,7 @@ def pooled_fragility(
     )
 
 
-#: What is kept of the curve of each block.
+#: Stored results of the curve of each block.
 _KEPT: Final[Mapping[str, str]] = {
     "median": "intensity that half of the outcomes exceed the limit at",
     "median_lower": "lower end of its confidence interval",
@@ -432,7 +432,7 @@ def block_fragilities(
                     try:
                         curve = fit(*data, trials=trials[some], clusters=together[some]).curves[0]
                         numbers = [curve.median, *curve.median_interval, curve.dispersion, *curve.dispersion_interval]
-                    except InvalidOption as error:  # no lognormal fits outcomes that are all alike, or separated
+                    except InvalidOption as error:  # identical or separated outcomes have no lognormal fit
                         faults[i, j] = str(error)
                     numbers += [exceeded.sum(), trials.sum()]
                     for values, number in zip(kept.values(), numbers, strict=True):
@@ -456,10 +456,10 @@ def block_fragilities(
 
 
 def _intensities(product: Product, measure: Measure) -> Floats:
-    """Return what every motion measures at every scale, shape (motions, scales)."""
+    """Return the intensity of every motion at every scale, shape (motions, scales)."""
     scales = product.scales
     values = values_of(product.motions, measure)
     if scales.measure == measure.alone:
-        return np.tile(scales.values, (len(values), 1))  # as they were given, to the last bit
+        return np.tile(scales.values, (len(values), 1))  # the input values, bit for bit
     factors = np.array([scales.factors(motion) for motion in product.motions])
     return np.asarray(np.abs(factors) * values[:, None])

@@ -1,4 +1,4 @@
-"""Studies too long for one sitting: created once, run anywhere, killed at any moment without loss."""
+"""Studies: stored simulations that can be interrupted and resumed without loss."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Status:
     Attributes
     ----------
     done, units, simulations : int
-        Units that are done, all units, and simulations in all.
+        Number of finished units, of all units, and of simulations.
     """
 
     done: int
@@ -74,7 +74,7 @@ class Status:
         return self.done == self.units
 
     def __str__(self) -> str:
-        share = int(1000 * self.done / self.units) / 10  # 100 % only where all are
+        share = int(1000 * self.done / self.units) / 10  # rounded down, so that 100 % means all
         done = f"{self.done} of {counted(self.units, 'unit')} done ({share:.1f} %)"
         return f"{done}, {counted(self.simulations, 'simulation')} in all"
 
@@ -86,13 +86,13 @@ class RunReport:
     Attributes
     ----------
     units, simulations : int
-        Units that were computed, and simulations in them.
+        Number of computed units and simulations.
     seconds : float
-        Time it took.
+        Duration of the run, s.
     failed : mapping
         Sentence for each unit that could not be computed, by its name.
     stopped : bool
-        Whether SIGTERM stopped it before all was done.
+        Whether SIGTERM stopped the run before all units were done.
     """
 
     units: int
@@ -111,19 +111,24 @@ class RunReport:
 
 
 class Study:
-    """Simulations of blocks, motions, scales and polarities, kept in a folder; from `rocking.study`.
+    """Simulations of blocks, motions, scales and polarities, stored in a folder; from `rocking.study`.
 
     Parameters
     ----------
     folder : path
-        Folder of a study that is there.
+        Folder of an existing study.
 
     Attributes
     ----------
     place : str
-        Folder where the study is kept.
+        Folder of the study.
     product : Product
-        What is simulated.
+        Inputs of the simulations.
+
+    See Also
+    --------
+    study : Create or open a study.
+    simulate_many : Simulate in memory.
 
     Examples
     --------
@@ -144,7 +149,7 @@ class Study:
 
     @property
     def status(self) -> Status:
-        """Number of units that are done; may be asked while another process runs the study."""
+        """Return the progress; may be called while another process runs the study."""
         return Status(len(self._store.done()), len(self._store.grid), int(np.prod(self._store.grid.shape)))
 
     def run(
@@ -162,25 +167,24 @@ class Study:
         threads : int, optional
             As for `simulate_many`.
         executor : concurrent.futures.Executor or dask.distributed.Client, optional
-            Processes, or the client of a cluster, whose workers compute instead; only this process writes.
+            Pool of processes or cluster client that computes instead; only this process writes.
         part : str, optional
-            Compute a fixed share of the units only, as "3/10", the third of ten. Different shares may run at the same
-            time, on machines with a common file system; a run without a part then computes what is missing.
+            Fixed share of the units, for example "3/10", the third of ten. Different shares may run at the same time,
+            on machines with a common file system; a run without a part then computes the missing units.
         progress : bool, optional
             As for `simulate_many`.
 
         Returns
         -------
         RunReport
-            Units that this run computed. SIGTERM finishes the units in hand first; Ctrl-C ends the run at once. Stored
-            units are kept either way.
+            Computed units. SIGTERM ends the run after the current units, Ctrl-C at once; stored units are kept.
 
         Raises
         ------
         InvalidOption
             If an argument is out of its range.
         StudyError
-            If the study is being run elsewhere, was made by another version, or the workers are gone.
+            If another process runs the study, another version created it, or the workers are gone.
         OutputError
             If a unit cannot be written.
         """
@@ -192,17 +196,17 @@ class Study:
             return _run(self._store, share, number, executor, progress)
 
     def results(self) -> xr.Dataset:
-        """Return the outcomes so far as `simulate_many` does, read from the folder when they are needed.
+        """Return the outcomes so far as `simulate_many` does, read lazily from the folder.
 
-        While units are missing every variable is of floats, NaN where its unit is not done, and a variable ``done``
-        marks the others. A StudyError names a damaged unit when it is read.
+        While units are missing, every variable is of floats with NaN for missing units, and a variable ``done`` marks
+        available ones. Reading a damaged unit raises a StudyError that names it.
         """
         return results_of(self._store)
 
     def verify(
         self, recompute: int = 0, *, repair: bool = False, seed: int = 0, progress: bool | None = None
     ) -> list[str]:
-        """Read and check every unit, and compute some again, to the last bit.
+        """Read and check every unit, and recompute some units bit for bit.
 
         Parameters
         ----------
@@ -218,12 +222,12 @@ class Study:
         Returns
         -------
         list of str
-            A sentence for each unit that is damaged or differs; empty if all is well.
+            A sentence for each unit that is damaged or differs; empty if there are none.
 
         Raises
         ------
         StudyError
-            If units are to be computed again and the study was made by another version.
+            If another version created the study whose units are to be computed again.
         """
         store, faults = self._store, dict[Key, str]()
         if checks.whole(recompute, "recompute", InvalidOption, 0) or repair:
@@ -246,28 +250,28 @@ class Study:
         return [*faults.values()]
 
     def critical_scales(self, verdict: StudyVerdict = "overturning") -> xr.Dataset:
-        """Find the scales between which the verdict on a block changes.
+        """Find the scales between which the outcome of a block changes.
 
         Parameters
         ----------
         verdict : {"overturning", "complete_chattering"}
-            Whether a block overturns; or whether it comes to rest after its first uplift before the motion passes a
+            Whether a block overturns; or whether it comes to rest after its first uplift before the motion exceeds a
             threshold again.
 
         Returns
         -------
         xarray.Dataset
-            Over ``change``, in order of motion, polarity, block and scale: low and high (neighbouring scales with a
-            known verdict, in the units of the measure), overturns or completes (the verdict at the higher one), known
-            (whether all verdicts between them are), with motion, polarity, block and its parameters. A block that
-            stands a stronger motion than one that overturns it has several.
+            Variables over ``change``, ordered by motion, polarity, block and scale: low and high (neighbouring scales
+            with a known outcome, in the units of the measure), overturns or completes (the outcome at the higher
+            scale), known (whether all outcomes between them are known), with motion, polarity, block and its
+            parameters. A block that survives a stronger motion than one that overturns it has several changes.
 
         Raises
         ------
         StudyError
             If units are missing or damaged.
         InvalidOption
-            If there is no such verdict, or the study has no two scales in increasing order.
+            If `verdict` is unknown, or the study has fewer than two scales in increasing order.
         """
         return critical_scales(self._store, verdict)
 
@@ -280,9 +284,9 @@ class Study:
         weights: ArrayLike | None = None,
         clusters: ArrayLike | None = None,
     ) -> Fragility:
-        """Fit fragility curves to the outcomes of all blocks, with arguments and results as for `rocking.fragility`.
+        """Fit fragility curves to the outcomes of all blocks, with the arguments and results of `rocking.fragility`.
 
-        The intensity is what a motion measures at a scale. A StudyError is raised if units are missing or damaged.
+        The intensity is the measure of a motion at a scale. A StudyError is raised if units are missing or damaged.
         """
         return pooled_fragility(self._store, Measure.of(measure), limits, confidence, weights, clusters)
 
@@ -295,28 +299,28 @@ class Study:
         clusters: ArrayLike | None = None,
         progress: bool | None = None,
     ) -> BlockTable:
-        """Fit a fragility curve to the outcomes of each block, with arguments and errors as for `Study.fragility`.
+        """Fit a fragility curve to the outcomes of each block, with the arguments and errors of `Study.fragility`.
 
-        The result has, over (limit_state, block), the median and the dispersion with their confidence intervals
-        (median_lower, median_upper, ...; SI units), exceeded and outcomes (counts; a symmetric block has those of one
-        polarity), and fault: why no lognormal fits, empty where one does.
+        The result contains, over (limit_state, block), the median and the dispersion with their confidence intervals
+        (median_lower, median_upper, ...; SI units), exceeded and outcomes (counts; for a symmetric block of one
+        polarity), and fault: the reason why no lognormal fits, or an empty string.
         """
         return block_fragilities(self._store, Measure.of(measure), limits, confidence, clusters, progress)
 
     def spectrum(self, fractiles: Sequence[float] = (0.16, 0.5, 0.84), *, progress: bool | None = None) -> BlockTable:
-        """Compute fractiles over the motions of the peak rotation over slenderness, for each scale and block.
+        """Compute fractiles of the normalised peak rotation over the motions, for each scale and block.
 
         Parameters
         ----------
         fractiles : sequence of float
-            Shares of the motions, in (0, 1), that stay below.
+            Fractions of the motions, in (0, 1), that stay below.
         progress : bool, optional
             As for `simulate_many`.
 
         Returns
         -------
         BlockTable
-            fractile_over_alpha over (fractile, scale, block), infinite where that share of the motions overturns the
+            fractile_over_alpha over (fractile, scale, block), infinite if that fraction of the motions overturns the
             block, and overturned_share over (scale, block).
 
         Raises
@@ -329,18 +333,18 @@ class Study:
         return study_spectrum(self._store, fractiles, progress)
 
     def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
-        """Write the `results` to a NetCDF file, or the critical scales, as `to_csv` does."""
+        """Write the `results`, or the critical scales as `to_csv` does, to a NetCDF file."""
         write_netcdf(path, self.critical_scales(critical) if critical else self.results())
 
     def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
-        """Write a row for each simulation as text, in columns named with their units.
+        """Write a CSV row for each simulation, with units in the column names.
 
         Parameters
         ----------
         path : str or pathlib.Path
-            File to write, whole or not at all.
+            File, written atomically.
         critical : {"overturning", "complete_chattering"}, optional
-            Write the `critical_scales` of this verdict instead, a row for each change.
+            Write the `critical_scales` of this outcome instead, a row for each change.
         progress : bool, optional
             As for `simulate_many`.
 
@@ -356,7 +360,7 @@ class Study:
     def to_parquet(
         self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None
     ) -> None:
-        """Write the table of `to_csv` as Parquet, with its arguments and errors; requires pyarrow."""
+        """Write the table of `to_csv` as Parquet, with the same arguments and errors; requires pyarrow."""
         self._write("parquet", path, critical, progress)
 
     def _write(self, kind: str, path: str | Path, critical: StudyVerdict | None, progress: bool | None) -> None:
@@ -382,31 +386,36 @@ def study(
     duration: float | None = None,
     unit_blocks: int | None = None,
 ) -> Study:
-    """Create a study, or open one that is there and check that its inputs are these.
+    """Create a study, or open an existing one and check its inputs.
 
     Parameters
     ----------
     folder : path
-        Folder where the study is kept.
+        Folder of the study.
     blocks, motions : optional
-        As for `simulate_many`; without both, the study must be there, and takes no other argument.
+        As for `simulate_many`; without both, the study must exist, and no other argument is accepted.
     model, chattering, levels, measure, polarity, duration : optional
         As for `simulate_many`.
     unit_blocks : int, optional
-        Blocks of a unit, a multiple of 512, of one motion, scale and polarity; by default a unit holds as many of all
-        as take about five seconds, from a pilot.
+        Number of blocks in a unit (one motion, scale and polarity), a multiple of 512. By default a unit contains as
+        many blocks, motions, scales and polarities as run for about five seconds, estimated by a pilot run.
 
     Returns
     -------
     Study
-        ``.run()`` computes what is missing, ``.results()`` reads what is there.
+        ``.run()`` computes missing units, ``.results()`` reads the stored ones.
 
     Raises
     ------
     StudyError
-        If there is no study and no inputs are given, it holds other inputs, or it is damaged.
+        If the study does not exist and no inputs are provided, contains other inputs, or is damaged.
     InvalidOption
         If an argument is out of its range.
+
+    See Also
+    --------
+    Study : Methods of a study.
+    simulate_many : Simulate in memory.
 
     Examples
     --------
@@ -431,12 +440,12 @@ def study(
 def study_of(
     folder: str | Path, product: Product, unit_blocks: int | None = None, records: Sequence[str] = ()
 ) -> Study:
-    """Create the study of a product in a folder, or open the one there and check its inputs."""
+    """Create the study of a product, or open it and check its inputs."""
     if not exists(folder):
-        require_free(folder)  # before the pilot, and before a lock is put beside the files of others
+        require_free(folder)  # before the pilot and the lock file
         unit = unit_of(product, unit_blocks)
         with locked(folder):
-            if not exists(folder):  # another process may have made it meanwhile
+            if not exists(folder):  # another process may have created it meanwhile
                 Store.create(folder, product, unit, records)
     found = Study(folder)
     found._store.check_inputs(product)
@@ -447,7 +456,7 @@ def study_of(
 
 
 def _part(part: str) -> tuple[int, int]:
-    """Return the number of a part, and how many there are."""
+    """Return the number of a part and the number of parts."""
     number, slash, count = str(part).partition("/")
     if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
         raise InvalidOption(
@@ -459,7 +468,7 @@ def _part(part: str) -> tuple[int, int]:
 
 
 def _run(store: Store, share: Sequence[Key], threads: int, executor: Any, progress: bool | None) -> RunReport:
-    """Compute the units of a share that are not done, in threads or by an executor, until SIGTERM."""
+    """Compute the missing units of a share until SIGTERM."""
     start, grid, pending = time.monotonic(), store.grid, dict[Future[bytes], Key]()
     units, simulations, failed = 0, 0, dict[str, str]()
     done = store.done()
@@ -473,7 +482,7 @@ def _run(store: Store, share: Sequence[Key], threads: int, executor: Any, progre
     ):
         try:
             while True:
-                # Each worker has a unit in hand, and the next.
+                # Each worker has a current unit and a next one.
                 room = 0 if stop.is_set() else max(2 * max(1, count()) - len(pending), 0)
                 for key in itertools.islice(left, room):
                     pending[submit(store.work(key))] = key
@@ -502,7 +511,7 @@ def _run(store: Store, share: Sequence[Key], threads: int, executor: Any, progre
 
 @contextlib.contextmanager
 def _terminated() -> Iterator[threading.Event]:
-    """Give what SIGTERM sets, where this is the main thread."""
+    """Yield an event that SIGTERM sets if this is the main thread."""
     stop = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield stop
@@ -516,7 +525,7 @@ def _terminated() -> Iterator[threading.Event]:
 
 @contextlib.contextmanager
 def _workers(executor: Any, threads: int) -> Iterator[tuple[Callable[[Work], Future[bytes]], Callable[[], int]]]:
-    """Give what hands a unit to a worker, and what counts the workers; threads stop when this is left by an error."""
+    """Yield functions that submit a unit and count the workers; errors stop the threads."""
     if executor is None:
         cancelled, pool = threading.Event(), ThreadPoolExecutor(threads)
         try:
@@ -544,7 +553,7 @@ def _workers(executor: Any, threads: int) -> Iterator[tuple[Callable[[Work], Fut
             raise _gone("no connection to the scheduler")
         try:
             return sum(client.nthreads().values())
-        except Exception as error:  # a client that loses its scheduler raises what its sockets raise
+        except Exception as error:  # a client that loses its scheduler raises socket errors
             raise _gone(error) from error
 
     yield submit, count

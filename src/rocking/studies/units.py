@@ -1,4 +1,4 @@
-"""Units of a study: one cell of a regular grid each, how large it is, what it computes, and its bytes in the folder."""
+"""Units of a study: grid cells, their size, computation and encoding."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
 from rocking.simulation.ensemble import VARIABLES, Product
 
-#: All outcomes of a simulation, in the order in which a unit holds them.
+#: All outcomes of a simulation, in the order of the encoding.
 OUTCOMES: Final = tuple(VARIABLES)
 
-#: Units are multiples of so many blocks, which the engine takes through a motion together.
+#: Unit sizes are multiples of this number of blocks, which the engine integrates together.
 _GROUP: Final = 512
 
-#: Simulations in one unit at most.
+#: Maximum number of simulations in a unit.
 _LARGEST: Final = 1 << 18
 
 #: Packing saves three quarters of the bytes, and takes half a microsecond for each simulation.
@@ -40,7 +40,7 @@ _LEVEL: Final = 1
 #: Bytes of the hash at the end of a file.
 _HASH: Final = hashlib.sha256().digest_size
 
-#: Index of a unit among the motions, scales, polarities and blocks.
+#: Index of a unit along motions, scales, polarities and blocks.
 Key = tuple[int, ...]
 
 
@@ -50,31 +50,31 @@ def sealed(data: bytes) -> bytes:
 
 
 def unsealed(data: bytes) -> bytes | None:
-    """Return what was sealed; None where any bit of it changed."""
+    """Return the data of `sealed`; None if any bit has changed."""
     return data[:-_HASH] if sealed(data[:-_HASH]) == data else None
 
 
 @dataclass(frozen=True)
 class UnitGrid:
-    """How simulations (motions, scales, polarities, blocks) are cut into units."""
+    """Division of simulations (motions, scales, polarities, blocks) into units."""
 
     shape: tuple[int, ...]
     unit: tuple[int, ...]
 
     @functools.cached_property
     def cells(self) -> tuple[int, ...]:
-        """Numbers of units along the axes."""
+        """Return the number of units along each axis."""
         return tuple(math.ceil(size / part) for size, part in zip(self.shape, self.unit, strict=True))
 
     def __len__(self) -> int:
         return math.prod(self.cells)
 
     def __iter__(self) -> Iterator[Key]:
-        """Give the keys of all units, the last axis first."""
+        """Iterate over the keys of all units, the last axis fastest."""
         return itertools.product(*map(range, self.cells))
 
     def ranges(self, key: Key) -> tuple[slice, ...]:
-        """Range of a unit along each axis."""
+        """Return the range of a unit along each axis."""
         axes = zip(key, self.unit, self.shape, strict=True)
         return tuple(slice(index * part, min(index * part + part, size)) for index, part, size in axes)
 
@@ -84,12 +84,12 @@ class UnitGrid:
 
 
 def name_of(key: Key) -> str:
-    """Name of a unit's file."""
+    """Return the file name of a unit."""
     return "unit." + ".".join(map(str, key))
 
 
 def unit_of(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
-    """Return the size of a unit along the axes: so many blocks, or what takes about five seconds by a pilot."""
+    """Return the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
     if unit_blocks is not None:
         width = checks.whole(unit_blocks, "unit_blocks", InvalidOption, least=_GROUP)
         if width % _GROUP:
@@ -104,7 +104,7 @@ def unit_of(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
     start = time.perf_counter()
     simulate_task(setup, task)
     each = (time.perf_counter() - start) / len(some)
-    # Neither too few nor too large.
+    # Limits the size from below and above.
     most = min(5.0 / each, math.prod(product.shape) / 32, _LARGEST)
     width = min(_GROUP * max(1, int(most) // _GROUP), count)
     left, held = most / width, []
@@ -116,13 +116,13 @@ def unit_of(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
 
 @functools.cache
 def program() -> str:
-    """Name what computes here, to the last bit."""
+    """Return an identifier shared by programs that compute the same bits."""
     return f"rocking {VERSION} (kernels {fingerprint()})"
 
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """All that a worker needs for a unit; factors have the shape (motions, scales, polarities)."""
+    """Complete input of a worker for a unit; factors have the shape (motions, scales, polarities)."""
 
     setup: Setup
     motions: tuple[Motion, ...]
@@ -132,10 +132,10 @@ class Work:
 
 
 def compute(work: Work, cancelled: threading.Event | None = None) -> bytes:
-    """Simulate a unit and return its bytes, unless `cancelled`; a StudyError if the program here is another one."""
+    """Return the bytes of a unit, unless `cancelled`; raise a StudyError if the program differs."""
     if work.program != program():
         raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
-    # NaN where the unit holds fewer simulations than a full one.
+    # NaN where the unit contains fewer simulations than a full one
     values = np.full((len(OUTCOMES), *work.unit), np.nan)
     blocks = slice(0, len(work.setup.bodies))
     for m, s, k in np.ndindex(work.factors.shape):
@@ -147,6 +147,6 @@ def compute(work: Work, cancelled: threading.Event | None = None) -> bytes:
 
 
 def decoded(data: bytes, unit: tuple[int, ...]) -> Floats | None:
-    """Outcomes of a full unit, shape (outcomes, *unit); None where any bit of it changed."""
+    """Return the outcomes of a full unit, shape (outcomes, *unit); None if any bit has changed."""
     packed = unsealed(data)
     return None if packed is None else np.frombuffer(zlib.decompress(packed), "<f8").reshape(len(OUTCOMES), *unit)
