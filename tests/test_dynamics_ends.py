@@ -115,6 +115,23 @@ def test_a_branch_reaches_limits_beyond_which_there_is_no_body():
         assert branch.multipliers[k].sum().real == pytest.approx(ball.trace(level, stable=True), abs=1e-9)
 
 
+def test_a_symmetric_orbit_with_a_large_multiplier_is_followed_to_grazing():
+    """Its multiplier is 131 over a period, and the square root of that over half of one."""
+
+    def family(level):
+        return dynamics.InvertedPendulum(1.0, 1.0, 0.8), pulses.sine(level, 0.35, cycles=1)
+
+    (start,) = (
+        each
+        for each in dynamics.periodic_orbits(*family(3.0), starts=256)
+        if each.symmetric and each.impacts == 2.0 and not each.is_stable
+    )
+    branch = dynamics.continue_orbit(start, family, 3.0, (1.5, 6.0))
+    assert branch.ends == ("limit of the parameter", "grazing") and len(branch) < 100
+    (grazing,) = branch.bifurcations
+    assert grazing.value == pytest.approx(5.836106, abs=1e-6)
+
+
 def test_no_more_points_than_asked_for():
     start = next(each for each in dynamics.periodic_orbits(*table(1.2), starts=64) if each.is_stable)
     branch = dynamics.continue_orbit(start, table, 1.2, (1.0, 1.6), most=4)

@@ -9,6 +9,7 @@ from oracles import closed_orbits
 
 from rocking import Block, InvalidOption, dynamics, pulses
 from rocking.chattering import critical_amplitude
+from rocking.dynamics.maps import distances
 
 G = 10.0
 TABLE = 5.0  # Hz
@@ -279,7 +280,7 @@ def test_a_doubled_branch_ends_at_the_flip_and_an_asymmetric_one_where_symmetry_
     one_sided = [each for each in orbits if each.period == 3 and not each.symmetric and each.is_stable]
     branch = dynamics.continue_orbit(one_sided[0], rocked, 3.15, (2.9, 3.2))
     assert branch.ends[0] == "symmetry breaking"
-    assert branch.bifurcations[0].value == pytest.approx(breaking, abs=1e-7)
+    assert branch.bifurcations[0].value == pytest.approx(breaking, abs=1e-9)
     assert len(one_sided) == 2  # and its mirror image
 
 
@@ -358,3 +359,12 @@ def test_the_peak_of_an_orbit_between_walls_is_where_they_are():
     axes = branch.plot().axes[0]  # which would be a flat line
     assert " ".join(axes.get_ylabel().split()) == "position at the start of a period (m)"
     assert np.nanmax(axes.lines[0].get_ydata()) == pytest.approx(branch.states[:, 0].max())
+
+
+def test_distances_in_a_period_are_those_of_all_pairs() -> None:
+    random = np.random.default_rng(5)
+    for _ in range(300):
+        period = 10.0 ** random.uniform(-2.0, 2.0)
+        marks, times = (period * random.uniform(size=random.integers(1, 12)) for _ in range(2))
+        away = np.abs(times[:, None] - marks)
+        assert distances(times, marks, period).tolist() == np.minimum(away, period - away).min(axis=1).tolist()

@@ -17,6 +17,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.dynamics import branches as ends
 from rocking.dynamics.branches import Bifurcation, Branch
+from rocking.dynamics.maps import are_halved, distances, is_mirrored
 from rocking.dynamics.orbit_equations import AT_VALUE, DIFFERENCE, OrbitEquations, Solved, Tests, at_zero, tangent_of
 from rocking.dynamics.orbits import PeriodicOrbit
 from rocking.errors import InvalidOption, RockingError
@@ -83,10 +84,11 @@ def continue_orbit(
 
     Notes
     -----
-    The method is pseudo-arclength continuation in state and parameter. Folds and flips are roots of the determinant of
-    the derivative minus or plus one. Where symmetry breaks, the equations are singular and the parameter is
-    interpolated. Ends are located by halving the step. Two multipliers whose product is less than one leave the unit
-    circle only through 1 or -1. Therefore no Neimark-Sacker bifurcation occurs with restitution below 1.
+    The method is pseudo-arclength continuation in state and parameter. Folds, flips and symmetry breaking are roots of
+    the determinant of the derivative minus or plus one. For a symmetric orbit the derivative is that of the map to the
+    mirror image half a period later. Ends are located by halving the step. Two multipliers whose product is less than
+    one leave the unit circle only through 1 or -1. Therefore no Neimark-Sacker bifurcation occurs with restitution
+    below 1.
 
     The motion must be specified over its least period. Over two periods, orbits of twice the period and those from
     which they bifurcate are of one kind, and a long step may jump between them.
@@ -122,9 +124,7 @@ def continue_orbit(
     count = checks.whole(most, "most", InvalidOption, least=1)
     equations = OrbitEquations.of(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
-    odd = orbit.period % 2 == 1 and equations.strobe(start).bodies.is_symmetric
-    crossing = ends.SYMMETRY if odd and not orbit.rests else ends.BRANCHES
-    backward, forward = (_Walk(equations, z, direction, longest, crossing) for direction in (-1.0, 1.0))
+    backward, forward = (_Walk(equations, z, direction, longest) for direction in (-1.0, 1.0))
     backward.run(count)
     if backward.end == ends.CLOSED:  # a closed branch is complete
         forward.end = ends.CLOSED
@@ -141,8 +141,8 @@ def continue_orbit(
 class _Walk:
     """Continuation of a branch in one direction of the parameter: points, current position and next step."""
 
-    def __init__(self, equations: OrbitEquations, z: Floats, direction: float, longest: float, crossing: str) -> None:
-        self.equations, self.z, self.crossing = equations, z, crossing
+    def __init__(self, equations: OrbitEquations, z: Floats, direction: float, longest: float) -> None:
+        self.equations, self.z = equations, z
         self.direction, self.step, self.longest = direction, min(0.005, longest), longest
         self.response = equations.response(z)
         self.points = [equations.point(z, self.response)]
@@ -195,7 +195,7 @@ class _Walk:
             return ""
         solved, at_limit = found
         new, tests = solved.z, solved.tests(tangent_of(solved.jacobian, self.tangent))
-        if self.turns(tests) or equations.is_shorter(new):
+        if self.turns(tests) or equations.is_parent(new):
             self.bifurcations.append(self.joined(new))
             return self.bifurcations[-1].kind
         self.pass_bifurcations(new, tests)
@@ -271,7 +271,8 @@ class _Walk:
     def pass_bifurcations(self, new: Floats, tests: Tests) -> None:
         """Add the bifurcations between this point and the next at which the branch continues."""
         turns, length = self.tests.onwards * tests.onwards < 0.0, float(self.tangent @ (new - self.z))
-        for k, kind in enumerate((ends.FOLD if turns else self.crossing, ends.FLIP)):
+        at_minus_one = ends.SYMMETRY if self.equations.by_half else ends.FLIP
+        for k, kind in enumerate((ends.FOLD if turns else ends.BRANCHES, at_minus_one)):
             if self.tests[k] * tests[k] < 0.0:
                 there = self.equations.located(kind, self.z, self.tangent, length, k)
                 self.bifurcations += [] if there is None else [there]
@@ -279,13 +280,13 @@ class _Walk:
     def joined(self, new: Floats) -> Bifurcation:
         """Locate, between two points, where the branch meets orbits of half the period, or symmetric orbits."""
         equations, middle = self.equations, 0.5 * (self.z + new)
-        half = replace(equations, period=equations.period // 2)
-        for share in () if equations.period % 2 else _WIDER:
-            start = middle - share * AT_VALUE
-            if found := half.located(ends.FLIP, start, AT_VALUE, 2.0 * share, 1):
+        even = equations.period % 2 == 0
+        parent = replace(equations, period=equations.period // 2 if even else equations.period, by_half=not even)
+        kind = ends.FLIP if even else ends.SYMMETRY
+        for share in _WIDER if even or is_mirrored(equations.strobe(equations.physical(middle)[1])) else ():
+            if found := parent.located(kind, middle - share * AT_VALUE, AT_VALUE, 2.0 * share, 1):
                 return found
-        turn = equations.located(self.crossing, self.z, self.tangent, float(self.tangent @ (new - self.z)), 2)
-        return turn or equations.bifurcation(self.crossing, middle, [self.z[2], new[2]])
+        return equations.bifurcation(ends.BRANCHES, middle, [self.z[2], new[2]])
 
     def vanishing(self) -> Bifurcation | None:
         """Extrapolate to the grazing at zero speed of the slowest impact, where the equations are singular."""
@@ -321,12 +322,12 @@ class _Walk:
         equations = self.equations
         _, motion = equations.family(equations.physical(self.z)[1])
         starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
-        phases = np.sort(np.mod(self.response.impacts["time"] + starts[equations.shift], period))
+        phases = np.mod(self.response.impacts["time"] + starts[equations.shift], period)
         if not len(phases):
             return
-        around = np.concatenate([phases[-1:] - period, phases, phases[:1] + period])
-        after = np.searchsorted(around, starts, side="right")
-        nearest = np.minimum(starts - around[after - 1], around[after] - starts)
+        nearest = distances(starts, phases, period)
+        if equations.by_half:  # the map of half a period ends at a breakpoint, too
+            nearest[~are_halved(motion)] = -1.0
         best = int(np.argmax(nearest))
         if nearest[equations.shift] > 0.03 * period or nearest[best] <= nearest[equations.shift]:
             return

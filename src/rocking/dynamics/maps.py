@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.block.body import Body
 from rocking.block.sides import in_line
 from rocking.core import checks
-from rocking.core.arrays import Floats, Integers, ranges
+from rocking.core.arrays import Flags, Floats, Integers, ranges
 from rocking.core.constants import MODELS, Model
 from rocking.core.threads import cores, in_threads
 from rocking.dynamics.bodies import LinearBody
@@ -326,6 +326,53 @@ class StroboscopicMap(PeriodicForcing):
 
         for _ in in_threads(follow, parts_of(len(made), periods), threads=cores()):
             pass
+
+
+class HalfMap(StroboscopicMap):
+    """Map of a mirrored body under an antisymmetric motion to the mirror image of its state half a period later."""
+
+    def __init__(self, strobe: StroboscopicMap) -> None:
+        super().__init__(strobe.body, strobe.motion, strobe.model, strobe.treatment)
+        motion = strobe.motion
+        middle = int(np.argmin(np.abs(motion.breakpoints - motion.breakpoints[0] - 0.5 * self.period)))
+        half = Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
+        self.period *= 0.5
+        self._ground = repeated(half, self.body.gravity, -1.0)
+        self._steps = np.ascontiguousarray(self._steps[:, :middle])  # as kernels require
+
+    def mirrored(self, state: Floats, halves: int) -> tuple[Floats, Floats]:
+        """Return the mirror image after an odd number of half periods, and its derivative; NaN where it overturns."""
+        total, at = np.eye(2), state
+        for _ in range(halves):
+            if not np.all(np.isfinite(at)):  # a march from there would use all its turns
+                break
+            after, change = self.derivative(at)
+            at, total = 0.0 - after, -change @ total
+        return at, total
+
+
+def is_mirrored(strobe: StroboscopicMap) -> bool:
+    """Whether the mirror image of every trajectory of a body is a trajectory half a period later."""
+    motion = strobe.motion
+    if not (strobe.bodies.is_symmetric and are_halved(motion)[0]):
+        return False
+    times = motion.breakpoints[0] + strobe.period * (np.arange(200) + 0.5) / 400.0
+    sums = motion.acceleration(times) + motion.acceleration(times + 0.5 * strobe.period)
+    return bool(np.max(np.abs(sums)) <= 1e-12 * motion.pga)
+
+
+def are_halved(motion: Motion) -> Flags:
+    """Whether there is another breakpoint half a period later, for each breakpoint but the last."""
+    starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
+    return distances(np.mod(starts + 0.5 * period, period), starts, period) <= 1e-14 * period
+
+
+def distances(times: Floats, marks: Floats, period: float) -> Floats:
+    """Compute the distance from each time to the nearest mark, within a period that repeats."""
+    marks = np.sort(marks)
+    after = np.searchsorted(marks, times)
+    away = np.abs(times - marks[[after - 1, after % len(marks)]])
+    return np.asarray(np.min(np.minimum(away, period - away), axis=0))
 
 
 def _signs(side: NDArray[np.int64]) -> Floats:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.dynamics.branches import SYMMETRY, Bifurcation
-from rocking.dynamics.maps import Fate, StroboscopicMap, scale_of
+from rocking.dynamics.branches import Bifurcation
+from rocking.dynamics.maps import Fate, HalfMap, StroboscopicMap, is_mirrored, scale_of
 from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at, peak_of, response_of
 from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption, RockingError
@@ -90,9 +90,12 @@ class OrbitEquations:
     #: Breakpoint at which a period starts; an impact on it makes the equations non-smooth.
     shift: int = 0
     difference: float = DIFFERENCE
+    #: Whether they are those of the map to the mirror image half a period later.
+    by_half: bool = False
 
     def __post_init__(self) -> None:
         self.strobe = lru_cache(maxsize=64)(self._strobe)
+        self.half = lru_cache(maxsize=64)(self._half)
 
     @classmethod
     def of(
@@ -111,7 +114,9 @@ class OrbitEquations:
                 f"the orbit is none of what {{}} makes at {{}} = {value:g}", "family", "value", value=value
             )
         sizes, kind = np.array([*scale, limits[1] - limits[0]]), kind_of(strobe, orbit.state, orbit.period)
-        return cls(family, orbit.model, orbit.treatment, orbit.period, sizes, kind, limits)  # type: ignore[arg-type]
+        made = cls(family, orbit.model, orbit.treatment, orbit.period, sizes, kind, limits)  # type: ignore[arg-type]
+        made.by_half = orbit.symmetric and not orbit.rests and made.stays_mirrored(value)
+        return made
 
     def _strobe(self, value: float) -> StroboscopicMap:
         body, motion = self.family(value)
@@ -121,6 +126,20 @@ class OrbitEquations:
             motion = Motion(later, rows, motion.name, motion.description, error=motion.error)
         return StroboscopicMap(body, motion, self.model, self.treatment)
 
+    def _half(self, value: float) -> HalfMap:
+        strobe = self.strobe(value)
+        if not is_mirrored(strobe):
+            raise InvalidOption(f"the family has no mirror images at {{}} = {value:g}", "value", value=value)
+        return HalfMap(strobe)
+
+    def stays_mirrored(self, value: float) -> bool:
+        """Whether the family has mirror images at a value, and over the whole range of the parameter."""
+        for each in (value, *np.linspace(*self.limits, 5).tolist()):
+            with suppress(RockingError):  # no body or motion there: the branch ends before
+                if not is_mirrored(self.strobe(each)):
+                    return False
+        return True
+
     def physical(self, z: Floats) -> tuple[Floats, float]:
         """Convert z to state and parameter, exactly a limit within rounding error."""
         value = float(z[2] * self.sizes[2])
@@ -128,8 +147,10 @@ class OrbitEquations:
         return z[:2] * self.sizes[:2], next(at_limit, value)
 
     def returned(self, state: Floats, value: float) -> tuple[Floats, Floats]:
-        """Return the state after the period and the derivative; NaN if they do not exist."""
+        """Return the state after the period (or its mirror image after half of it) and the derivative, or NaN."""
         try:
+            if self.by_half:
+                return self.half(value).mirrored(state, self.period)
             return self.strobe(value).derivative(state, self.period)
         except RockingError:  # behind a stop, or no body or motion for the parameter
             return np.full(2, np.nan), np.full((2, 2), np.nan)
@@ -190,12 +211,17 @@ class OrbitEquations:
         multipliers = multipliers_at(strobe, strobe.derivative(state, self.period)[1])
         return value, self.state(z), multipliers, peak_of(response)
 
-    def is_shorter(self, z: Floats) -> bool:
-        """Whether a point belongs to orbits of half the period, from which this branch bifurcates."""
-        if self.period % 2 or self.kind.rests:
-            return False
+    def is_parent(self, z: Floats) -> bool:
+        """Whether a point belongs to orbits of half the period, or symmetric ones, from which this branch bifurcates."""
         state, value = self.physical(z)
-        after = self.strobe(value)(state, self.period // 2)
+        if self.kind.rests or self.by_half:
+            return False
+        if self.period % 2 == 0:
+            after = self.strobe(value)(state, self.period // 2)
+        elif is_mirrored(self.strobe(value)):
+            after, _ = self.half(value).mirrored(state, self.period)
+        else:
+            return False
         return bool(np.max(np.abs(after - state) / self.sizes[:2]) < SAME)
 
     def bifurcation(self, kind: str, z: Floats, values: Sequence[float]) -> Bifurcation:
@@ -225,14 +251,7 @@ class OrbitEquations:
         except _Missed:
             if len({test > 0.0 for _, test in found.values()}) < 2:
                 return None
-            # The equations are singular where branches cross. Where symmetry breaks, closer points are more
-            # informative.
-            for aside in length * np.array([0.1, 0.01, 1e-3] if kind == SYMMETRY else []):
-                near = sorted((abs(test), test, at) for at, (_, test) in found.items())[:_CROSSING]
-                middle = at_zero([test for _, test, _ in near], [at for *_, at in near])
-                for at in (middle - aside, middle + aside):
-                    with suppress(_Missed):
-                        tested(at)
+            # The equations are singular where branches cross.
             points = sorted(found.values(), key=lambda each: abs(each[1]))[:_CROSSING]
             value = at_zero([test for _, test in points], [each.z[2] for each, _ in points])
             crossing = self.bifurcation(kind, points[0][0].z, [z[2], (z + length * tangent)[2]])

@@ -17,7 +17,7 @@ from rocking.core.constants import Model
 from rocking.core.result import Result, Row, text_of
 from rocking.core.tables import Column, as_written, counted, named, plain
 from rocking.dynamics.bodies import LinearBody, in_positions
-from rocking.dynamics.maps import StroboscopicMap, mean_size, scale_of
+from rocking.dynamics.maps import StroboscopicMap, is_mirrored, mean_size, scale_of
 from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -223,10 +223,9 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
     """Create the periodic orbit of a state that recurs after a number of periods."""
     _, change = strobe.derivative(state, period)
     symmetric = False
-    if period % 2 and strobe.bodies.is_symmetric:  # mirror image of itself half a period later
-        half = 0.5 * period * strobe.period
-        states = response_of(strobe, state, period).states(half * np.linspace(0.0, 1.0, 9)[:-1, None] + [0.0, half])
-        symmetric = bool(np.all(np.abs(states.sum(axis=1)[:, :2]) < 1e-9 * np.array(scale_of(strobe))))
+    if period % 2 and is_mirrored(strobe):  # its own mirror image half a period later
+        after = response_of(strobe, state, period).states(0.5 * period * strobe.period)[:2]
+        symmetric = bool(np.all(np.abs(after + state) < 1e-9 * np.array(scale_of(strobe))))
     return PeriodicOrbit(
         strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period,
         impacts_of(strobe, state, period, change), multipliers_at(strobe, change), symmetric, not np.any(change),
