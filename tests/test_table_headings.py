@@ -132,12 +132,15 @@ REFUSED = [
     ("24 bits", "time (s),a (gal)\n0,1\n0.01,8388607\n0.02,2\n", 3, "8.38861e+06 seems to stand for a missing value"),
     ("metres", "Time (m),a (g)\n" + rows(), 1, "not clear from 'm'"),
     ("volts", "Time (s),Sensor (mV)\n" + rows(), 1, "the units 'mV' are not known; give units as one of"),
-    ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the units 'cm/s' are not known"),
+    ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the heading says 'cm/s', which is no unit of an acceleration"),
+    ("displacements", "time (s),disp (cm)\n" + rows(), 1, "of an acceleration; give a table of accelerations"),
+    ("a unit in Spanish", "t (s),a (cm/seg2)\n" + rows(), 1, "the units 'cm/seg2' are not known; give units as one"),
+    ("a gap in the numbers of rows", "No,t (s),a (g)\n1,0,1\n2,1,2\n4,2,1\n5,3,2\n", 4, "get a record without gaps"),
     ("a factor", "Time (s),a (10^-3 g)\n" + rows(), 1, "the units '10^-3 g' are not known"),
     ("two units", "Time (s),a (g or cm/s2)\n" + rows(), 1, "the units 'g or cm/s2' are not known"),
     ("numbers of rows and no times", "Sample,a (g)\n" + wide(COUNT, SAMPLES), 2, "give dt in seconds"),
     ("components and no times", "NS (g),EW (g)\n" + wide(OTHER, SAMPLES), 2, "give dt in seconds"),
-    ("a spectrum", "Period (s),Sa (g)\n" + rows(), 1, "names no column of accelerations at times ('Period',"),
+    ("a spectrum", "Period (s),Sa (g)\n" + rows(), 1, "'Sa', of a spectrum?); give a table of accelerations at times"),
     ("unnamed columns", "0 1 2\n1 2 3\n2 3 4\n", 1, "each line holds 3 numbers"),
 ]  # fmt: skip
 
@@ -262,9 +265,9 @@ def test_components_alone_are_read_with_a_step(tmp_path, names):
 
 def test_of_a_folder_those_that_say_something_else_keep_it_or_are_refused(tmp_path):
     path = tmp_path / "table.csv"
-    for unit in ("cm/s", "counts"):
+    for unit, what in (("cm/s", "'cm/s', which is no unit of"), ("counts", "the units 'counts' are not known")):
         path.write_text(f"t (s),v ({unit})\n" + rows())
-        with pytest.raises(UnreadableRecord, match=f"the units '{unit}' are not known"):
+        with pytest.raises(UnreadableRecord, match=what):
             named_motion(str(path), units="g", several=True)
     path.write_text("t (s),a (g)\n0,0\n0.01,1\n0.05,0.5\n0.06,0\n")
     assert named_motion(str(path), dt=0.01, several=True).step is None

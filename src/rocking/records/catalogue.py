@@ -118,9 +118,19 @@ def info(name: str) -> Record:
     """
     catalogue = _catalogue()
     if checks.text(name, "name of a shipped record", UnreadableRecord) not in catalogue:
-        meant = checks.meant(name, list(catalogue), f"there are {', '.join(catalogue)}")
-        raise UnreadableRecord(f"no shipped record is named {name!r}; {meant}")
+        hint = meant(name, f"there are {', '.join(catalogue)}")
+        raise UnreadableRecord(f"no shipped record is named {name!r}; {hint}")
     return Record(name=name, **catalogue[name])
+
+
+def meant(name: str, otherwise: str, what: str = "") -> str:
+    """Return the end of a message about an unknown name: similar records, horizontal unless "-up", or another hint."""
+    vertical = name.endswith(("-u", "-up"))
+    offered = [each for each, facts in _catalogue().items() if (facts["direction"] == "up") == vertical]
+    begun = [each for each in offered if len(name) > 2 and each.startswith(name)]
+    if begun:
+        return f"did you mean {what}{' or '.join(begun)}?"
+    return checks.meant(name, {each: f"{what}{each}" for each in offered}, otherwise)
 
 
 def load(name: str) -> Motion:

@@ -93,8 +93,10 @@ def timing(
     if given is not None and prints_as(written, given * unit.divisor / unit.multiplier):
         return given, None
     if fault is not None:
-        text = "the time does not increase from the row before; correct it, or give {} if it is missing or rounded"
-        raise source.error(text, row_at(fault), "dt")
+        text = "the time does not increase from the row before; correct it"
+        if request.dt is not None:
+            raise source.error(text, row_at(fault))
+        raise source.error(f"{text}, or give {{}} if it is missing or rounded", row_at(fault), "dt")
     gap = gap_at(written)
     if gap is not None:
         raise missing_value(source, written[gap], row_at(gap))

@@ -31,7 +31,8 @@ def _at2(header: Header) -> Said:
     points, dt = filter(None, sizes.groups())
     at = header.lines[-1].start
     # "event, date, station, component (owner)", "event, station, component" or "..., component, (owner)"
-    title = header.lines[1].text.strip() if len(header.lines) > 2 else ""
+    second = header.source.lines(0, 2)[1:]  # of the file, whose first line may be blank
+    title = next((line.text.strip() for line in second if line.start < at), "")
     owned = _OWNER.fullmatch(title)
     text, owner = owned.groups() if owned else (title, "")
     event, station, name = title, "", "acceleration"
@@ -141,6 +142,9 @@ def _esm(header: Header) -> Said:
     entries = [each.groups() for each in itertools.takewhile(bool, found) if each]
     header.take(len(entries))
     says = {key: value.strip() for key, value in entries if value.strip()}
+    for key in _ESM_KEYS[:3]:
+        if key not in says:
+            raise header.source.error(f"the header gives no {key}; get the record again", header.at(_ESM[key]))
     (step,), (count,) = (header.positive(_ESM[key]) for key in ("SAMPLING_INTERVAL_S", "NDATA"))
     name = says.get("STREAM", "acceleration")
     first_sample = says.get("DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS", "")

@@ -98,8 +98,8 @@ def unreadable(name: str, error: Exception) -> UnreadableRecord:
     """Return an error for a file that could not be opened, with any similar shipped record."""
     text = f"this file could not be read ({getattr(error, 'strerror', None) or error}); check the name and the disk"
     if isinstance(error, FileNotFoundError):
-        shipped = {each: f"the shipped record {each}" for each in catalogue.names()}
-        text = f"there is no such file; {checks.meant(name, shipped, 'check the name and the folder')}"
+        meant = catalogue.meant(name, "check the name and the folder", "the shipped record ")
+        text = f"there is no such file; {meant}"
     return UnreadableRecord(text, path=name)
 
 

@@ -46,6 +46,8 @@ _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+(?:[EeDd][+-]?\d+)?")
 
 #: Pattern of a unit of another quantity.
 _OF_OTHER_QUANTITY: Final = re.compile(r"(?i).*[/%].*|m|cm|mm|in|ft|m?v|counts?|rad|deg")
+#: Pattern of a unit that is surely none of acceleration, unlike unknown spellings such as "cm/seg2" or "% of g".
+_OF_NO_ACCELERATION: Final = re.compile(r"(?i)(?:[muµk]?m|cm|in|ft|rad|deg)(?:/s(?:ec)?)?")
 #: Step or rate in a heading.
 _STATES_STEP: Final = re.compile(
     rf"({NUMBER})\s*(?:sps\b|samples?\s*(?:/|per)\s*s)|(?:sampl\w*[\s_-]*(?:rate|freq|interval|step|period|/\s*s)"
@@ -105,10 +107,14 @@ class _Table(NamedTuple):
             raise self.source.error(f"{text}; give accelerations at times, or name their column so", self.heading.at)
         if not times:
             self._check_step(request.dt)
+        self._check_numbers(numbers)
         overruled = request.unit is not None and not request.several
         channels = []
         for number, place in enumerate(held, 1):
             _, name, unit, strange = self.heading.columns[place]
+            if not (unit or overruled) and _OF_NO_ACCELERATION.fullmatch(strange):
+                text = f"the heading says {strange!r}, which is no unit of an acceleration"
+                raise self.source.error(f"{text}; give a table of accelerations", self.heading.at)
             at = self.heading.at if strange else self.start
             known = self._timing(request, numbers, place)
             in_heading = unit.name if unit else strange if _OF_OTHER_QUANTITY.fullmatch(strange) else ""
@@ -132,6 +138,15 @@ class _Table(NamedTuple):
         dt, instants = timing(self.source, request, numbers[:, column], unit, self.start, self._row_at)
         return {"dt": dt, "times": instants, "start": float(unit.to_si(numbers[:1, column])[0])}
 
+    def _check_numbers(self, numbers: Floats) -> None:
+        """Raise an error if row numbers have a gap."""
+        for place in self.heading.places("count"):
+            steps = np.diff(numbers[:, place])
+            odd = np.flatnonzero(np.abs(steps - steps[:1]) > 1e-6)
+            if len(odd):
+                text = "the number of this row does not follow that of the row before; get a record without gaps"
+                raise self.source.error(text, self._row_at(int(odd[0]) + 1))
+
     def _check_step(self, dt: float | None) -> None:
         """Raise an error for a table without times if the step is missing or differs from its heading."""
         said = "the file does not say its sampling step"
@@ -151,8 +166,8 @@ class _Table(NamedTuple):
         columns, channels = self.heading.columns, self.heading.places("channel")
         if not channels or (self.heading.places("spectrum") and not self.heading.places("time")):
             others = ", ".join(repr(column.name) for column in columns)
-            text = f"the heading names no column of accelerations at times ({others}, of a spectrum?); name it so"
-            raise self.source.error(text, self.heading.at)
+            text = f"the heading names no column of accelerations at times ({others}, of a spectrum?)"
+            raise self.source.error(f"{text}; give a table of accelerations at times", self.heading.at)
         known = [place for place in channels if columns[place].unit]
         return known or [place for place in channels if not columns[place].strange] or channels
 
