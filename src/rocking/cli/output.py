@@ -67,11 +67,11 @@ def write_tables(folder: Path, found: Result) -> None:
 
 
 @contextmanager
-def left_out(files: str) -> Iterator[None]:
+def left_out(files: str, refusal: type[InvalidOption] = InvalidOption) -> Iterator[None]:
     """Go on without files whose content is refused, with a note why: what was computed is not lost for them."""
     try:
         yield
-    except InvalidOption as error:
+    except refusal as error:
         note(Message(f"{literal(files)} left out: {error.message.template}", error.message.arguments))
 
 
