@@ -282,6 +282,7 @@ def test_a_hyphen_is_a_polarity(run):
 NOTES = """
 el-centro-meloland-up {B} | looks vertical
 {R} --width 2 --height 1 --restitution 0.5 | sizes swapped
+{R} --p 2.9858,3.0053 --alpha 0.155,0.27417 | are the sides of p swapped
 {R} --width 20 --height 100 | in metres
 {R} {B} --pga 0.4 | --pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g
 {R} {B} --pga 400 | the peak acceleration is 40.8 g

@@ -18,7 +18,7 @@ PULSE = "one-sine:amplitude=0.4g,frequency=1Hz"
 #: What is typed after `rocking`, and words of the one sentence that answers: {R} is a record, {S} sizes, {B} a block by
 #: its parameters, {W} a wall of a mass, {P} a pulse.
 MISTAKES = """
-simulat | Did you mean "simulate"?
+simulat | there is no command simulat; did you mean simulate?
 simulate {R} | a block is needed: give --width and --height, or --half-width and --half-height, or --p and --alpha
 simulate {S} | give one record or more
 simulate {R} --width 1 | a block needs more than --width: give --width and --height
@@ -36,7 +36,7 @@ simulate {R} {S} --chattering foo | one of time, certified, velocity, bypass, in
 simulate {R} {S} --chattering certified=0 | --chattering "certified=0": tolerance must be a positive number, in s, not 0
 simulate {R} {S} --scale 2 --pga 0.5g | --scale and --pga
 simulate {R} {S} --sa 0.4g | 0.4g@1.0
-simulate {R} {S} --pga | --pga requires an argument; see rocking simulate --help
+simulate {R} {S} --pga | --pga needs a value; see rocking simulate --help
 simulate {R} {S} --pga -0.4g | --pga must be above 0, not -0.4g; --scale -1 reverses a motion
 simulate {R} {S} --channel 7 | a shipped record is one channel, with its step and units; leave --channel out
 simulate {R} {S} --energy | --energy writes files
@@ -67,7 +67,8 @@ fragility {R} {S} --limits half=0.5,half=0.7 | has half twice
 fragility {R} {S} --limits overturning=0.5 | gives a rotation the name 'overturning'
 fragility {R} {S} --site 2 | --site is for a curve of --hazard
 chatter one 2 0.9 | Invalid value for A: unable to convert "one" into float; see rocking chatter --help
-chatter 1.5 2 | --eta requires an argument; see rocking chatter --help
+chatter 1.5 2 | rocking chatter needs ETA; see rocking chatter --help
+chatter | rocking chatter needs A; see
 mesh nobody.obj | nobody.obj: there is no such file
 mesh statue --density heavy | --density takes a number, not 'heavy'
 mesh statue --restitution 0.9 | --restitution is for the blocks of --azimuth: give one

@@ -138,6 +138,7 @@ MISTAKES = r"""
 p = "1:6:5" -> p = "fast" | 2 | p takes an angular velocity
 restitution = 0.9 -> restitutoin = 0.9 | 4 | no restitutoin; did you mean restitution
 {GRID} -> width = 0.3 | 2 | a block needs more than width: give width and height
+[simulation] -> [report.fragility]\n[simulation] | 18 | its options are now those of rocking study report
 [scales] -> [scale] | 14 | no table [scale]; did you mean scales?
 frequency = [0.5, 1.0] ->  | 9 | the pulse one-sine needs frequency as well
 frequency = [0.5, 1.0] -> frequncy = 2 | 12 | no frequncy; did you mean frequency
@@ -288,7 +289,7 @@ def test_a_file_that_is_there_is_not_overwritten(run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["study", "crate", "a"], 'Unknown command "crate". Did you mean "create"?'),
+        (["study", "crate", "a"], "there is no command crate; did you mean create?"),
         (["study", "run", "m", "--thread", "2"], "Unknown option: --thread. Did you mean --threads?"),
         (["study", "run", "nowhere"], "nowhere: there is no study here"),
         (["study", "export", "nowhere", "all.doc"], "exported to .nc, .csv, .parquet, not to all.doc"),

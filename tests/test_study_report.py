@@ -209,6 +209,20 @@ def test_a_block_that_no_curve_fits_says_why(tmp_path):
     assert "; 1 curve cannot be fitted (fault says why)" in found.summary()
 
 
+def test_wrong_options_of_a_report_are_refused(study, run, tmp_path):
+    for curves in (study.block_fragilities, study.fragility):
+        with pytest.raises(rocking.InvalidOption, match="confidence must be a number between 0 and 1, not 2"):
+            curves(confidence=2)
+        with pytest.raises(rocking.InvalidOption, match="must be 0 or more"):
+            curves(limits={"half": -0.5})
+    with pytest.raises(rocking.InvalidOption, match="fractiles must hold a share of the motions or more"):
+        study.spectrum([])
+    for options in ("--limits foo", "--measure sa", "--fractiles 2", "--confidence 2", "--limits half=-1"):
+        code, _, err = run("study", "report", study.place, tmp_path / "out", *options.split())
+        said = "the limit 'half'" if "half" in options else options.split()[0]
+        assert code == 2 and said in err and not (tmp_path / "out").exists()
+
+
 def test_a_study_that_is_not_complete_has_no_report(tmp_path):
     study = rocking.study(tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
     with pytest.raises(rocking.StudyError, match="units are missing, 72 of 72"):
@@ -251,3 +265,10 @@ def test_the_figures_draw_every_block(study, curves):
     marks = sum(len(one.get_offsets()) for axes in spectrum.axes[:4] for one in axes.collections)
     assert marks == 4 * 12
     assert f"{len(MOTIONS)} motions, nonlinear model" in spectrum.get_suptitle() == study.spectrum().data.description
+
+
+def test_the_figures_say_what_they_draw(study, curves):
+    bar = study.spectrum([0.9, 0.16, 0.16]).plot().axes
+    assert bar[0].get_title().startswith("PGA 0.10") and bar[0].get_title().endswith(" g")
+    assert bar[-1].get_ylabel() == "16 % fractile of peak rotation over slenderness"
+    assert curves.plot().axes[-1].get_ylabel() == "median peak ground acceleration (g)"

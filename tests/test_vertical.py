@@ -342,6 +342,7 @@ def test_the_figure_of_a_response_moves_the_thresholds_with_the_weight_and_shows
     [
         ("el-centro-meloland-270", ["the vertical motion is the horizontal one itself"]),
         ("el-centro-meloland-360", ["the channel '360' looks horizontal"]),
+        ("ridgecrest-clc-up", ["the vertical motion is of the station 'CI.CLC", "do both start at the same time?"]),
     ],
 )
 def test_a_vertical_component_that_looks_like_a_mistake_is_computed_with_a_note(
@@ -353,6 +354,15 @@ def test_a_vertical_component_that_looks_like_a_mistake_is_computed_with_a_note(
     assert "rocking: note: el-centro-meloland-270: " in err and all(each in err for each in said)
     code, _, err = run("simulate", "el-centro-meloland-270", "--vertical", "el-centro-meloland-up", *statue)
     assert (code, err) == (0, "")
+
+
+def test_components_that_last_very_different_times_are_noted() -> None:
+    part = el_centro().vertical.processed(trim=(0.0, 20.0))
+    assert vertical_notes(el_centro().with_vertical(part)) == (
+        "the horizontal motion lasts 56.93 s, the vertical one 20 s: do both start at the same time?",
+    )
+    late = Motion.from_samples([0.0] * 5600 + [1.0, -1.0] * 40, 0.01)
+    assert "the horizontal motion is strong from" in vertical_notes(el_centro().with_vertical(late))[0]
 
 
 def test_a_jump_beyond_one_threshold_lifts_off_though_the_other_is_only_reached() -> None:

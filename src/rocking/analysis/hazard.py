@@ -205,7 +205,8 @@ def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
 
 def _check_order(what: str, values: Floats, way: float) -> None:
     """Check that values are positive, and increase (`way` 1) or decrease (-1)."""
-    sound = np.isfinite(values) & (values > 0.0) & (way * np.diff(values, prepend=-way * np.inf) > 0.0)
+    with np.errstate(invalid="ignore"):  # an infinite first value
+        sound = np.isfinite(values) & (values > 0.0) & (way * np.diff(values, prepend=-way * np.inf) > 0.0)
     if not sound.all():
         k = int(np.argmin(sound))
         after = f" after {values[k - 1]:g}" if k else ""
@@ -242,8 +243,10 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
         except ValueError:
             sentence = f"{','.join(row)} is not an intensity and a rate, in {len(heading)} cells as the heading"
             raise InvalidOption(sentence, line=line) from None
-    if (kind == "sa") != (period is not None):
-        raise InvalidOption(f"{{}} (s) is for a spectral acceleration, and needed there; it is {kind}", "period")
+    if kind == "sa" and period is None:
+        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period")
+    if kind != "sa" and period is not None:
+        raise InvalidOption(f"{{}} belongs to a spectral acceleration, and this curve is of {kind}", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
     with np.errstate(over="ignore"):  # infinite values are rejected later
         return factor * intensity, rate, measure

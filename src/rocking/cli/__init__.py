@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from inspect import Parameter
 from pathlib import Path
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, Argument, CycloptsError, MissingArgumentError, UnknownCommandError
 
 from rocking.core.checks import meant
 from rocking.core.progress import notes_for
@@ -125,6 +125,14 @@ def _sentence(error: Exception, given: list[str]) -> str:
         return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
     if isinstance(error, RockingError):
         return error.text(spelling_of(command_of(given))).rstrip(".")
+    if isinstance(error, UnknownCommandError):
+        unknown, commands = (error.unused_tokens or given)[0], [*filter(str.isalpha, command_of(given))]
+        hint = meant(unknown, commands, f"there are {', '.join(commands)}")
+        return f"there is no command {unknown}; {hint}"
+    if isinstance(error, MissingArgumentError) and (missing := error.argument) is not None:
+        is_given = any(each.partition("=")[0] in missing.names for each in given)
+        wants = f"{missing.name} needs a value" if is_given else f"{_named(given)} needs {_name(missing)}"
+        return f"{wants}; see {_named(given)} --help"
     if isinstance(error, CycloptsError):
         sentence = " ".join(str(error).split()).rstrip(".")
         return sentence if sentence.endswith("?") else f"{sentence}; see {_named(given)} --help"
@@ -197,5 +205,12 @@ def _options(command: App) -> Iterable[str]:
     if command.default_command is None:
         return ()
     arguments = command.assemble_argument_collection()
-    named = [each for each in arguments if each.keys or each.field_info.kind is Parameter.KEYWORD_ONLY]
-    return [name for each in named for name in each.names if name.startswith("-")]
+    return [name for each in arguments if not _is_positional(each) for name in each.names if name.startswith("-")]
+
+
+def _name(argument: Argument) -> str:
+    return argument.name.lstrip("-").upper() if _is_positional(argument) else argument.name
+
+
+def _is_positional(argument: Argument) -> bool:
+    return not argument.keys and argument.field_info.kind is not Parameter.KEYWORD_ONLY

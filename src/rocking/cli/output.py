@@ -67,11 +67,11 @@ def write_tables(folder: Path, found: Result) -> None:
 
 
 @contextmanager
-def left_out(files: str) -> Iterator[None]:
+def left_out(files: str, refusal: type[InvalidOption] = InvalidOption) -> Iterator[None]:
     """Skip files whose content is rejected, with a note."""
     try:
         yield
-    except InvalidOption as error:
+    except refusal as error:
         note(Message(f"{literal(files)} left out: {error.message.template}", error.message.arguments))
 
 

@@ -20,13 +20,14 @@ from rocking.cli.output import (
     print_result,
     write_results,
 )
+from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.result import Result
 from rocking.core.tables import counted, write_text
-from rocking.errors import InvalidOption, OutputError, StudyError
+from rocking.errors import InvalidOption, OutputError, StudyError, Unfitted
 from rocking.inputs.quantities import values
 from rocking.studies.file import TEMPLATE, read_study
-from rocking.studies.results import StudyVerdict
+from rocking.studies.results import StudyVerdict, checked_fractiles
 from rocking.studies.study import Study, study_of
 
 study = App(name="study")
@@ -209,12 +210,15 @@ def report(
     fractiles
         Fractions of the motions that stay below the fractiles of the spectrum.
     """
+    how, states = measure.wanted, limits_of(limits)
+    shares = checked_fractiles(values(fractiles, "fractiles").tolist())
+    checks.share(confidence, "confidence", InvalidOption)
     found, made = Study(folder), dict[str, Result]()
     fit = found.fragility if together else found.block_fragilities
     with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
-        with left_out("fragility"):
-            made["fragility"] = fit(measure=measure.wanted, limits=limits_of(limits), confidence=confidence)
-        made["spectrum"] = found.spectrum(values(fractiles, "fractiles").tolist())
+        with left_out("fragility", Unfitted):
+            made["fragility"] = fit(measure=how, limits=states, confidence=confidence)
+        made["spectrum"] = found.spectrum(shares.tolist())
         for name, one in made.items():
             one.to_csv(target / f"{name}.csv")
         result = {name: one.to_dict() for name, one in made.items()}

@@ -212,7 +212,7 @@ class OrbitEquations:
         return value, self.state(z), multipliers, peak_of(response)
 
     def is_parent(self, z: Floats) -> bool:
-        """Whether a point belongs to symmetric orbits, or to those of half the period, from which this branch starts."""
+        """Whether a point belongs to symmetric orbits, or to those of half the period, where this branch starts."""
         state, value = self.physical(z)
         if self.kind.rests or self.by_half:
             return False

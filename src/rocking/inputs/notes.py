@@ -13,6 +13,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
 from rocking.motion.description import Origin, begins_later
+from rocking.motion.measures import significant_span
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
@@ -50,6 +51,8 @@ _HORIZONTAL: Final = re.compile(
     r"(\d{2,3}|n|e|s|w|ns|ew|n-s|e-w|[ns] ?\d{1,2} ?[ew]|north|east|south|west|h[12]|[a-z]{2}[ne12])( deg.*)?",
     re.IGNORECASE,
 )
+#: Smallest ratio of the durations of components that start together.
+_ALIKE: Final = 0.75
 
 
 def motion_notes(motion: Motion) -> tuple[str, ...]:
@@ -76,12 +79,7 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
         theirs, ours = (getattr(_origin(each), what) for each in (vertical, motion))
         if theirs and ours and _spelled(theirs) != _spelled(ours):
             notes.append(f"the vertical motion is of the {what} {theirs!r}, the horizontal one of {ours!r}")
-    if later := begins_later(motion.description, vertical.description, motion.step):
-        notes.append(
-            f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
-            "horizontal one, but both are taken to start together: cut what comes first"
-        )
-    return tuple(notes)
+    return (*notes, *_timing_notes(motion, vertical))
 
 
 def reading_notes(motion: Motion) -> tuple[str, ...]:
@@ -142,6 +140,12 @@ def block_notes(block: Block) -> tuple[str, ...]:
     if block.half_width is not None and block.half_height is not None and block.half_width > block.half_height:
         width, height = 2.0 * block.half_width, 2.0 * block.half_height
         notes.append(f"the block is wider, {width:g} m, than it is high, {height:g} m: are the sizes swapped?")
+    slender, stocky = sorted(block.sides, key=lambda side: side.alpha)
+    if slender.alpha < stocky.alpha and slender.p <= stocky.p:
+        notes.append(
+            f"the more slender side has no larger p, {slender.p:g} rad/s, than the other, so that the mass lies as far "
+            "from its centre as the pivots do: are the sides of p swapped, or its digits too few?"
+        )
     return tuple(notes)
 
 
@@ -181,6 +185,27 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
         yield (
             f"the peak velocity is {motion.pgv:.3g} m/s, too much for a ground motion: are units and step right, or is "
             "an offset left?"
+        )
+
+
+def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
+    """Yield notes on components that seem to start at different times."""
+    if later := begins_later(motion.description, vertical.description, motion.step):
+        yield (
+            f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
+            "horizontal one, but both are taken to start together: cut what comes first"
+        )
+        return
+    (start, end), (first, last) = (significant_span(each) for each in (motion, vertical))
+    if last < start or first > end:
+        yield (
+            f"the horizontal motion is strong from {start:.4g} s to {end:.4g} s, the vertical one from {first:.4g} s "
+            f"to {last:.4g} s: do both start at the same time?"
+        )
+    elif min(motion.duration, vertical.duration) < _ALIKE * max(motion.duration, vertical.duration):
+        yield (
+            f"the horizontal motion lasts {motion.duration:.4g} s, the vertical one {vertical.duration:.4g} s: do both "
+            "start at the same time?"
         )
 
 

@@ -66,7 +66,7 @@ class Tables:
         if "." in table and not re.search(rf"^\s*\[+\s*{re.escape(table)}\b", self.text, re.MULTILINE):
             parent, _, name = table.rpartition(".")
             return self.line_of(parent, name)
-        here, seen, heading_line = "", -1, 1
+        here, seen, heading_line = "", -1, 0
         for number, line in enumerate(self.text.splitlines(), start=1):
             if heading := re.match(r"\s*\[+\s*([\w.]+)\s*\]+", line):
                 here = heading[1]
@@ -75,10 +75,12 @@ class Tables:
                     return number
                 if here == table and seen == occurrence:
                     heading_line = number
+                elif here.startswith(f"{table}."):
+                    heading_line = heading_line or number  # only a part of the table has a heading
             found = re.match(r"\s*([\w.-]+)\s*=", line)
             if found and key is not None and here == table and max(seen, 0) == occurrence and found[1] == key:
                 return number
-        return heading_line
+        return heading_line or 1
 
 
 @contextlib.contextmanager

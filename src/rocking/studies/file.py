@@ -128,7 +128,9 @@ def _check_tables(tables: Tables) -> None:
     """Check table names, keys, and types of non-numeric values."""
     for table, content in tables.tables.items():
         if table not in SCHEMA:
-            raise tables.wrong(table, None, f"there is no table [{{}}]; {nearest(table, SCHEMA)}", table)
+            moved = "its options are now those of rocking study report"
+            hint = moved if table == "report" else nearest(table, SCHEMA)
+            raise tables.wrong(table, None, f"there is no table [{{}}]; {hint}", table)
         if not isinstance(content, dict):
             raise tables.wrong(table, None, f"{{}} must be one table, [{table}], once", table)
         for key, value in content.items():

@@ -17,7 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.analysis.curve import fitted_curve
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.levels import (
+    checked_limit,
     clusters_of,
+    limit_states,
     motions_in_words,
     of_polarities,
     passed,
@@ -37,7 +39,7 @@ from rocking.core.result import DatasetResult, table_of_some, variable
 from rocking.core.tables import as_written, columns_of, counted, frame_of, records_of, whole_file
 from rocking.engine.problem import slenderness_of
 from rocking.engine.tasks import OUTCOME, missing_text
-from rocking.errors import InvalidOption, StudyError, install
+from rocking.errors import InvalidOption, StudyError, Unfitted, install
 from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Product, body_coordinates, dataset_of, verticals_of
 from rocking.studies.folder import Store
@@ -286,19 +288,26 @@ class BlockTable(DatasetResult):
 
         drawn, parameters = next(iter(self.data.data_vars.values())), self.block_parameters
         if "fractile" in drawn.dims:
-            drawn = drawn.sel(fractile=0.5, method="nearest")
-        over = str(drawn.dims[0])
+            drawn = drawn.isel(fractile=int(np.argmin(np.abs(drawn.fractile.values - 0.5))))
+            measure = _measure_of(drawn.scale.attrs)
+            is_factor = measure.name == "factor"
+            name, unit = "factor" if is_factor else measure.short_name, measure.shown_in
+            names = [f"{name} {measure.scale * value:.4g} {unit}".rstrip() for value in drawn.scale.values]
+            shown, missing = drawn.values, "overturns"
+            label = f"{100.0 * float(drawn.fractile):g} % fractile of peak rotation over slenderness"
+        else:
+            measure, names = _measure_of(self.data.attrs), [str(name) for name in drawn.limit_state.values]
+            shown, missing, label = measure.scale * drawn.values, "no curve fits", f"median {measure.label}"
         p, alpha = (
             np.mean([parameters[one] for one in (name, f"{name}_plus", f"{name}_minus") if one in parameters], axis=0)
             for name in ("p", "alpha")
         )
-        labels, unit = drawn[over].values, drawn.attrs["units"]
         return blocks_figure(
             p,
             alpha,
-            panels={f"{over.replace('_', ' ')} {labels[k]}": drawn.values[k] for k in evenly(len(labels), 4)},
-            value_label=drawn.attrs["long_name"] + ("" if unit == "1" else f" ({unit})"),
-            missing_label="none",
+            panels={names[k]: shown[k] for k in evenly(len(names), 4)},
+            value_label=label,
+            missing_label=missing,
             title=title or as_written(self.data.description),
             ax=ax,
             figsize=figsize,
@@ -308,12 +317,35 @@ class BlockTable(DatasetResult):
         return _for_tables(self.data)
 
 
+def _measure_of(about: Mapping[str, Any]) -> Measure:
+    """Return the measure that attributes describe."""
+    return Measure(about["measure"], **{name: about[name] for name in ("period", "damping") if name in about})
+
+
+def checked_fractiles(fractiles: Sequence[float]) -> Floats:
+    """Return shares between 0 and 1, one or more."""
+    shares = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
+    if not shares.size:
+        raise InvalidOption("{} must hold a share of the motions or more, as [0.16, 0.5, 0.84]", "fractiles")
+    for value in shares:
+        if not 0.0 < value < 1.0:
+            sentence = f"each of {{}} must be a number between 0 and 1, not {value:g}"
+            raise InvalidOption(sentence, "fractiles", value=value)
+    return shares
+
+
+def _check_fit(limits: Mapping[str, float], confidence: float) -> None:
+    """Check what is asked of curves, before outcomes are read."""
+    checks.share(confidence, "confidence", InvalidOption)
+    for name, limit in limit_states(limits, "limits").items():
+        checked_limit(limit, name)
+
+
 def study_spectrum(store: Store, fractiles: Sequence[float], progress: bool | None) -> BlockTable:
     """Compute fractiles of the normalised peak rotation for each scale and block."""
     import xarray as xr
 
-    given = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
-    shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in given])
+    shares = checked_fractiles(fractiles)
     product, scales, count = store.product, store.product.scales, len(store.product.bodies)
     values = np.empty((len(shares), scales.count, count))
     overturned, missing = np.empty((scales.count, count)), 0
@@ -348,6 +380,7 @@ def pooled_fragility(
     clusters: ArrayLike | None,
 ) -> Fragility:
     """Fit one curve to the outcomes of all blocks, with optional weights."""
+    _check_fit(limits, confidence)
     product, bodies = store.product, store.product.bodies
     units, which = np.unique(units_of(bodies, measure, product.model), return_inverse=True)
     shares = weights_of(weights, len(bodies))
@@ -411,6 +444,7 @@ def block_fragilities(
     """Fit a curve to the outcomes of each block."""
     import xarray as xr
 
+    _check_fit(limits, confidence)
     product, bodies, scales = store.product, store.product.bodies, store.product.scales.count
     kept = {name: np.full((len(limits), len(bodies)), np.nan) for name in _KEPT}
     faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
@@ -430,9 +464,11 @@ def block_fragilities(
                     data = intensities[some] / units[j], {name: exceeded[some]}
                     numbers = [np.nan] * 6
                     try:
+                        if not some.any():
+                            raise Unfitted("every simulation was given up")
                         curve = fit(*data, trials=trials[some], clusters=together[some]).curves[0]
                         numbers = [curve.median, *curve.median_interval, curve.dispersion, *curve.dispersion_interval]
-                    except InvalidOption as error:  # identical or separated outcomes have no lognormal fit
+                    except Unfitted as error:  # identical or separated outcomes have no lognormal fit
                         faults[i, j] = str(error)
                     numbers += [exceeded.sum(), trials.sum()]
                     for values, number in zip(kept.values(), numbers, strict=True):
