@@ -679,6 +679,17 @@ def test_a_body_within_a_cavity_is_one(inverted, density):
         assert found.mass == pytest.approx(2000.0 * 8.32 + 7000.0 * 0.25, rel=1e-12)
 
 
+def test_an_inverted_part_leaves_the_cavity_of_another_one_hollow():
+    cavity = _box((1, 1, 3), (4, 0, 2.5), inverted=True)
+    hollow = trimesh.util.concatenate([_box((2, 2, 5), (4, 0, 2.5)), cavity])
+    found = Solid.from_mesh(scene(solid=_box((3, 3, 6), (0, 0, 3), inverted=True), hollow=hollow))
+    assert found.volume == pytest.approx(54.0 + 17.0, rel=1e-12)
+    assert found.repairs == (
+        "hollow: 1 cavity of 3 m^3 taken as hollow",
+        "solid: normals pointed inwards: the surface was turned inside out",
+    )
+
+
 @pytest.mark.parametrize("at", [(-0.5, 0, 2), (0.5, 0, 2), (0, -0.5, 2), (0, 0.5, 2)])
 def test_a_cavity_in_the_surface_is_one_wherever_its_corners_lie(at):
     found = Solid.from_mesh(trimesh.util.concatenate([_box((2, 2, 4), (0, 0, 2)), _box((1, 1, 2), at, inverted=True)]))

@@ -74,11 +74,10 @@ def oriented(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list[Surfac
     of, shells = _pieces(surfaces, labels)
     volumes = np.array([float(signed_volumes(*each[:2]).sum()) for each in shells])
     sizes, owner = np.abs(volumes), of.copy()
-    against = volumes * volumes[np.argmax(sizes)] < 0.0
     is_cavity = np.zeros(len(shells), bool)
-    for n in np.flatnonzero(against):
-        larger = np.flatnonzero(~against & (sizes > sizes[n]) & ((of == of[n]) | hollow[of[n]]))
-        if around := [m for m in larger if surrounds(*shells[m][:2], *shells[n][:2])]:
+    for n in np.argsort(-sizes, kind="stable"):  # so that it is known of all larger ones whether they are cavities
+        may = (volumes * volumes[n] < 0.0) & (sizes > sizes[n]) & ~is_cavity & ((of == of[n]) | hollow[of[n]])
+        if around := [m for m in np.flatnonzero(may) if surrounds(*shells[m][:2], *shells[n][:2])]:
             is_cavity[n], owner[n] = True, of[min(around, key=lambda m: sizes[m])]
     flipped = np.where(is_cavity, volumes > 0.0, volumes < 0.0)
     found = []
