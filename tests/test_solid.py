@@ -557,6 +557,10 @@ REFUSED = {
         "tolerance is how a support is looked for: leave it out where support is given",
     ),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
+    "a folder": (
+        lambda: Solid.from_mesh(Path(__file__).parent),
+        "tests: this is a folder, not a file: name the file in it",
+    ),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
     "no mesh": (
         lambda: Solid.from_mesh(3.0),

@@ -101,6 +101,8 @@ def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
 
 
 def _read(file: Path, named: str) -> Scene:
+    if file.is_dir():
+        raise InvalidBlock("this is a folder, not a file: name the file in it", path=named)
     if not file.is_file():
         known = f"; the mesh that ships is {', '.join(SHIPPED)}" if not file.suffix else ""
         raise InvalidBlock(f"there is no such file{known}", path=named)
