@@ -534,7 +534,14 @@ REFUSED = {
     "a ball": (lambda: Solid.from_mesh(trimesh.creation.icosphere()), "stands on a point or a line"),
     "support beyond": (
         lambda: Solid.from_mesh(box(), support=[(0.35, 0.2), (-0.3, 0.2), (-0.3, -0.2)]),
-        r"support reaches 0\.05 m beyond the mesh, from -0\.3 m to 0\.3 m in the east",
+        r"support reaches 0\.05 m beyond the outline of the mesh, from -0\.3 m to 0\.3 m in the east",
+    ),
+    "support beyond a circle": (
+        lambda: Solid.from_mesh(
+            trimesh.creation.cylinder(0.5, 2.0, sections=360),
+            support=np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) / 2,
+        ),
+        r"support reaches 0\.207 m beyond the outline of the mesh",
     ),
     "support on a line": (
         lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (0.0, 0.0), (-0.1, -0.1)]),
