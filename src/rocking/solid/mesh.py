@@ -242,7 +242,7 @@ def properties(
             for name, surface in zip(names, surfaces, strict=True)
             for sentence in surface.repairs
         ),
-        "notes": (*notes, *overlaps(surfaces), *height_notes(height), *density_notes(used)),
+        "notes": (*notes, *overlaps(names, surfaces), *height_notes(height), *density_notes(used)),
     }
     return made, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
 
