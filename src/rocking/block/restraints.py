@@ -377,7 +377,7 @@ class Restitution:
     largest, least : float or pair
         Bounds of the factor on the angular speed, in (0, 1]; a pair is (on leaving side +, on leaving side -). The
         largest takes the place of the restitution of each `Side`.
-    slope : float or pair
+    slope : float or pair, optional
         How much it falls per angular speed before the impact, s/rad, at least 0.
     seed : int, optional
         Whole number from 0 to 2^53. The factor depends on it and on the number of the impact alone: a body draws the
@@ -387,7 +387,7 @@ class Restitution:
     Raises
     ------
     InvalidBlock
-        If a bound, the slope or the seed is out of its range, or there are both a slope and a seed.
+        If a bound, the slope or the seed is out of its range, or there are both a slope and a seed, or neither.
 
     References
     ----------
@@ -404,10 +404,14 @@ class Restitution:
 
     largest: float | Sequence[float]
     least: float | Sequence[float]
-    slope: float | Sequence[float] = 0.0
+    slope: float | Sequence[float] | None = None
     seed: int | None = None
 
     def __post_init__(self) -> None:
+        if self.slope is None:
+            if self.seed is None:
+                raise InvalidBlock("a restitution that varies needs a {} or a {}", "slope", "seed")
+            object.__setattr__(self, "slope", 0.0)
         slopes = checked_pair(self.slope, "slope")
         if wrong := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
             raise InvalidBlock(
