@@ -151,6 +151,8 @@ def test_blocks_broadcast_and_index():
     assert [block.alpha for block in blocks] == [0.1, 0.2, 0.3] * 2
     assert blocks[4] == Block.from_parameters(2.0, 0.2, 0.9)
     assert len(blocks.select(blocks.alpha[:, 0] > 0.15)) == 4
+    assert [block.alpha for block in blocks.select((1, 5))] == [0.2, 0.3]
+    assert len(blocks.select(np.array([]))) == 0
     two_sided = Blocks(p=[[1.0, 2.0]], alpha=0.2, restitution=[0.9, 0.8])
     assert [side.p for side in two_sided[1].sides] == [1.0, 2.0]
     assert not two_sided.is_symmetric
