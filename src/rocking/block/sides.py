@@ -288,6 +288,11 @@ def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, floa
                 "restitution",
             )
         return conserved[0], conserved[1]
+    if hasattr(given, "largest"):  # a Restitution, whose module imports this one
+        raise InvalidBlock(
+            "{} of a Block must be a number or a pair; give a law to RestrainedBlock(block, restitution=...)",
+            "restitution",
+        )
     plus, minus = (checked_parameter(value, "restitution") for value in checked_pair(given, "restitution"))
     return plus, minus
 
