@@ -130,6 +130,11 @@ def test_parameters_give_the_rectangles_radius():
         (lambda: Block.from_parameters(1e-200, 0.2), "p must"),
         (lambda: Block.from_parameters(1.0, 1e-200), "alpha"),
         (lambda: Block.from_pivots((0.2, 0.2), 1.0, 1e200), "radius_of_gyration"),
+        (lambda: Block(0.4, 2.0), "give the sizes of a block by name, in m: Block(width=0.4, height=2.0)"),
+        (
+            lambda: Block.from_parameters((2.7, 2.70001), (0.2, 0.2)),
+            "give p and alpha with more digits, or give restitution a value in (0, 1]",
+        ),
         (lambda: Block.from_parameters(True, 0.2), "p must be a number or an array of numbers, not True"),
     ],
 )
@@ -146,6 +151,8 @@ def test_blocks_broadcast_and_index():
     assert [block.alpha for block in blocks] == [0.1, 0.2, 0.3] * 2
     assert blocks[4] == Block.from_parameters(2.0, 0.2, 0.9)
     assert len(blocks.select(blocks.alpha[:, 0] > 0.15)) == 4
+    assert [block.alpha for block in blocks.select((1, 5))] == [0.2, 0.3]
+    assert len(blocks.select(np.array([]))) == 0
     two_sided = Blocks(p=[[1.0, 2.0]], alpha=0.2, restitution=[0.9, 0.8])
     assert [side.p for side in two_sided[1].sides] == [1.0, 2.0]
     assert not two_sided.is_symmetric
@@ -167,6 +174,11 @@ def test_blocks_broadcast_and_index():
 def test_bad_arrays_of_blocks_are_refused(make, word):
     with pytest.raises(InvalidBlock, match=word):
         make()
+
+
+def test_sides_that_are_equal_but_for_rounding_are_those_of_a_rectangle():
+    block = Block.from_parameters(p=(2.7, 2.7 * (1.0 + 1e-10)), alpha=(0.2, 0.2 * (1.0 - 3e-10)))
+    assert [side.restitution for side in block.sides] == pytest.approx([1.0 - 1.5 * math.sin(0.2) ** 2] * 2, rel=1e-9)
 
 
 @pytest.mark.parametrize("distances", [(0.3, 0.5), (0.5, 0.3)])

@@ -198,6 +198,7 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
         (lambda: Restitution(0.9, 0.95, seed=1), "least must be above 0 and at most largest"),
         (lambda: Restitution(1.1, 0.9, seed=1), "largest must be in"),
         (lambda: Restitution((0.95, 0.4), (0.9, 0.5), seed=1), "least must be above 0 and at most largest, 0.4"),
+        (lambda: Restitution(0.9, 0.5), "a restitution that varies needs a slope or a seed"),
         (lambda: Restitution(0.95, 0.9, seed=1.5), "seed must be a whole number"),
         (lambda: Restitution(0.95, 0.9, slope=0.1, seed=1), "either falls or is drawn: give a slope or a seed"),
         (lambda: impact_restitution(), "either alpha of a rectangular block, or"),

@@ -286,7 +286,7 @@ def test_cavities_are_hollow_and_pieces_are_not():
     core = Solid.from_mesh(trimesh.util.concatenate([outer, inner]))
     assert core.volume == pytest.approx(1.008)
     assert core.repairs == ()
-    assert core.notes[0].startswith("parts or pieces overlap in about 0.008 m^3, which is counted twice: ")
+    assert core.notes[0].startswith("two pieces of mesh overlap in about 0.008 m^3, which is counted twice: ")
     assert core.notes[0].endswith("if one is a cavity, turn its normals inwards")
     apart = box((0.2, 0.2, 0.2), at=(0.0, 2.0))
     apart.invert()
@@ -309,7 +309,7 @@ def test_a_part_inside_another_that_is_turned_the_other_way_is_its_cavity():
         assert solid.notes == ()
     filled = Solid.from_mesh(scene(**parts), density={"outer": 2e3, "far": 2e3, "hollow": 1e3})
     assert filled.volume == pytest.approx(2.008)
-    assert "parts or pieces overlap in about 0.008 m^3" in filled.notes[0]
+    assert filled.notes[0].startswith("hollow and outer overlap in about 0.008 m^3")
     # All turned inside out, and a cavity in the smaller piece of one mesh.
     inverted = one_mesh.copy()
     inverted.invert()
@@ -335,16 +335,33 @@ def test_what_two_boxes_have_in_common_is_noted_once(at, sizes, common):
     other = box(sizes, at[:2])
     other.apply_translation([0.0, 0.0, at[2]])
     parts = {"foot": box((1.0, 1.0, 1.0)), "post": other}
-    for mesh in (scene(**parts), trimesh.util.concatenate([*parts.values()])):
+    both = trimesh.util.concatenate([*parts.values()])
+    for mesh, pair in ((scene(**parts), "foot and post"), (both, "two pieces of mesh")):
         solid = Solid.from_mesh(mesh)
         if common == 0.0:
             assert solid.notes == ()
             continue
         (note,) = solid.notes
         assert note == (
-            f"parts or pieces overlap in about {common:.2g} m^3, which is counted twice: make one surface of them, cut "
-            "one out of the other, or, if one is a cavity, turn its normals inwards"
+            f"{pair} overlap in about {common:.2g} m^3, which is counted twice: make one surface of the two, cut one "
+            "out of the other, or, if one is a cavity, turn its normals inwards"
         )
+
+
+def test_small_overlaps_far_apart_are_noted():
+    parts = {"base": _box((4, 2, 0.5), (0, 0, 0.25)), "top": _box((4, 2, 0.5), (0, 0, 3.65))}
+    parts |= {name: _box((0.3, 0.3, 3.0), (x, 0, 1.95)) for name, x in (("west", -1.5), ("east", 1.5))}
+    (note,) = Solid.from_mesh(scene(**parts)).notes
+    assert note.count(" overlap in about 0.0045 m^3") == 3 and "top and west overlap" in note
+    assert ", and 1 more pair, which is counted twice" in note
+
+
+def test_bodies_that_overlap_in_a_cavity_are_noted():
+    shell = [_box((4, 4, 4), (0, 0, 2)), _box((3, 3, 3), (0, 0, 2), inverted=True)]
+    held = [_box((1, 1, 1), (x, 0, 2)) for x in (0.0, 0.5)]
+    assert Solid.from_mesh(trimesh.util.concatenate([*shell, held[0]])).notes == ()
+    (note,) = Solid.from_mesh(trimesh.util.concatenate([*shell, *held])).notes
+    assert note.startswith("two pieces of mesh overlap in about 0.5 m^3, which is")
 
 
 def test_faces_that_are_none_or_come_twice_are_left_out():
@@ -534,7 +551,14 @@ REFUSED = {
     "a ball": (lambda: Solid.from_mesh(trimesh.creation.icosphere()), "stands on a point or a line"),
     "support beyond": (
         lambda: Solid.from_mesh(box(), support=[(0.35, 0.2), (-0.3, 0.2), (-0.3, -0.2)]),
-        r"support reaches 0\.05 m beyond the mesh, from -0\.3 m to 0\.3 m in the east",
+        r"support reaches 0\.05 m beyond the outline of the mesh, from -0\.3 m to 0\.3 m in the east",
+    ),
+    "support beyond a circle": (
+        lambda: Solid.from_mesh(
+            trimesh.creation.cylinder(0.5, 2.0, sections=360),
+            support=np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) / 2,
+        ),
+        r"support reaches 0\.207 m beyond the outline of the mesh",
     ),
     "support on a line": (
         lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (0.0, 0.0), (-0.1, -0.1)]),
@@ -557,6 +581,10 @@ REFUSED = {
         "tolerance is how a support is looked for: leave it out where support is given",
     ),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
+    "a folder": (
+        lambda: Solid.from_mesh(Path(__file__).parent),
+        "tests: this is a folder, not a file: name the file in it",
+    ),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
     "no mesh": (
         lambda: Solid.from_mesh(3.0),
@@ -677,6 +705,17 @@ def test_a_body_within_a_cavity_is_one(inverted, density):
     assert {region.name for region in found.regions} == {"wall", "core"}
     if isinstance(density, dict):
         assert found.mass == pytest.approx(2000.0 * 8.32 + 7000.0 * 0.25, rel=1e-12)
+
+
+def test_an_inverted_part_leaves_the_cavity_of_another_one_hollow():
+    cavity = _box((1, 1, 3), (4, 0, 2.5), inverted=True)
+    hollow = trimesh.util.concatenate([_box((2, 2, 5), (4, 0, 2.5)), cavity])
+    found = Solid.from_mesh(scene(solid=_box((3, 3, 6), (0, 0, 3), inverted=True), hollow=hollow))
+    assert found.volume == pytest.approx(54.0 + 17.0, rel=1e-12)
+    assert found.repairs == (
+        "hollow: 1 cavity of 3 m^3 taken as hollow",
+        "solid: normals pointed inwards: the surface was turned inside out",
+    )
 
 
 @pytest.mark.parametrize("at", [(-0.5, 0, 2), (0.5, 0, 2), (0, -0.5, 2), (0, 0.5, 2)])

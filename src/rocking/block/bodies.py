@@ -319,8 +319,11 @@ class Blocks:
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
         """Return some of the blocks, by a slice, indices, or a mask."""
+        given = index if isinstance(index, slice) else np.asarray(index)
+        if not isinstance(given, slice) and not given.size:
+            given = given.astype(np.int64)
         try:
-            rows = np.arange(len(self))[index]
+            rows = np.arange(len(self))[given]
         except IndexError:
             rows = np.array(0)
         if rows.ndim != 1:

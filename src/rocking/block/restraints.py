@@ -410,7 +410,8 @@ class Restitution:
     Raises
     ------
     InvalidBlock
-        If a bound, the slope or the seed is out of its range, or both a slope and a seed are given.
+        If a bound, the slope or the seed is out of its range, or a slope and a seed are both given or both
+        missing.
 
     See Also
     --------
@@ -431,10 +432,14 @@ class Restitution:
 
     largest: float | Sequence[float]
     least: float | Sequence[float]
-    slope: float | Sequence[float] = 0.0
+    slope: float | Sequence[float] | None = None
     seed: int | None = None
 
     def __post_init__(self) -> None:
+        if self.slope is None:
+            if self.seed is None:
+                raise InvalidBlock("a restitution that varies needs a {} or a {}", "slope", "seed")
+            object.__setattr__(self, "slope", 0.0)
         slopes = checked_pair(self.slope, "slope")
         if wrong := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
             raise InvalidBlock(

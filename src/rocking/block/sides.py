@@ -298,12 +298,17 @@ def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, floa
                 "restitution",
             )
         return conserved[0], conserved[1]
+    if hasattr(given, "largest"):  # a Restitution, whose module imports this one
+        raise InvalidBlock(
+            "{} of a Block must be a number or a pair; give a law to RestrainedBlock(block, restitution=...)",
+            "restitution",
+        )
     plus, minus = (checked_parameter(value, "restitution") for value in checked_pair(given, "restitution"))
     return plus, minus
 
 
 #: Largest relative difference between parameters of sides that count as equal.
-_ROUNDING: Final = 1e-12
+_ROUNDING: Final = 1e-9
 
 
 def rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
@@ -339,8 +344,8 @@ def no_body(p: Floats, alpha: Floats) -> str:
     differ, most = (100.0 * math.expm1(float(each[0])) for each in _differences(p[None], np.cos(alpha)[None]))
     return (
         f"no rigid body has p = {p[0]:g} and {p[1]:g} rad/s on sides of alpha = {alpha[0]:g} and {alpha[1]:g} rad: its "
-        f"p would differ by less than {most:.2g} %, not by {differ:.2g} %; correct p, or give {{}} a value or a pair "
-        "in (0, 1]"
+        f"p would differ by less than {most:.2g} %, not by {differ:.2g} %; give p and alpha with more digits, or "
+        "give {} a value in (0, 1]"
     )
 
 

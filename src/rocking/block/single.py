@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Never
 
 import numpy as np
 
@@ -120,7 +120,7 @@ class Block(Rocking):
 
     def __init__(
         self,
-        *,
+        *unnamed: Never,
         half_width: float | None = None,
         half_height: float | None = None,
         width: float | None = None,
@@ -130,6 +130,8 @@ class Block(Rocking):
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
+        if unnamed:
+            raise InvalidBlock("give the sizes of a block by name, in m: Block({}=0.4, {}=2.0)", "width", "height")
         b, h = _half_sizes((half_width, half_height), (width, height))
         g = checked_gravity(gravity)
         text = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
@@ -479,9 +481,10 @@ class Block(Rocking):
 def one_block(block: object, needed: str = "a free Block") -> Block:
     """Return the block, or raise `InvalidBlock` that names the required object."""
     if not isinstance(block, Block):
-        raise InvalidBlock(
-            f"{needed} is needed, not a {type(block).__name__}: make one with Block(width=, height=), in m"
-        )
+        how = "make one with Block(width=, height=), in m"
+        if hasattr(block, "rose"):
+            how = "use solid.block(azimuth), the block that a Solid is in one vertical plane"
+        raise InvalidBlock(f"{needed} is needed, not a {type(block).__name__}: {how}")
     return block
 
 

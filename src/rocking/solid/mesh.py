@@ -101,6 +101,8 @@ def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
 
 
 def _read(file: Path, named: str) -> Scene:
+    if file.is_dir():
+        raise InvalidBlock("this is a folder, not a file: name the file in it", path=named)
     if not file.is_file():
         known = f"; the mesh that ships is {', '.join(SHIPPED)}" if not file.suffix else ""
         raise InvalidBlock(f"there is no such file{known}", path=named)
@@ -247,7 +249,7 @@ def properties(
             for name, surface in zip(names, surfaces, strict=True)
             for sentence in surface.repairs
         ),
-        "notes": (*notes, *overlaps(surfaces), *height_notes(height), *density_notes(used)),
+        "notes": (*notes, *overlaps(names, surfaces), *height_notes(height), *density_notes(used)),
     }
     return made, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
 
@@ -295,13 +297,16 @@ def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: s
     """Return the support polygon, with notes, of a mesh whose lowest corner is at height zero."""
     if given is not None:
         polygon = polygons.given_polygon(given)
-        (west, south), (east, north) = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
-        beyond = float(max(np.max([west, south] - polygon), np.max(polygon - [east, north])))
-        if beyond > 1e-6 * float(np.ptp(corners, axis=0).max()):
+        outline, beyond = polygons.hull(corners[:, :2]), 0.0
+        if outline is not None:
+            facing, distances = polygons.edges(outline - outline[0])
+            beyond = float(np.max((polygon - outline[0]) @ polygons.directions(facing).T - distances))
+        if outline is None or beyond > 1e-6 * float(np.ptp(corners, axis=0).max()):
+            (west, south, _), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
             raise InvalidBlock(
-                f"{{}} reaches {beyond:.3g} m beyond the mesh, from {west:.4g} m to {east:.4g} m in the east and "
-                f"{south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, in the mesh's own "
-                "coordinates",
+                f"{{}} reaches {beyond:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in the "
+                f"east and {south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, in the "
+                "mesh's own coordinates",
                 "support",
             )
         return polygon, ()

@@ -76,11 +76,10 @@ def oriented(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list[Surfac
     of, shells = _pieces(surfaces, labels)
     volumes = np.array([float(signed_volumes(*each[:2]).sum()) for each in shells])
     sizes, owner = np.abs(volumes), of.copy()
-    against = volumes * volumes[np.argmax(sizes)] < 0.0
     is_cavity = np.zeros(len(shells), bool)
-    for n in np.flatnonzero(against):
-        larger = np.flatnonzero(~against & (sizes > sizes[n]) & ((of == of[n]) | hollow[of[n]]))
-        if around := [m for m in larger if surrounds(*shells[m][:2], *shells[n][:2])]:
+    for n in np.argsort(-sizes, kind="stable"):  # so that it is known of all larger ones whether they are cavities
+        may = (volumes * volumes[n] < 0.0) & (sizes > sizes[n]) & ~is_cavity & ((of == of[n]) | hollow[of[n]])
+        if around := [m for m in np.flatnonzero(may) if surrounds(*shells[m][:2], *shells[n][:2])]:
             is_cavity[n], owner[n] = True, of[min(around, key=lambda m: sizes[m])]
     flipped = np.where(is_cavity, volumes > 0.0, volumes < 0.0)
     found = []
@@ -254,28 +253,38 @@ def _middle(vertices: Floats) -> Floats:
     return np.asarray(0.5 * (vertices.min(axis=0) + vertices.max(axis=0)))
 
 
-def overlaps(surfaces: Sequence[Surface]) -> tuple[str, ...]:
-    """Return a note on the common volume of pieces, by sampling overlaps of bounding boxes.
-
-    The sum of the winding numbers of closed surfaces, including cavities, equals the number of bodies at a point.
-    """
-    _, shells = _pieces(surfaces, [shells_of(each.faces) for each in surfaces])
+def overlaps(names: Sequence[str], surfaces: Sequence[Surface]) -> tuple[str, ...]:
+    """Return a note on the common volumes of pieces of a mesh, by sampling overlaps of their bounding boxes."""
+    of, shells = _pieces(surfaces, [shells_of(each.faces) for each in surfaces])
     corners = [each.vertices[each.faces] for each in shells]
-    ends = [(each.min(axis=(0, 1)), each.max(axis=(0, 1))) for each in corners]
-    pairs = ((np.maximum(a, c), np.minimum(b, d)) for (a, b), (c, d) in itertools.combinations(ends, 2))
-    size = max(float(np.max(high - low)) for low, high in ends)
-    boxes = [(low, high) for low, high in pairs if np.all(high - low > 2e-9 * size)]
-    if not boxes:
+    lows, highs = (np.array([end(each, axis=(0, 1)) for each in corners]) for end in (np.min, np.max))
+    volumes = np.array([float(signed_volumes(*each[:2]).sum()) for each in shells])
+    size, boxes = float(np.max(highs - lows)), []
+    for pair in itertools.combinations(np.flatnonzero(volumes > 0.0).tolist(), 2):
+        low, high = lows[[*pair]].max(axis=0), highs[[*pair]].min(axis=0)
+        if np.all(high - low > 2e-9 * size):
+            boxes.append((float(np.prod(high - low)), pair, low, high))
+    found = []
+    for volume, pair, low, high in sorted(boxes, key=lambda box: -box[0])[:50]:
+        within = [np.all((lows >= lows[k]) & (highs <= highs[k]), axis=1) & (of == of[k]) for k in pair]
+        some = [shells[k] for k in (*pair, *np.flatnonzero(np.any(within, axis=0) & (volumes < 0.0)))]
+        count = min(max(20_000_000 // (len(boxes) * sum(len(each.faces) for each in some)), 30), 1000)
+        # An additive recurrence fills the box evenly, and avoids the faces of common shapes.
+        shares = (0.5 + np.arange(count)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1.0
+        places = low + shares * (high - low)
+        times = np.array([sum(winding(each.vertices, each.faces, place) for each in some) for place in places])
+        common = volume * float(np.mean(times > 1.5))
+        if common > 1e-4 * min(volumes[k] for k in pair):
+            found.append((common, *(names[of[k]] for k in pair)))
+    if not found:
         return ()
-    low, high = np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
-    count = min(max(20_000_000 // sum(len(each.faces) for each in surfaces), 30), 1000)
-    # An additive recurrence fills the box evenly and avoids the faces of common shapes.
-    places = low + (0.5 + np.arange(count)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1.0 * (high - low)
-    times = np.array([sum(winding(*each[:2], place) for each in surfaces) for place in places])
-    twice = float(np.prod(high - low) * np.mean(np.maximum(np.rint(times) - 1.0, 0.0)))
-    if not twice > 0.0:
-        return ()
+    found.sort(key=lambda pair: -pair[0])
+    said = [
+        f"{f'{one} and {other}' if one != other else f'two pieces of {one}'} overlap in about {common:.2g} m^3"
+        for common, one, other in found[:3]
+    ]
+    more = f", and {counted(len(found) - 3, 'more pair')}" if len(found) > 3 else ""
     return (
-        f"parts or pieces overlap in about {twice:.2g} m^3, which is counted twice: make one surface of them, cut one "
-        "out of the other, or, if one is a cavity, turn its normals inwards",
+        f"{', '.join(said)}{more}, which is counted twice: make one surface of the two, cut one out of the other, or, "
+        "if one is a cavity, turn its normals inwards",
     )
