@@ -71,6 +71,6 @@ def test_an_example_ends_in_its_numbers_and_draws_one_figure(name, monkeypatch, 
 
 def test_every_example_has_numbers_and_a_place_in_the_gallery():
     listed = re.findall(
-        r'"(\w+)"', "".join(re.findall(r"^GALLERY.*$", (ROOT / "docs/conf.py").read_text("utf-8"), re.M))
+        r'"(\w+)"', "".join(re.findall(r"^GALLERY.*?\]", (ROOT / "docs/conf.py").read_text("utf-8"), re.M | re.S))
     )
     assert sorted(listed) == sorted(EXAMPLES) == sorted(NUMBERS)
