@@ -102,7 +102,6 @@ def one_sided_restitution(alpha: float) -> float:
     See Also
     --------
     Block.one_sided : Create a rectangular block with a single side.
-    housner_restitution : Compute the restitution of a free rectangular block.
 
     Examples
     --------
@@ -153,7 +152,6 @@ def impact_restitution(
 
     See Also
     --------
-    housner_restitution : Compute the restitution with a contact at the pivot.
     Block.from_pivots : Create a block from its pivots and its radius of gyration.
 
     Notes

@@ -184,7 +184,7 @@ class Region(NamedTuple):
 
     See Also
     --------
-    Solid : Rigid body in space.
+    rocking.Solid : Rigid body in space.
     """
 
     name: str

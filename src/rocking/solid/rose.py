@@ -45,7 +45,7 @@ class Rose(DatasetResult):
 
     See Also
     --------
-    Solid : Rigid body in space.
+    rocking.Solid : Rigid body in space.
     """
 
     TABLES = MappingProxyType(

@@ -57,7 +57,7 @@ class Solid(Result):
 
     See Also
     --------
-    Rose : Resistance to rocking in every direction.
+    rocking.solid.Rose : Resistance to rocking in every direction.
     Block : Block that rocks in a plane.
 
     Notes
@@ -166,7 +166,7 @@ class Solid(Result):
 
         See Also
         --------
-        Region : Part of a body.
+        rocking.solid.Region : Part of a body.
 
         Notes
         -----
