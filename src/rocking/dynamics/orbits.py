@@ -213,7 +213,7 @@ def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Respons
 
 
 def peak_of(response: Response) -> float:
-    """Compute the largest absolute coordinate of a response, from at least 64 points per period of the motion."""
+    """Compute the largest absolute coordinate of a response, from 64 points per impact and the impacts themselves."""
     times = np.linspace(0.0, response.duration, 64 * max(1, len(response.impacts)) + 1)
     at = np.concatenate([times, response.impacts["time"]])
     return max(response.peak_rotation, float(np.max(np.abs(response.states(at)[:, 0]))))

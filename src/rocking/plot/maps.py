@@ -82,13 +82,11 @@ def outcome_figure(
     return page.figure
 
 
-def _colour_cells(
-    axes: Axes, x: Floats, y: Floats, numbers: NDArray[np.integer], colours: Sequence[str], first: int = 0
-) -> None:
-    """Fill the cells around grid points by number, from `first` on."""
+def _colour_cells(axes: Axes, x: Floats, y: Floats, numbers: NDArray[np.integer], colours: Sequence[str]) -> None:
+    """Fill the cells around grid points by number."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
-    norm = BoundaryNorm(np.arange(len(colours) + 1) + first - 0.5, len(colours))
+    norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
     look: dict[str, Any] = {"cmap": ListedColormap([*colours]), "norm": norm, "rasterized": True}
     axes.pcolormesh(cell_edges(x), cell_edges(y), numbers, **look)
 
@@ -246,13 +244,13 @@ def basins_figure(
     y_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw the attractor of each state of a grid: integers of shape (len(y), len(x)), -1 if unknown."""
+    """Draw the attractor of each state of a grid: integers of shape (len(y), len(x))."""
     seen = [kinds[:k].count(kind) for k, kind in enumerate(kinds)]
     shades = [_SHADES[kind][min(k, len(_SHADES[kind]) - 1)] for k, kind in zip(seen, kinds, strict=True)]
     with page_for((5.4, 4.6), **place) as page:
         (axes,) = page.panels()
-        _colour_cells(axes, x, y, outcome, ["#ffffff", *shades], first=-1)
-        handles: list[Artist] = [_patch(("#ffffff", "...."), "not reached")] if np.any(outcome < 0) else []
+        _colour_cells(axes, x, y, outcome, shades)
+        handles: list[Artist] = []
         for name, kind, shade, k, points in zip(names, kinds, shades, seen, orbits, strict=True):
             handles.append(_patch((shade, ""), name))
             inside = points[(points >= [x[0], y[0]]).all(axis=1) & (points <= [x[-1], y[-1]]).all(axis=1)]
