@@ -52,7 +52,8 @@ def main() -> None:
 
 def report(model: Model, motion: rocking.Motion, acceleration: np.ndarray, blocks: rocking.Blocks, steps: int) -> None:
     """Print the rates of one model."""
-    own = shortest(lambda: rocking.simulate_many(blocks, motion, model=model, threads=1)) / steps
+    with rocking.set_options(threads=1):
+        own = shortest(lambda: rocking.simulate_many(blocks, motion, model=model)) / steps
     result = rocking.simulate_many(blocks, motion, model=model).isel(motion=0)
     nonlinear = model == "nonlinear"
     arguments = (acceleration, motion.step, blocks.p[:, 0].copy(), blocks.alpha[:, 0].copy(), 0.9, nonlinear)
@@ -80,11 +81,12 @@ def report_vertical(blocks: rocking.Blocks) -> None:
 def vertical_times(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> tuple[float, float, float]:
     """Processor times of an ensemble: under the horizontal component alone, under both, under both without lanes."""
     horizontal = motion.with_vertical(None)
-    return (
-        shortest(lambda: rocking.simulate_many(blocks, horizontal, model=model, threads=1)),
-        shortest(lambda: rocking.simulate_many(blocks, motion, model=model, threads=1)),
-        shortest(lambda: one_by_one(model, motion, blocks)),
-    )
+    with rocking.set_options(threads=1):
+        return (
+            shortest(lambda: rocking.simulate_many(blocks, horizontal, model=model)),
+            shortest(lambda: rocking.simulate_many(blocks, motion, model=model)),
+            shortest(lambda: one_by_one(model, motion, blocks)),
+        )
 
 
 def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> None:

@@ -23,7 +23,7 @@ ANSWERS = {
     "fragility, 3 blocks": (
         "rocking.fragility(rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=0.2), "
         f"[rocking.records.load(name) for name in ('{RECORD}', 'ridgecrest-clc-090')], "
-        "levels=[2.0, 4.0, 8.0, 16.0], progress=False)"
+        "levels=[2.0, 4.0, 8.0, 16.0])"
     ),
     "chattering time": "rocking.chattering.chattering_time(1.05, 3.0, 0.9)",
     "chattering report": "rocking.chattering.chattering_report(1.05, 3.0, 0.9)",

@@ -89,19 +89,16 @@ def drawn(count: int, two_sided: bool) -> Iterator[DataSet]:
 
 def ranks(given: DataSet) -> dict[str, float]:
     """Share of the posterior below the truth, by parameter."""
-    found = rocking.calibrate(
-        given.motions,
-        given.overturned,
-        model="linear",
-        seed=given.seed,
-        p=BOUNDS["p"],
-        alpha=BOUNDS["alpha"],
-        restitution=BOUNDS["restitution"],
-        two_sided=given.space.two_sided,
-        lapse=LAPSE,
-        threads=1,
-        progress=False,
-    )
+    with rocking.set_options(threads=1):
+        found = rocking.calibrate(
+            given.motions,
+            given.overturned,
+            model="linear",
+            seed=given.seed,
+            **BOUNDS,
+            two_sided=given.space.two_sided,
+            lapse=LAPSE,
+        )
     values = given.space.named(population.unpacked(given.truth)[0])
     return {name: float(np.mean(found.draws[name] < values[name][0])) for name in found.estimates}
 

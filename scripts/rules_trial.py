@@ -89,13 +89,13 @@ def ratings(blocks, motions):
 
 def simulated_verdicts(blocks, motions):
     """Whether each block overturns under each motion at every level, shape (motion, level, block)."""
-    found = rocking.simulate_many(blocks, motions, levels=LEVELS * blocks.gravity, measure="pga", progress=False)
+    found = rocking.simulate_many(blocks, motions, levels=LEVELS * blocks.gravity, measure="pga")
     return found.overturned.transpose("motion", "scale", "block").values
 
 
 def simulated_capacities(blocks, motions):
     """Lowest PGA, over gravity, that overturns each block under each motion, shape (motion, block)."""
-    found = rocking.incremental_dynamic_analysis(blocks, motions, tolerance=1e-3, progress=False)
+    found = rocking.incremental_dynamic_analysis(blocks, motions, tolerance=1e-3)
     return found.data.overturning_level.transpose("motion", "block").values / blocks.gravity
 
 

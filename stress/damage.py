@@ -50,7 +50,8 @@ def main() -> None:
     found: Counter[tuple[str, str]] = Counter()
     with tempfile.TemporaryDirectory() as where:
         folder = Path(where)
-        made(folder).run(threads=1)
+        with rocking.set_options(threads=1):
+            made(folder).run()
         reference, expected = rocking.study(folder).results().load(), digest(folder)
         files = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != "lock"]
         for _ in range(given.trials):

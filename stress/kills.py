@@ -25,6 +25,7 @@ import distributed
 import numpy as np
 from common import digest, made, units
 
+import rocking
 from rocking.studies.units import UnitGrid
 
 HERE = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")
@@ -76,8 +77,9 @@ def run(folder: Path, cluster: Cluster, kind: str, count: int, order: str) -> No
     ordered = keys[::-1] if order == "reversed" else keys
     address = json.loads(cluster.file.read_text())["address"]
     client = contextlib.nullcontext() if kind == "threads" else distributed.Client(address, set_as_default=False)
-    with client as executor, patch.object(UnitGrid, "__iter__", lambda grid: iter(ordered)):
-        study.run(threads=count if kind == "threads" else None, executor=executor)
+    in_order = patch.object(UnitGrid, "__iter__", lambda grid: iter(ordered))
+    with client as executor, in_order, rocking.set_options(threads=count):
+        study.run(executor=executor)
 
 
 def forked(action: Callable[[], None]) -> int:
@@ -131,7 +133,8 @@ def main() -> None:
         top = Path(where)
         cluster = Cluster(top)
         try:
-            made(top / "undisturbed").run(threads=1)
+            with rocking.set_options(threads=1):
+                made(top / "undisturbed").run()
             reference, expected = units(top / "undisturbed"), digest(top / "undisturbed")
             turn = 0
             while sum(killed.values()) < given.kills or turn < len(SETTINGS):
@@ -147,7 +150,8 @@ def main() -> None:
                     before, seen = len(seen), check(folder, seen, reference)
                     # A busy machine may need longer for a unit than any run is let live.
                     within *= 1.3 if len(seen) == before else 1.0
-                made(folder).run(threads=1)  # removes what is half-written
+                with rocking.set_options(threads=1):
+                    made(folder).run()  # removes what is half-written
                 assert digest(folder) == expected
                 digests[f"{kind} {count}, units {order}"] += 1
                 turn += 1

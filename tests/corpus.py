@@ -502,14 +502,14 @@ def ensembles(kind: str) -> Iterator[Item]:
     motions = [*shaking(), record().with_vertical(record("el-centro-meloland-up", 350, 1100))]
     if options.get("measure"):
         motions = [motion for motion in motions if motion.pgv > 0.0]
-    data = rocking.simulate_many(bodies, motions, progress=False, **options)
+    data = rocking.simulate_many(bodies, motions, **options)
     yield "outcomes", of_dataset(data, "p", "alpha", "restitution", "scale", "level", "motion")
 
 
 @group()
 def ensembles_between_stops() -> Iterator[Item]:
     for kind, bodies in BETWEEN.items():
-        data = rocking.simulate_many(bodies, shaking()[:6], model="linear", duration=4.0, progress=False)
+        data = rocking.simulate_many(bodies, shaking()[:6], model="linear", duration=4.0)
         yield kind, of_dataset(data)
 
 
@@ -1052,16 +1052,17 @@ def studies() -> Iterator[Item]:
         yield "product", [product.shape, product.model, str(product.treatment)]
         motions = dict(list(suite().items())[:5])
         study = rocking.study(folder / "study", SUITE_BLOCKS, motions, levels=LEVELS, measure="pga")
-        study.run(threads=1, progress=False)
+        with rocking.set_options(threads=1):
+            study.run()
         yield "complete", [study.status.complete, study.status.done, study.status.units, study.status.simulations]
         yield "results", of_dataset(study.results())
         yield "critical", of_dataset(study.critical_scales())
         yield from of_result(study.fragility(limits=LIMITS))
         yield from of_result(study.block_fragilities(**QUIET))
         yield from of_result(study.spectrum(**QUIET))
-        yield "verified", study.verify(recompute=1, progress=False)
+        yield "verified", study.verify(recompute=1)
         for critical in (None, "overturning"):
-            yield "table", saved(study.to_csv, critical=critical, progress=False)
+            yield "table", saved(study.to_csv, critical=critical)
 
 
 # The file of digests

@@ -132,10 +132,13 @@ def test_what_overturns_after_its_first_rocking_is_counted_and_hatched():
 
 def test_a_map_is_the_same_in_one_thread_and_in_several():
     parameters = {"a": [0.9, 1.03, 1.05, 9.0], "omega": [1.0, 2.0]}
-    one, several = (chattering_map(families.sine(BLOCK), parameters, threads=count) for count in (1, 3))
+    with rocking.set_options(threads=1):
+        one = chattering_map(families.sine(BLOCK), parameters)
+    with rocking.set_options(threads=3):
+        several = chattering_map(families.sine(BLOCK), parameters)
     assert one.data.identical(several.data)
     with pytest.raises(rocking.InvalidOption, match="threads"):
-        chattering_map(families.sine(BLOCK), parameters, threads=0)
+        rocking.set_options(threads=0)
 
 
 # Families

@@ -169,7 +169,8 @@ def test_an_interrupt_is_one_sentence_and_closes_what_is_half_done(monkeypatch, 
     begun = []
 
     def run(_):
-        for _ in in_threads(lambda each: (begun.append(each), time.sleep(0.01)), itertools.count(), threads=2):
+        rocking.set_options(threads=2)
+        for _ in in_threads(lambda each: (begun.append(each), time.sleep(0.01)), itertools.count()):
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(cli, "_run", run)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
+import rocking
 from rocking import Block, dynamics, pulses
 from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.bifurcation import period_of, states_after
@@ -91,7 +92,10 @@ def test_a_state_goes_where_plain_iteration_takes_it(seeds, cells):
 @pytest.mark.thorough
 def test_the_order_of_work_and_threads_do_not_count():
     x, v = np.linspace(-0.2, 0.2, 36), np.linspace(-0.4, 0.4, 31)
-    one, two = (dynamics.basins(BLOCK, SHAKING, x, v, threads=count) for count in (1, 3))
+    with rocking.set_options(threads=1):
+        one = dynamics.basins(BLOCK, SHAKING, x, v)
+    with rocking.set_options(threads=3):
+        two = dynamics.basins(BLOCK, SHAKING, x, v)
     assert one.data.identical(two.data)
     assert one.data.share.values.sum() == pytest.approx(1.0)
     assert one.data.standard_error.values == pytest.approx(np.sqrt(one.data.share * (1.0 - one.data.share) / (36 * 31)))

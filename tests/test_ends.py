@@ -27,7 +27,8 @@ def _of_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 @MODELS
 def test_blocks_that_hardly_lose_energy_end(model: str) -> None:
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 2), alpha=0.2, restitution=LIVELY)
-    assert rocking.simulate_many(blocks, RECORD, model=model, threads=2).sizes["block"] == 2
+    with rocking.set_options(threads=2):
+        assert rocking.simulate_many(blocks, RECORD, model=model).sizes["block"] == 2
     free = rocking.simulate(rocking.Block.from_parameters(2.0, 0.2, LIVELY), None, model=model, initial_rotation=0.1)
     assert free.unfinished
 

@@ -156,8 +156,8 @@ def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
 
     with monkeypatch.context() as patched:
         patched.setattr(engine, "simulate_task", held)
-        with pytest.raises(KeyboardInterrupt):
-            [*engine.simulate_tasks(setup, tasks(), threads=2)]
+        with pytest.raises(KeyboardInterrupt), rocking.set_options(threads=2):
+            [*engine.simulate_tasks(setup, tasks())]
     assert told == [True]
 
 

@@ -98,7 +98,7 @@ def test_the_margin_is_the_lowest_band_of_an_incremental_dynamic_analysis(width,
     assessment = assessed({"width": width, "height": height, "motion": name}, **FEW)
     margin = last(assessment).header["margin"]
     block, motion = rocking.Block(width=float(width), height=float(height)), rocking.records.load(name)
-    found = rocking.incremental_dynamic_analysis(block, motion, progress=False)
+    found = rocking.incremental_dynamic_analysis(block, motion)
     bands = found.bands()
     assert len(bands) > 2 and margin["pga"] == pytest.approx(bands[0][0], rel=1e-6)
     (note,) = (each for each in described(assessment)["notes"] if each["phrase"] == "assessment.first")

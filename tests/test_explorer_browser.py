@@ -947,7 +947,7 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
         measure="pga",
         unit_blocks=512,
     )
-    made.run(progress=False)
+    made.run()
     running = served(Explorer(), {"view": "map"}, StudyView(folder))
     running.run_in_background()
     page = opened(server=running)
@@ -994,7 +994,7 @@ def test_uneven_cells_of_a_study_lie_where_their_values_do(opened, tmp_path_fact
     blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0, 8.0, 16.0], alpha=[0.2], restitution=[0.9])
     levels = np.array([0.8, 0.2, 0.4]) * 9.80665
     made = rocking.study(folder, blocks, rocking.pulses.one_sine(1.0, 1.0), levels=levels, measure="pga")
-    made.run(progress=False)
+    made.run()
     falls = made.results().overturned.transpose("scale", "motion", "block").values[[1, 2, 0], 0]
     running = served(Explorer(), {"view": "map"}, StudyView(folder))
     running.run_in_background()
@@ -1323,14 +1323,14 @@ def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(
     page.until("document.body.dataset.assessment === 'complete'", "the assessment is complete")
     block, motions = rocking.Block(width=0.24, height=1.1), [rocking.records.load(name) for name in names]
     stripes = {"levels": np.linspace(0.2, 0.9, 6) * 9.80665, "polarity": "both", "clusters": "station"}
-    curve = rocking.fragility(block, motions, **stripes, progress=False).curves[0]
+    curve = rocking.fragility(block, motions, **stripes).curves[0]
     low = f"{curve.median_interval[0] / 9.80665:.3g} g"
     said = f"at {curve.median / 9.80665:.3g} g (with 90 % confidence {low} to ∞)"
     assert said in page.text("#assessment-verdict")
     assert "The records are of 3 stations" in page.text("#assessment-about")
     assert page.page.locator("#assessment-records tbody tr").count() == 4
     assert "slides before it rocks" in page.text("#assessment-figures")
-    first = rocking.incremental_dynamic_analysis(block, rocking.records.load("ridgecrest-clc-090"), progress=False)
+    first = rocking.incremental_dynamic_analysis(block, rocking.records.load("ridgecrest-clc-090"))
     level = f"{float(first.data.overturning_level.values[0, 0]) / 9.80665:.3g} g"
     assert f"overturns first at {level}" in page.text("#assessment-figures")
     assert "as it is" not in page.text("#assessment-figures").partition("overturns first at")[2]

@@ -805,7 +805,7 @@ def test_the_critical_amplitude_is_drawn_where_it_parts_complete_chattering_from
 
     parted = []
     for omega, a in zip(grid.x.values, critical_amplitude(grid.x.values, 0.92), strict=True):
-        near = chattering_map(at, {"a": [0.999 * a, 1.001 * a], "omega": [omega]}, progress=False)
+        near = chattering_map(at, {"a": [0.999 * a, 1.001 * a], "omega": [omega]})
         parted.append(near.data.complete.values[:, 0].tolist() == [True, False])
     assert all(parted) is valid
     if valid:
@@ -858,7 +858,7 @@ def study(tmp_path_factory):
     blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 7), alpha=np.linspace(0.1, 0.3, 5), restitution=[0.85, 0.9])
     motions = [rocking.pulses.one_sine(1.0, 1.0), rocking.records.load("el-centro-meloland-270")]
     made = rocking.study(folder, blocks, motions, levels=[2.0, 4.0], measure="pga", polarity="both", unit_blocks=512)
-    made.run(progress=False)
+    made.run()
     return StudyView(folder)
 
 
@@ -906,7 +906,7 @@ def test_points_of_a_study_have_its_gravity_and_keep_each_motion_once(tmp_path):
     samples = np.random.default_rng(1).normal(size=400)
     motion = rocking.Motion.from_samples(samples, 0.02, name="own")
     made = rocking.study(tmp_path / "moon", blocks, motion, levels=[1.0, 2.0, 3.0], measure="pga", polarity="both")
-    made.run(progress=False)
+    made.run()
     view, uploads, results = StudyView(tmp_path / "moon"), UploadStore(), made.results()
     judged = 0
     for scale, level in enumerate((1.0, 2.0, 3.0)):
@@ -925,7 +925,7 @@ def test_points_of_a_study_have_its_gravity_and_keep_each_motion_once(tmp_path):
 def test_levels_of_a_study_are_an_axis_in_increasing_order(tmp_path):
     blocks, levels = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.2], restitution=[0.9]), [3.0, 1.0, 2.0]
     made = rocking.study(tmp_path / "any", blocks, rocking.pulses.one_sine(2.2, 2.0), levels=levels)
-    made.run(progress=False)
+    made.run()
     found = StudyView(tmp_path / "any").slice({"x": "p", "y": "scale", "quantity": "peak_rotation"})
     assert found.header["y"]["values"] == [1.0, 2.0, 3.0]
     peaks = made.results().peak_rotation.transpose("scale", "motion", "block").values[[1, 2, 0], 0]
@@ -964,7 +964,7 @@ def test_a_point_of_a_study_has_the_polarity_that_is_chosen(study, motion):
 )
 def test_the_axis_of_scales_says_what_they_are(tmp_path, scales, label, unit):
     blocks = rocking.Blocks(p=[2.0, 3.0], alpha=0.2, restitution=0.9)
-    rocking.study(tmp_path / "scaled", blocks, rocking.pulses.one_sine(3.0, 1.0), **scales).run(progress=False)
+    rocking.study(tmp_path / "scaled", blocks, rocking.pulses.one_sine(3.0, 1.0), **scales).run()
     axis = next(one for one in StudyView(tmp_path / "scaled").describe()["axes"] if one["name"] == "scale")
     assert (axis["label"], axis["unit"]) == (label, unit)
 
@@ -973,7 +973,7 @@ def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
     blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=[[0.2, 0.25], [0.2, 0.2], [0.3, 0.3]], restitution=0.9)
     motions = [rocking.records.load(f"el-centro-meloland-{which}") for which in ("270", "360")]
     made = rocking.study(tmp_path / "list", blocks, motions, levels=[2.0, 4.0, 5.0], measure="pga")
-    made.run(progress=False)
+    made.run()
     view = StudyView(tmp_path / "list")
     assert list(view.axes()) == ["block", "scale", "motion"]
     named = view.describe()["axes"][0]["names"]
@@ -994,7 +994,7 @@ def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
 def test_a_study_that_varies_too_little_is_refused_with_a_sentence(tmp_path):
     motion = rocking.pulses.one_sine(3.0, 1.0)
     made = rocking.study(tmp_path / "few", rocking.Blocks(p=[2.0, 3.0], alpha=[0.2, 0.3], restitution=0.9), motion)
-    made.run(progress=False)
+    made.run()
     with pytest.raises(StudyError, match="varies block; a map needs two of blocks, motions and scales"):
         StudyView(tmp_path / "few")
 

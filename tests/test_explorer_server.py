@@ -617,7 +617,7 @@ def test_a_study_is_shown_and_a_point_of_it_opened(tmp_path, opened):
     )
     with pytest.raises(StudyError, match="nothing of the study"):
         StudyView(tmp_path / "museum")
-    made.run(progress=False)
+    made.run()
     browser = opened(App(Explorer(), {"view": "map"}, StudyView(tmp_path / "museum")))
     assert [axis["name"] for axis in browser.get("/api/start").json()["study"]["axes"]] == ["p", "alpha", "scale"]
     header, arrays = unpacked(

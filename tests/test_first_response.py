@@ -85,7 +85,7 @@ rock = dynamics.stroboscopic_map(ball, table)
 rock([0.1, 0.5])
 rock.derivative([0.1, 0.5])
 dynamics.lyapunov_exponents(ball, table, [0.1, 0.5], 20, transient=5)
-dynamics.basins(ball, table, [0.01, 0.05], [0.0, 0.1], periods=10, progress=False)
+dynamics.basins(ball, table, [0.01, 0.05], [0.0, 0.1], periods=10)
 mirrored = rocking.Block.from_parameters(p=2.0, alpha=0.6, restitution=0.55)
 def swing(amplitude):
     return mirrored, rocking.pulses.sine(amplitude, 0.8, cycles=1)
@@ -145,7 +145,7 @@ import time
 import rocking
 blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=0.2)
 motions = [rocking.records.load(name) for name in ("el-centro-meloland-270", "ridgecrest-clc-090")]
-rocking.fragility(blocks, motions, levels=[2.0, 4.0, 8.0, 16.0], progress=False)
+rocking.fragility(blocks, motions, levels=[2.0, 4.0, 8.0, 16.0])
 print(time.process_time())
 """
 
@@ -175,13 +175,13 @@ motion = rocking.records.load("el-centro-meloland-270")
 blocks = rocking.Blocks(p=np.linspace(1.0, 5.0, 5), alpha=0.2)
 response = rocking.simulate(rocking.Block(half_width=0.12, half_height=0.55), motion)
 digest.update(response.impacts.tobytes() + response.events.tobytes())
-found = rocking.fragility(blocks, [motion, motion.scaled(1.5)], levels=[2.0, 4.0, 8.0, 16.0], progress=False)
+found = rocking.fragility(blocks, [motion, motion.scaled(1.5)], levels=[2.0, 4.0, 8.0, 16.0])
 spectrum = rocking.rocking_spectrum(blocks, [motion])
 digest.update(repr(found.to_dict()).encode() + repr(spectrum.to_dict()).encode())
 sets = [rocking.simulate_many(blocks, motion)]
 with tempfile.TemporaryDirectory() as folder:
     study = rocking.study(folder, blocks, [motion, motion.scaled(2.0)])
-    study.run(progress=False)
+    study.run()
     sets.append(study.results().load())
 for data in sets:
     for name in sorted(map(str, data.data_vars)):

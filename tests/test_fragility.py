@@ -513,7 +513,7 @@ def test_a_finite_limit_counts_in_the_smaller_slenderness_of_an_asymmetric_block
     motions = [
         rocking.pulses.one_sine(size, frequency) for size in np.linspace(2.5, 6.0, 12) for frequency in (1.0, 1.5)
     ]
-    result = fragility(block, motions, limits={"half": 0.5}, progress=False)
+    result = fragility(block, motions, limits={"half": 0.5})
     peaks = np.array([rocking.simulate(block, motion).peak_rotation for motion in motions])
     exceeded = result.outcomes.exceeded_half.values
     assert exceeded.tolist() == (peaks / 0.2 > 0.5).tolist()

@@ -131,7 +131,7 @@ def test_a_calibration_says_of_tests_what_it_predicts(coarse):
     pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
     fell = [False, False, True, True]
     calibration = rocking.calibrate(
-        pulses, fell, p=2.0, restitution=0.9, two_sided=False, candidates=128, model="linear", progress=False
+        pulses, fell, p=2.0, restitution=0.9, two_sided=False, candidates=128, model="linear"
     )
     tests = [ShakeTest(*pair) for pair in zip(pulses, fell, strict=True)]
     found = rocking.validate(tests, calibration)

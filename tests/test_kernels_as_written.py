@@ -63,7 +63,8 @@ def each_kind(model: str) -> Numbers:
         yield from (response.required_friction, response.minimum_normal_force)
         yield from np.ravel(response.normal_force([0.2, 0.5]))
         if kind in standing.OF_ENSEMBLES:
-            found = simulate_many(bodies, motion, model=model, duration=motion.end + 0.4, threads=1)
+            with rocking.set_options(threads=1):
+                found = simulate_many(bodies, motion, model=model, duration=motion.end + 0.4)
             yield from found.peak_rotation.values.ravel()
             yield from found.rests.values.ravel()
 
@@ -108,7 +109,8 @@ def ensembles(model: str) -> Numbers:
     short, up = shaken(6.0, seed=6, seconds=0.3), shaken(12.0, seed=7, seconds=0.3)
     for motion in (short, short.with_vertical(up), pulses.sine(4.0, 3.0, cycles=1)):
         for asked in ({"derivatives": True}, {"times": True}):
-            found = simulate_many([*blocks, TWO_SIDED], motion, model=model, duration=0.5, threads=1, **asked)
+            with rocking.set_options(threads=1):
+                found = simulate_many([*blocks, TWO_SIDED], motion, model=model, duration=0.5, **asked)
             for name in sorted(map(str, found.data_vars)):
                 values = found[name].values
                 if values.dtype.kind in "fib":
@@ -123,11 +125,13 @@ def repeated(model: str) -> Numbers:
     for state in ((0.05, 0.1), (0.0, 0.0), (-0.1, 0.2)):
         yield from np.ravel(section.orbit([state], 3))
     yield from np.ravel(section.derivative([(0.05, 0.1)], 2)[1])
-    found = dynamics.basins(block, motion, [-0.1, 0.1], [-0.3, 0.3], 4, model=model, threads=1)
+    with rocking.set_options(threads=1):
+        found = dynamics.basins(block, motion, [-0.1, 0.1], [-0.3, 0.3], 4, model=model)
     for name in ("multiplier", "orbit_coordinate", "orbit_velocity"):
         yield from np.ravel(found.data[name].values)
     slow = pulses.sine(6.0, 1.0, cycles=1)
-    found = dynamics.basins(block, slow, [-0.1, 0.1], [-0.3, 0.3], 4, model=model, threads=1)
+    with rocking.set_options(threads=1):
+        found = dynamics.basins(block, slow, [-0.1, 0.1], [-0.3, 0.3], 4, model=model)
     yield from np.ravel(found.data.multiplier.values)
     exponents = dynamics.lyapunov_exponents(block, motion, (0.05, 0.1), 20, transient=1, model=model)
     yield from (exponents.largest, exponents.smallest)
@@ -203,7 +207,8 @@ def mapped(model: str) -> Numbers:
         yield from np.ravel(section.derivative(states, 2)[1])
     section = dynamics.stroboscopic_map(dynamics.InvertedPendulum(2.0, 0.1, 0.8), pulses.sine(12.0, 2.0, cycles=1))
     yield from np.ravel(section.derivative([(0.0, 0.0)], 2)[1])
-    found = dynamics.basins(ball, pulses.sine(12.0, 2.0, cycles=1), [0.1, 0.3], [0.5, 2.0], 30, threads=1)
+    with rocking.set_options(threads=1):
+        found = dynamics.basins(ball, pulses.sine(12.0, 2.0, cycles=1), [0.1, 0.3], [0.5, 2.0], 30)
     yield from np.ravel(found.data.outcome.values).astype(float)
 
 
@@ -232,11 +237,9 @@ def closed(model: str) -> Numbers:
     for method in ("exact", "eq76", "eq77"):
         yield from np.ravel(chattering.critical_amplitude([0.5, 2.0], [0.5, 0.8], method=method))
     yield from np.ravel(chattering.series_coefficients([0.3, 5.0], [0.5, 0.97], order=3))
-    shown = chattering.chattering_map(
-        families.sine(Block.from_parameters(p=1.0, alpha=0.2, restitution=0.9), model=model),
-        {"a": [1.001, 1.05, 3.0], "omega": [0.5, 3.0]},
-        threads=1,
-    )
+    family = families.sine(Block.from_parameters(p=1.0, alpha=0.2, restitution=0.9), model=model)
+    with rocking.set_options(threads=1):
+        shown = chattering.chattering_map(family, {"a": [1.001, 1.05, 3.0], "omega": [0.5, 3.0]})
     yield from shown.data.outcome.values.ravel().astype(float)
     yield from shown.data.upper.values.ravel()
 

@@ -5,6 +5,8 @@ import pytest
 from oracles import referee
 from oracles.referee import Batch, Verdict
 
+import rocking
+
 QUICK, LONGER, LONG = 200, 1_000, 40_000
 LAW_BATCHES = 12
 
@@ -85,12 +87,15 @@ def assert_same_bytes(found: dict[str, np.ndarray], expected: dict[str, np.ndarr
 def assert_independent_of_the_batch(given: Batch, alone: range) -> None:
     """The same bytes for a block whoever is simulated with it, in whatever order, on however many threads."""
     rng = np.random.default_rng([given.seed, given.number, 1])
-    expected = given.together(threads=1)
+    with rocking.set_options(threads=1):
+        expected = given.together()
     everyone = np.arange(len(given.blocks))
-    assert_same_bytes(given.together(threads=2), expected, everyone)
+    with rocking.set_options(threads=2):
+        assert_same_bytes(given.together(), expected, everyone)
     many, order = referee.shuffled(given, -(-1000 // len(given.blocks)), rng)
     for threads in (1, 2):
-        assert_same_bytes(many.together(threads=threads), expected, order)
+        with rocking.set_options(threads=threads):
+            assert_same_bytes(many.together(), expected, order)
     for k in alone:
         single = referee.replace(given, blocks=given.blocks.select(np.array([k])))
         assert_same_bytes(single.together(), expected, np.array([k]))

@@ -136,9 +136,9 @@ def test_what_a_study_of_walls_computes_another_process_resumes_and_reads(tmp_pa
     bodies, levels = [FACADE, LEANING, RestrainedBlock(FACADE.block, one_sided=True, restitution=0.4)], [1.0, 2.0, 4.0]
     study = rocking.study(tmp_path / "walls", bodies, PULSES[:3], levels=levels, measure="pga", polarity="both",
                           unit_blocks=512)  # fmt: skip
-    study.run(progress=False)
+    study.run()
     whole = rocking.simulate_many(bodies, PULSES[:3], levels=levels, measure="pga", polarity="both")
-    script = f"import rocking; s = rocking.study({str(tmp_path / 'walls')!r}); s.run(progress=False); print(s.status)"
+    script = f"import rocking; s = rocking.study({str(tmp_path / 'walls')!r}); s.run(); print(s.status)"
     if another:
         print(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout)
     else:

@@ -103,7 +103,7 @@ def test_a_study_leaves_out_what_was_given_up(tmp_path):
     pulses = [PULSE, rocking.pulses.one_sine(6.0, 1.8)]
     levels = np.linspace(1.5, 6.0, 10)
     study = rocking.study(tmp_path / "study", TWO, pulses, levels=levels, measure="pga")
-    study.run(progress=False)
+    study.run()
     direct = rocking.fragility(TWO, pulses, levels=levels)
     missing = int(direct.outcomes.unfinished.sum())
     text = f"{missing} simulations given up after too many steps: outcomes missing"

@@ -33,7 +33,8 @@ motions = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2
 scales = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both"}
 study = rocking.study(sys.argv[1], blocks, motions, **scales, model="linear", unit_blocks=512)
 print("ready", flush=True)
-report = study.run(threads=int(sys.argv[2]), part=sys.argv[3] if sys.argv[3:] else None)
+with rocking.set_options(threads=int(sys.argv[2])):
+    report = study.run(part=sys.argv[3] if sys.argv[3:] else None)
 print(report.stopped)
 """
 
@@ -45,7 +46,8 @@ def made(folder, *, blocks=BLOCKS, **changes):
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory):
     folder = tmp_path_factory.mktemp("complete")
-    made(folder).run(threads=1)
+    with rocking.set_options(threads=1):
+        made(folder).run()
     return folder
 
 
@@ -77,7 +79,8 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
     keys = list(store_of(study).grid)
     assert len(keys) == 2 * 2 * 1 * 2
     assert sum(map(store_of(study).grid.simulations, keys)) == reference.overturned.size
-    study.run(threads=2)
+    with rocking.set_options(threads=2):
+        study.run()
     xr.testing.assert_identical(rocking.study(tmp_path).results().load(), reference)
     lazy = rocking.study(tmp_path).results()
     for part in ({"motion": [2, 0], "block": [1299, 5]}, {"polarity": 1, "scale": 0}, {"motion": -1, "block": -1}):
@@ -112,18 +115,21 @@ def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_pat
 def test_whoever_computes_it_the_store_is_the_same_to_the_byte(complete, tmp_path, how, monkeypatch):
     study = made(tmp_path)
     if how == "two threads":
-        study.run(threads=2)
+        with rocking.set_options(threads=2):
+            study.run()
     elif how == "processes":
         with ProcessPoolExecutor(2) as pool:
             study.run(executor=pool)
     elif how == "parts":
-        counts = [study.run(part=part, threads=1).units for part in ("3/5", "1/5", "2/5", "5/5", "4/5")]
+        with rocking.set_options(threads=1):
+            counts = [study.run(part=part).units for part in ("3/5", "1/5", "2/5", "5/5", "4/5")]
         assert sum(counts) == study.status.units == 36 and max(counts) - min(counts) <= 1
         assert study.run().units == 0
     else:
         keys = list(store_of(study).grid)
         monkeypatch.setattr(UnitGrid, "__iter__", lambda self: iter(keys[::-1]))
-        study.run(threads=1)
+        with rocking.set_options(threads=1):
+            study.run()
     assert digest(tmp_path) == digest(complete)
 
 
@@ -190,7 +196,8 @@ def test_sigterm_finishes_the_units_in_hand(complete, tmp_path, monkeypatch):
     study = made(tmp_path)
     with monkeypatch.context() as patched:
         after_each_unit(patched, lambda: signal.raise_signal(signal.SIGTERM))
-        report = study.run(threads=1)
+        with rocking.set_options(threads=1):
+            report = study.run()
     assert report.stopped and 1 <= report.units == study.status.done <= 3
     assert "stopped, go on with another run" in str(report)
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
@@ -224,8 +231,8 @@ def test_ctrl_c_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(RUNS, "compute", compute)
         after_each_unit(patched, lambda: signal.raise_signal(signal.SIGINT))
-        with pytest.raises(KeyboardInterrupt):
-            study.run(threads=2)
+        with pytest.raises(KeyboardInterrupt), rocking.set_options(threads=2):
+            study.run()
     assert stopped.count(False) == 1  # the unit that is stored
     assert len(stopped) == next(numbers) > 1
     assert study.status.done == 1
@@ -267,7 +274,8 @@ def test_units_that_failed_are_computed_by_the_next_run(complete, tmp_path, monk
 
     with monkeypatch.context() as patched:
         patched.setattr(RUNS, "compute", broken)
-        report = study.run(threads=1)
+        with rocking.set_options(threads=1):
+            report = study.run()
     assert set(report.failed.values()) == {"ArithmeticError: no luck"}
     assert len(report.failed) == 36 and study.status.done == 0
     assert not study.run().failed
@@ -295,7 +303,8 @@ def small(folder):
 @pytest.fixture(scope="module")
 def small_complete(tmp_path_factory):
     folder = tmp_path_factory.mktemp("small")
-    small(folder).run(threads=1)
+    with rocking.set_options(threads=1):
+        small(folder).run()
     return folder
 
 
@@ -315,13 +324,15 @@ def test_a_write_that_fails_is_one_sentence_and_leaves_nothing_half_visible(
         else:
             patched.setattr(folders.os, call, Failing(getattr(os, call), n, code))
         try:
-            small(tmp_path).run(threads=1)
+            with rocking.set_options(threads=1):
+                small(tmp_path).run()
         except rocking.RockingError as error:
             assert os.strerror(code) in str(error)
             assert "\n" not in str(error)
     for path in (tmp_path / "units").glob("unit.*"):
         assert path.read_bytes() == (small_complete / "units" / path.name).read_bytes()
-    small(tmp_path).run(threads=1)
+    with rocking.set_options(threads=1):
+        small(tmp_path).run()
     assert digest(tmp_path) == digest(small_complete)
     assert not list(tmp_path.rglob(".*.part*"))
 
@@ -475,7 +486,8 @@ COLUMNS = [
 def test_a_study_is_exported(tmp_path, reference):
     pandas = pytest.importorskip("pandas")
     study, reference = made(tmp_path / "study", blocks=BLOCKS.select(slice(0, 50))), reference.isel(block=slice(0, 50))
-    study.run(threads=1)
+    with rocking.set_options(threads=1):
+        study.run()
     study.to_netcdf(tmp_path / "all.nc")
     with xr.open_dataset(tmp_path / "all.nc", engine="h5netcdf") as found:
         np.testing.assert_array_equal(found.peak_rotation.values, reference.peak_rotation.values)
@@ -521,7 +533,8 @@ def test_a_vertical_component_is_part_of_a_study(tmp_path):
     """It is kept, computed with, and noticed when it is another one."""
     both = MOTIONS[0].with_vertical(MOTIONS[1])
     one = rocking.study(tmp_path / "study", BLOCKS, both)
-    one.run(threads=1)
+    with rocking.set_options(threads=1):
+        one.run()
     again = rocking.study(tmp_path / "study").results().load()
     assert np.array_equal(again.peak_rotation, rocking.simulate_many(BLOCKS, both).peak_rotation)
     assert not np.array_equal(again.peak_rotation, rocking.simulate_many(BLOCKS, MOTIONS[0]).peak_rotation)

@@ -48,7 +48,8 @@ def wait_until(true, seconds=300.0):  # far beyond what a busy machine takes: wh
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory):
     folder = tmp_path_factory.mktemp("complete")
-    made(folder).run(threads=1)
+    with rocking.set_options(threads=1):
+        made(folder).run()
     return digest(folder)
 
 
@@ -134,7 +135,8 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
         monkeypatch.undo()
     assert "KilledWorker" in report.failed["unit.0.7.0.0"]
     assert len(report.failed) <= 2  # with the one that waited behind it
-    study.run(threads=1)
+    with rocking.set_options(threads=1):
+        study.run()
     assert digest(tmp_path / "unit") == complete
 
     # The scheduler is killed: one sentence, and no waiting for what will never come.
@@ -148,7 +150,8 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
         after_each_unit(patched, cluster.scheduler.kill)
         study.run(executor=client)
     assert 0 < study.status.done < UNITS
-    study.run(threads=1)
+    with rocking.set_options(threads=1):
+        study.run()
     assert digest(tmp_path / "scheduler") == complete
 
 

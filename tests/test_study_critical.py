@@ -73,7 +73,8 @@ def test_a_change_with_unknown_verdicts_inside_lies_between_the_known_ones(tmp_p
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.97)
     options = {"levels": [0.5, 1.0, 2.2, 2.5, 6.0, 6.5], "measure": "pga", "duration": 4.0}
     study = rocking.study(tmp_path, block, rocking.pulses.one_sine(1.0, 1.0), **options)
-    study.run(threads=1)
+    with rocking.set_options(threads=1):
+        study.run()
     results, found = study.results(), study.critical_scales()
     assert results.stopped.values.ravel().tolist() == [False, False, True, True, False, False]
     assert results.overturned.values.ravel().tolist() == [False, False, False, False, True, True]

@@ -133,7 +133,7 @@ def test_a_study_of_one_block_says_what_a_fragility_at_once_does(tmp_path, alpha
     motions = [motion.with_vertical(lift) for motion in MOTIONS[:6]]
     levels = np.linspace(1.0, 9.0, 9)
     of_study = rocking.study(tmp_path / "s", block, motions, levels=levels, polarity="both", unit_blocks=512)
-    of_study.run(progress=False)
+    of_study.run()
     found, reference = of_study.fragility(), rocking.fragility(block, motions, levels=levels, polarity="both")
     assert found.description.partition(" model, ")[2] == reference.description.partition(" model, ")[2] != ""
     for one in (found, reference):
@@ -153,7 +153,8 @@ def test_a_spectrum_is_the_fractiles_of_the_simulations(study, simulated):
 def test_what_is_written_of_spectral_accelerations_says_their_period_and_damping(tmp_path):
     measure, about = rocking.Measure("sa", 0.7, 0.02), {"measure": "sa", "period": 0.7, "damping": 0.02}
     made = rocking.study(tmp_path / "study", BLOCKS, MOTIONS[:2], levels=[1.0, 2.0], measure=measure, unit_blocks=512)
-    made.run(threads=1)
+    with rocking.set_options(threads=1):
+        made.run()
     for found in (made.results().scale.attrs, made.critical_scales().attrs, made.spectrum().to_dict()):
         assert {name: found[name] for name in about} == about
 
@@ -178,7 +179,7 @@ def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
     blocks = rocking.Blocks(p=[1.5, 2.0, 3.0], alpha=[[0.1, 0.15], [0.2, 0.15], [0.2, 0.3]], restitution=0.9)
     motions = MOTIONS[::2]
     study = rocking.study(tmp_path, blocks, motions, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
-    study.run(progress=False)
+    study.run()
     of_study = study.fragility(limits=LIMITS)
     at_once = rocking.fragility(blocks, motions, levels=LEVELS, polarity="both", limits=LIMITS)
     for name in LIMITS:
@@ -193,7 +194,7 @@ def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
 def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, order):
     blocks = rocking.Blocks(p=2.0, alpha=[[0.2, 0.2], [0.2, 0.15]], restitution=0.9).select(np.array(order))
     study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
-    study.run(progress=False)
+    study.run()
     found, once = study.block_fragilities(), len(MOTIONS) * len(LEVELS)
     assert found.data.outcomes.values.tolist() == [[once * (1 + k) for k in order]]
 

@@ -29,6 +29,7 @@ from .calibration.outcomes import Calibration, calibrate
 from .calibration.tables import read_tests
 from .calibration.validate import ModelValidation, ShakeTest, validate
 from .core.result import DatasetResult, Result, Row
+from .core.threads import set_options
 from .engine.treatment import (
     AsymptoticTime,
     Certified,
@@ -145,6 +146,7 @@ __all__ = [
     "response_rose",
     "rocking_spectrum",
     "rules",
+    "set_options",
     "simulate",
     "simulate_many",
     "solid",

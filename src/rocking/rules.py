@@ -407,8 +407,6 @@ def check(
     *,
     rules: Iterable[str] | None = None,
     model: Model = "nonlinear",
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> Check:
     """Apply rules of thumb to a block under motions, and compare with simulations.
 
@@ -422,8 +420,6 @@ def check(
         Names in `RULES`, by default all.
     model : {"nonlinear", "linear"}
         Equation of motion of the simulations.
-    threads, progress : int or bool, optional
-        As for `rocking.simulate_many`.
 
     Returns
     -------
@@ -465,19 +461,17 @@ def check(
         for motion in named_motions.values()
     ]
     responses, margins = [], []
-    with Progress("checking", total=len(named_motions), show=progress) as bar:
+    with Progress("checking", total=len(named_motions)) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, model=model))
-            margins.append(_margin(responses[-1], block, motion, model, threads))
+            margins.append(_margin(responses[-1], block, motion, model))
             bar.advance()
     return Check(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
 
 
-def _margin(response: Response, block: Block, motion: Motion, model: Model, threads: int | None) -> float:
+def _margin(response: Response, block: Block, motion: Motion, model: Model) -> float:
     """Reciprocal of the lowest factor on the motion that overturns the block, consistent with the response."""
-    scaled = incremental_dynamic_analysis(
-        block, motion, model=model, tolerance=_TOLERANCE, threads=threads, progress=False
-    )
+    scaled = incremental_dynamic_analysis(block, motion, model=model, tolerance=_TOLERANCE)
     margin = motion.pga / float(scaled.data.overturning_level[0, 0])
     if response.overturned:
         return float(np.fmax(margin, 1.0))  # the factor may be beyond all simulated levels

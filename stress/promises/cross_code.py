@@ -101,7 +101,8 @@ def judge(part: int) -> Found:
     found = Found(parts=1)
     blocks, shaking, model = drawn(part)
     motion: Any = shaking.motion
-    together = rocking.simulate_many(blocks, motion, model=model, threads=1, progress=False)  # type: ignore[arg-type]
+    with rocking.set_options(threads=1):
+        together = rocking.simulate_many(blocks, motion, model=model)  # type: ignore[arg-type]
     fell, peaks = (together[name].values.reshape(-1) for name in ("overturned", "peak_rotation"))
     for k in range(BLOCKS):
         given: Any = {name: tuple(map(float, getattr(blocks, name)[k])) for name in ("p", "alpha", "restitution")}

@@ -70,16 +70,15 @@ def digest(data: dict[str, np.ndarray]) -> str:
     return total.hexdigest()
 
 
-def direct(part: int, threads: int | None = 1) -> str:
+def direct(part: int, threads: int = 1) -> str:
     """Digest of the ensemble in one call."""
     blocks, motion, model = drawn(part)
     return digest(_outcomes(blocks, motion, model, threads))
 
 
-def _outcomes(
-    blocks: rocking.Blocks, motion: rocking.Motion, model: str, threads: int | None = 1
-) -> dict[str, np.ndarray]:
-    found = rocking.simulate_many(blocks, motion, model=model, threads=threads, progress=False)  # type: ignore[arg-type]
+def _outcomes(blocks: rocking.Blocks, motion: rocking.Motion, model: str, threads: int = 1) -> dict[str, np.ndarray]:
+    with rocking.set_options(threads=threads):
+        found = rocking.simulate_many(blocks, motion, model=model)  # type: ignore[arg-type]
     return {str(name): values.values.reshape(-1) for name, values in found.data_vars.items()}
 
 
@@ -99,9 +98,10 @@ def as_study(part: int, unit_blocks: int, processes: int = 0) -> str:
         made = rocking.study(folder, blocks, motion, model=model, unit_blocks=unit_blocks)  # type: ignore[arg-type]
         if processes:
             with ProcessPoolExecutor(processes, get_context("spawn")) as executor:
-                made.run(executor=executor, progress=False)
+                made.run(executor=executor)
         else:
-            made.run(threads=1, progress=False)
+            with rocking.set_options(threads=1):
+                made.run()
         return digest({str(name): values.values.reshape(-1) for name, values in made.results().data_vars.items()})
 
 

@@ -42,7 +42,8 @@ def _ensemble(round_: int) -> int:
         p=rng.uniform(3.0, 9.0, BLOCKS), alpha=rng.uniform(0.1, 0.4, BLOCKS), restitution=rng.uniform(0.3, 0.8, BLOCKS)
     )
     motion = rocking.pulses.one_sine(float(rng.uniform(2.0, 4.0)), 2.0)
-    found = rocking.simulate_many(blocks, motion, threads=1, progress=False)
+    with rocking.set_options(threads=1):
+        found = rocking.simulate_many(blocks, motion)
     return int(found.overturned.size)
 
 

@@ -489,7 +489,8 @@ class _Judge:
 
     def ensemble(self) -> None:
         """An ensemble of this block alone says the same, also where it steps in lanes."""
-        together = rocking.simulate_many(self.given.block, self.given.motion, model=self.given.model, threads=1)
+        with rocking.set_options(threads=1):
+            together = rocking.simulate_many(self.given.block, self.given.motion, model=self.given.model)
         overturned, peak = bool(together.overturned.item()), float(together.peak_rotation.item())
         if overturned != self.course.overturned:
             self.fault("verdict of an ensemble", overturned, self.course.overturned)

@@ -48,8 +48,6 @@ def response_rose(
     restitution: float | Sequence[float] | None = None,
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> ResponseRose:
     """Simulate a body in the plane of every azimuth under the ground motion along it.
 
@@ -73,7 +71,7 @@ def response_rose(
         Azimuths of the first and the second component of every pair. The default is read from the records.
     restitution : float or pair, optional
         As for `Solid.block`.
-    model, chattering, threads, progress : optional
+    model, chattering : optional
         As for `simulate_many`.
 
     Returns
@@ -114,13 +112,13 @@ def response_rose(
     factors = np.array([_factors(scales, pair) for pair in named.values()])
     shape = (len(named), scales.count, len(at))
     peak, overturned = np.empty(shape), np.empty(shape, bool)
-    with Progress("simulating", total=len(at), show=progress) as bar:
+    with Progress("simulating", total=len(at)) as bar:
         for k, (azimuth, block) in enumerate(zip(at.tolist(), blocks, strict=True)):
             along = [one.rotated(other, azimuth, recorded=recorded) for one, other in named.values()]
             motions = [
                 motion.scaled(factor) for motion, own in zip(along, factors, strict=True) for factor in own.tolist()
             ]
-            found = simulate_many(block, motions, model=model, chattering=chattering, threads=threads, progress=False)
+            found = simulate_many(block, motions, model=model, chattering=chattering)
             fell = found.overturned.values
             ratio = ratios_of(found.peak_rotation.values, fell, found.unfinished.values, min(block.balance))
             overturned[..., k], peak[..., k] = fell.reshape(shape[:2]), ratio.reshape(shape[:2])

@@ -49,8 +49,6 @@ def compare_measures(
     weights: ArrayLike | None = None,
     clusters: object = None,
     tolerance: float = 1e-4,
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> MeasureComparison:
     """Compare the dispersion of overturning motions for several intensity measures.
 
@@ -68,8 +66,6 @@ def compare_measures(
         As for `fragility`. A cluster counts as one motion in the intervals.
     tolerance : float
         Relative width of the brackets of the overturning intensities.
-    threads, progress : optional
-        As for `simulate_many`.
 
     Returns
     -------
@@ -118,9 +114,7 @@ def compare_measures(
     measures = [Measure("pga"), Measure("pgv"), *of_periods, Measure("pga_ratio"), Measure("pgv_ratio")]
     together = clusters_of(shaken, clusters)
     _check_enough(len(np.unique(together)), clusters)
-    scaled = incremental_dynamic_analysis(
-        many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
-    )
+    scaled = incremental_dynamic_analysis(many, shaken, measure="pga_ratio", model=model, tolerance=tolerance)
     level = scaled.data.overturning_level.transpose("motion", "block").values
     factors = level * units_of(many, measures[-2], model) / values_of(shaken, measures[0])[:, None]
     intensity = [factors * values_of(shaken, each)[:, None] / units_of(many, each, model) for each in measures]

@@ -338,8 +338,6 @@ def fragility(
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
     confidence: float = 0.9,
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> Fragility:
     """Simulate blocks under motions and fit the probability of exceedance against the intensity.
 
@@ -369,8 +367,6 @@ def fragility(
         combines components of one station and earthquake by their file names.
     confidence : float
         Probability of the intervals and bands, between 0 and 1.
-    threads, progress : optional
-        As for `simulate_many`.
 
     Returns
     -------
@@ -409,7 +405,7 @@ def fragility(
         raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
     shaken = several_motions(motions)
     values, together, units = values_of(shaken, how), clusters_of(shaken, clusters), units_of(many, how, model)
-    options: dict[str, Any] = {"chattering": chattering, "threads": threads, "progress": progress}
+    options: dict[str, Any] = {"chattering": chattering}
     options["polarity"] = "+" if mirrored else polarity
     if stripes is None:
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
@@ -451,7 +447,7 @@ def fragility(
         with_vertical="vertical" in table.coords,
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
-        undecided=undecided_text(setup, shaken, factors, table.overturned.values, threads),
+        undecided=undecided_text(setup, shaken, factors, table.overturned.values),
         missing=missing_text(missing),
     )
 

@@ -56,8 +56,6 @@ def incremental_dynamic_analysis(
     levels: ArrayLike | None = None,
     model: Model = "nonlinear",
     tolerance: float = 1e-6,
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> IncrementalDynamicAnalysis:
     """Scale motions beyond overturning of every block, and find the bands of levels that overturn.
 
@@ -79,8 +77,6 @@ def incremental_dynamic_analysis(
         Equation of motion.
     tolerance : float
         Width of refined ends of bands, relative to the level.
-    threads, progress : optional
-        As for `simulate_many`.
 
     Returns
     -------
@@ -126,7 +122,7 @@ def incremental_dynamic_analysis(
     if never_rests(many):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
-    options: dict[str, Any] = {"model": model, "threads": threads, "progress": progress}
+    options: dict[str, Any] = {"model": model}
     first = _lowest_uplift(many, shaken, values, how, model)
     if levels is None:
         table = _until_overturned(many, shaken, how, first, options)
@@ -143,17 +139,17 @@ def incremental_dynamic_analysis(
             factor = level[here] * factors[m, block[here]]
             # Use the treatment of the levels, which determines how often the restitution is drawn.
             setup = Setup(many.select(block[here]), model, Certified())
-            for task, outcomes in simulate_each(setup, shaken[m], factor, threads=threads):
+            for task, outcomes in simulate_each(setup, shaken[m], factor):
                 verdicts[np.flatnonzero(here)[task.bodies]] = outcomes["overturned"]
         return verdicts
 
     grid = table.overturned.transpose("level", "motion", "block").values
     flat = grid.reshape(len(grid), -1).astype(np.int64)
-    edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
+    edges = boundaries(table.level.values, flat, overturned, tolerance=width)
     found = _dataset(table, flat, edges, slenderness, how)
     about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
     scales = (table.level.values[:, None, None] * factors)[..., None]
-    about["undecided"] = undecided_text(Setup(many, model, Certified()), shaken, scales, grid[..., None], threads)
+    about["undecided"] = undecided_text(Setup(many, model, Certified()), shaken, scales, grid[..., None])
     return IncrementalDynamicAnalysis(found.assign_attrs(about))
 
 

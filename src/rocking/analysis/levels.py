@@ -286,9 +286,7 @@ def note_missing(unfinished: Flags) -> None:
         note(f"{text}, and each counts as half overturned")
 
 
-def undecided_text(
-    setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags, threads: int | None
-) -> str:
+def undecided_text(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags) -> str:
     """Describe how many outcomes of a sample change when motions are scaled by 1 +- 3e-6.
 
     Factors of the motions and outcomes are over (level, motion, block, polarity).
@@ -302,7 +300,7 @@ def undecided_text(
         for k, (m, b) in enumerate(zip(motion, block, strict=True))
         for scale in (near[0], near[-1])
     )
-    found = simulate_tasks(setup, tasks, threads=threads)
+    found = simulate_tasks(setup, tasks)
     changed = {task.key for task, outcomes in found if outcomes["overturned"][0] != was[task.key[0]]}
     sample = counted(len(drawn), "outcome")
     return f"undecided within {percent(near[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
@@ -330,7 +328,6 @@ def boundaries(
     outcome_of: Callable[[Integers, Floats], Integers],
     *,
     tolerance: float,
-    progress: bool | None = None,
 ) -> Boundaries:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
@@ -341,7 +338,7 @@ def boundaries(
     here = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
     origin = np.arange(len(here.level))
     left = _halvings(here, tolerance)
-    with Progress("refining", left, show=progress) as bar:
+    with Progress("refining", left) as bar:
         while (wide := bisection.is_wide(here.low, here.high, tolerance)).any():
             found = here.below.copy()
             found[wide] = outcome_of(here.column[wide], here.level[wide])

@@ -86,8 +86,6 @@ def overturning_map(
     frequencies: ArrayLike,
     model: Model = "nonlinear",
     tolerance: float = 1e-9,
-    threads: int | None = None,
-    progress: bool | None = None,
     **parameters: Any,
 ) -> OverturningMap:
     """Map the outcomes of a block under a pulse over amplitude and frequency, with their boundaries.
@@ -110,8 +108,6 @@ def overturning_map(
         Equation of motion.
     tolerance : float
         Width of refined boundaries, relative to the amplitude.
-    threads, progress : optional
-        As for `simulate_many`.
     **parameters : object
         Further parameters of a named pulse, as for the function of that name in `rocking.pulses`.
 
@@ -183,7 +179,6 @@ def overturning_map(
     # Blocks of one shape with values of p that correspond to the ratios for a pulse of the block's frequency.
     blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
     setup, threshold = Setup(blocks, model, Certified(width * unit.end)), min(block.uplift_thresholds(model))
-    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
 
     def followed(
         column: Integers, level: Floats, done: Callable[[int], None] = lambda count: None
@@ -191,16 +186,16 @@ def overturning_map(
         """Mode and peak rotation of each block, selected by column, at its level."""
         ends = np.empty(column.size, dtype=OUTCOME)
         here = replace(setup, bodies=setup.bodies.select(column))
-        for task, outcomes in simulate_each(here, unit, threshold * level, threads=count):
+        for task, outcomes in simulate_each(here, unit, threshold * level):
             ends[task.bodies] = outcomes
             done(len(outcomes))
         return np.where(ends["unfinished"], Mode.UNFINISHED, modes_of(ends, unit.end)), ends["peak_rotation"]
 
     row, column = (index.ravel() for index in np.indices((levels.size, ratios.size)))
-    with Progress("mapping", row.size, show=progress) as bar:
+    with Progress("mapping", row.size) as bar:
         modes, peaks = followed(column, levels[row], bar.advance)
     modes, peaks = modes.reshape(levels.size, -1), peaks.reshape(levels.size, -1)
-    edges = boundaries(levels, modes, lambda *at: followed(*at)[0], tolerance=width, progress=progress)
+    edges = boundaries(levels, modes, lambda *at: followed(*at)[0], tolerance=width)
     attributes = {
         "program": f"rocking {VERSION}",
         "model": model,

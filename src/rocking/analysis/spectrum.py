@@ -53,8 +53,6 @@ def rocking_spectrum(
     fractiles: Sequence[float] = (0.16, 0.5, 0.84),
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> RockingSpectrum:
     """Compute peak rotation against the frequency parameter or the size, for a grid or an ensemble.
 
@@ -74,7 +72,7 @@ def rocking_spectrum(
         Weights of the blocks of an ensemble, equal by default.
     fractiles : sequence of float
         Shares, in (0, 1), of motions (and of the ensemble's weight) below the fractile curves.
-    model, chattering, threads, progress : optional
+    model, chattering : optional
         As for `simulate_many`.
 
     Returns
@@ -116,7 +114,7 @@ def rocking_spectrum(
     """
     each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
     shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in each])
-    options: dict[str, Any] = {"model": model, "chattering": chattering, "threads": threads, "progress": progress}
+    options: dict[str, Any] = {"model": model, "chattering": chattering}
     gathered, shaken = bodies_of(blocks), several_motions(motions)
     if not isinstance(gathered, Blocks):
         raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {gathered.kind}")

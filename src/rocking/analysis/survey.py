@@ -244,7 +244,6 @@ def survey(
     *,
     friction: float | None = None,
     precision: float = PRECISION,
-    progress: bool | None = None,
     **options: Any,
 ) -> Survey:
     """Simulate a block under many motions.
@@ -258,8 +257,6 @@ def survey(
         Coefficient of friction for the detection of sliding.
     precision : float
         Relative precision of the motions, from 1e-6 to 0.1. Outcomes are also counted within this precision.
-    progress : bool, optional
-        As for `simulate_many`.
     **options : object
         As for `rocking.simulate`: model, chattering, duration, ...
 
@@ -294,7 +291,7 @@ def survey(
     if friction is not None:
         friction_coefficient(friction)
     responses = []
-    with Progress("simulating", total=len(named_motions), show=progress) as bar:
+    with Progress("simulating", total=len(named_motions)) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, **options))
             _row(responses[-1], precision)  # the response caches the expensive results while the progress bar is shown

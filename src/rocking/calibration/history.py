@@ -168,7 +168,6 @@ def calibrate_history(
     two_sided: bool = False,
     initial_rotation: float | None = None,
     seed: int = 0,
-    progress: bool | None = None,
 ) -> HistoryCalibration:
     """Fit a block to a measured rotation history, free or forced.
 
@@ -189,7 +188,7 @@ def calibrate_history(
         residuals show whether one value suffices.
     initial_rotation : float, optional
         Rotation of the held block at time 0, rad. By default fitted in a release test, and 0 under a motion.
-    seed, progress : optional
+    seed : optional
         As for `calibrate`.
 
     Returns
@@ -240,7 +239,7 @@ def calibrate_history(
         )
     problem = _Problem(at, measured, motion, model, settled, tuple(unknowns))
     rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
-    return _result(problem, _best(problem, rng, progress))
+    return _result(problem, _best(problem, rng))
 
 
 def _checked(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
@@ -351,14 +350,14 @@ def _released_from(rotation: Floats) -> _Unknown:
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
 
-def _best(problem: _Problem, rng: np.random.Generator, progress: bool | None) -> Floats:
+def _best(problem: _Problem, rng: np.random.Generator) -> Floats:
     """Find the logarithms of the unknowns with the least squares over the whole history."""
     from scipy.stats import qmc
 
     low, high = problem.bounds
     survivors = qmc.scale(qmc.Halton(len(low), rng=rng).random(_CANDIDATES), low, high)
     whole = len(problem.times)
-    with Progress("fitting", sum(kept for _, kept in _STAGES) + len(_WIDTHS), show=progress) as bar:
+    with Progress("fitting", sum(kept for _, kept in _STAGES) + len(_WIDTHS)) as bar:
         for share, kept in _STAGES:
             count = min(max(problem.first(share), 2 * len(low)), whole)
             errors = [problem.error(one, count) for one in survivors]

@@ -147,14 +147,14 @@ class Calibration(Result):
         """Scores on the calibration's own motions, which are optimistic (see `cross_validate`)."""
         return Scores.of(self.probabilities, self.observed)
 
-    def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
+    def predict(self, motions: Motions) -> Floats:
         """Compute the probability of overturning under m motions, shape (m,).
 
         The weighted share of the ensemble that overturns is bounded away from 0 and 1 by the lapse.
         """
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
-        fell = overturned_under(self.blocks, motions, self.model, threads, progress)
+        fell = overturned_under(self.blocks, motions, self.model)
         return chances_of(self.weights @ fell, self.diagnostics.effective, self.lapse)
 
     def cross_validate(
@@ -164,8 +164,6 @@ class Calibration(Result):
         folds: int = 10,
         repeats: int = 1,
         seed: int = 0,
-        threads: int | None = None,
-        progress: bool | None = None,
     ) -> Validation:
         """Predict every test from fits without it.
 
@@ -178,8 +176,6 @@ class Calibration(Result):
             Number of parts, and of random divisions into parts.
         seed : int
             Seed of the divisions.
-        threads, progress : optional
-            As for `simulate_many`.
 
         Returns
         -------
@@ -193,15 +189,14 @@ class Calibration(Result):
         """
         labels = group_labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
-        count = None if threads is None else checks.whole(threads, "threads", InvalidOption, 1)
-        evidence = replace(self._evidence, threads=count)
+        evidence = replace(self._evidence)
         probabilities = np.empty((checks.whole(repeats, "repeats", InvalidOption, 1), len(self.observed)))
         for row in probabilities:
             parts = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
             for part in range(folds):
                 left_out = parts == part
                 kept, wanted = evidence.of_tests(~left_out), evidence.of_tests(left_out)
-                drawn = posterior(kept, _DRAWS, ROUNDS, rng, progress=progress)
+                drawn = posterior(kept, _DRAWS, ROUNDS, rng)
                 row[left_out] = wanted.probabilities(drawn).mean(axis=0)
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
@@ -284,11 +279,9 @@ class Calibration(Result):
         return f"<Calibration: {self._headline()}; fitted: {self.scores}>"
 
 
-def overturned_under(
-    blocks: Bodies, motions: Motions, model: Model, threads: int | None, progress: bool | None
-) -> NDArray[np.float32]:
+def overturned_under(blocks: Bodies, motions: Motions, model: Model) -> NDArray[np.float32]:
     """Return 1 for overturning, 0 for none, 0.5 for an abandoned simulation, shape (n, m)."""
-    simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
+    simulated = simulate_many(blocks, motions, model=model)
     note_missing(simulated.unfinished.values)
     known = simulated.overturned.astype(np.float32).where(~simulated.unfinished, np.float32(0.5))
     return np.asarray(known.transpose("block", "motion").values, dtype=np.float32)
@@ -320,8 +313,6 @@ def calibrate(
     candidates: int = 8192,
     ensemble: int = 1000,
     seed: int = 0,
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> Calibration:
     """Fit blocks to the outcomes (overturned or not) of a specimen under several motions.
 
@@ -351,8 +342,6 @@ def calibrate(
         Largest number of blocks for predictions.
     seed : int
         Seed of the random draws.
-    threads, progress : optional
-        As for `simulate_many`.
 
     Returns
     -------
@@ -400,11 +389,11 @@ def calibrate(
     distinct, which = distinct_motions(tested)
 
     def tried(points: Floats) -> NDArray[np.float32]:
-        return np.take(overturned_under(space.blocks(points), distinct, model, threads, progress), which, axis=1)
+        return np.take(overturned_under(space.blocks(points), distinct, model), which, axis=1)
 
-    found = search(Problem(space, observed, lapse, tried, threads), candidates, rng)
+    found = search(Problem(space, observed, lapse, tried), candidates, rng)
     evidence = found.evidence
-    final = posterior(evidence, 2 * _DRAWS, ROUNDS, rng, progress=progress)
+    final = posterior(evidence, 2 * _DRAWS, ROUNDS, rng)
     weights = evidence.mean_weights(final)
     kept, times = np.unique(systematic(weights, ensemble, rng), return_counts=True)
     calibration = Calibration(

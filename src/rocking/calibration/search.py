@@ -22,7 +22,7 @@ from rocking.calibration.space import Space
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisected
 from rocking.core.progress import Progress
-from rocking.core.threads import cores
+from rocking.core.threads import thread_count
 from rocking.kernels import population as kernel
 
 #: Prior standard deviation of the logarithm of a dispersion from test to test.
@@ -122,7 +122,6 @@ class Evidence:
     candidates: Candidates
     observed: Flags
     lapse: float
-    threads: int | None = None
 
     def of_tests(self, tests: Flags) -> Evidence:
         """Return the evidence of some of the tests."""
@@ -168,7 +167,7 @@ class Evidence:
             exponents = np.empty(powers.shape[1], np.float32)
             kernel.shares(factors[start:end], powers, overturned, exponents, found[start:end], effective[start:end])
 
-        each = max(-(-len(populations) // (self.threads or cores())), 16)
+        each = max(-(-len(populations) // thread_count()), 16)
         starts = range(0, len(populations), each)
         with ThreadPoolExecutor(max(len(starts), 1)) as pool:
             list(pool.map(weigh, starts, (start + each for start in starts)))
@@ -230,11 +229,10 @@ class Problem:
     observed: Flags
     lapse: float
     tried: Callable[[Floats], NDArray[np.float32]]
-    threads: int | None = None
 
     def evidence(self, candidates: Candidates) -> Evidence:
         """Combine candidates with the observed outcomes."""
-        return Evidence(candidates, self.observed, self.lapse, self.threads)
+        return Evidence(candidates, self.observed, self.lapse)
 
     def filling(self, count: int, rng: np.random.Generator) -> Candidates:
         """Simulate blocks that fill the space evenly."""
@@ -243,7 +241,7 @@ class Problem:
 
     def propose(self, candidates: Candidates, exponent: float, count: int, rng: np.random.Generator) -> Candidates:
         """Also simulate blocks near fitted populations, wider for a lower exponent of the likelihood."""
-        populations = posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent, progress=False)
+        populations = posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent)
         points = drawn(populations, PROPOSAL_WIDTH, count, rng)
         points = points[self.space.contains(points)]
         drawn_ones = Candidates(self.space, points, self.tried(points), 0, ((count, populations),))
@@ -300,7 +298,7 @@ def _compared(
         for exponent in exponents:
             run = problem.propose(run, exponent, part, rng)
         longer.append(run)
-        posteriors.append(posterior(problem.evidence(run), *_COMPARED, rng, progress=False))
+        posteriors.append(posterior(problem.evidence(run), *_COMPARED, rng))
     return Search(problem.evidence(Candidates.pooled(longer)), tuple(longer), tuple(posteriors))
 
 
@@ -324,7 +322,6 @@ def posterior(
     rng: np.random.Generator,
     *,
     exponent: float = 1.0,
-    progress: bool | None = None,
 ) -> Floats:
     """Draw populations from the posterior, shape (count, 2 k), or from a tempered one if an exponent is set.
 
@@ -336,7 +333,7 @@ def posterior(
     centres = points[rng.choice(len(points), min(4 * count, len(points)), replace=False)]
     particles = with_dispersions(space, centres, rng)
     start, end = _log_densities(evidence, exponent, particles)
-    with Progress("fitting", 100, show=progress) as bar:
+    with Progress("fitting", 100) as bar:
         done = 0.0
         while done < 1.0:
             step = _step(end - start, 1.0 - done)

@@ -251,8 +251,6 @@ def validate(
     bins: int = 10,
     simulations: int = 2000,
     seed: int = 0,
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> ModelValidation:
     """Compare the predictions of blocks with the outcomes of tests.
 
@@ -273,8 +271,6 @@ def validate(
         Number of bins of the reliability diagram, of equal width.
     simulations, seed : int
         Number of independent draws from the predictions for the bands and `reliability_chance`, and their seed.
-    threads, progress : optional
-        As for `simulate_many`.
 
     Returns
     -------
@@ -348,7 +344,7 @@ def validate(
             slenderness_of(bodies)  # checked before the simulations
             shares = normalised_weights(weights, len(bodies)) / len(bodies)
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
-        fell = overturned_under(bodies, distinct, how, threads, progress)
+        fell = overturned_under(bodies, distinct, how)
         probabilities = chances_of(shares @ fell, effective, lapse or 0.0)[which]
     outcomes = rng.random((simulations, len(given))) < probabilities
     places = np.minimum((probabilities * bins).astype(np.int64), bins - 1)

@@ -29,7 +29,7 @@ from rocking.core.arrays import Floats
 from rocking.core.bisection import bisected
 from rocking.core.progress import Progress
 from rocking.core.tables import counted
-from rocking.core.threads import cores, in_threads
+from rocking.core.threads import in_threads
 from rocking.engine.tasks import require_finished
 from rocking.engine.treatment import critical_amplitudes_by
 from rocking.errors import InvalidOption, Unfinished
@@ -315,7 +315,7 @@ def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
         phases[statuses == Verdict.UNRESOLVED] = math.inf
         times[some] = phases / frequencies[some]
 
-    for _ in in_threads(part, range(0, rock.size, _PART), threads=cores()):  # the compiled function holds no lock
+    for _ in in_threads(part, range(0, rock.size, _PART)):  # the compiled function holds no lock
         pass
     return times.reshape(shape)[()]
 
@@ -388,9 +388,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     return critical_amplitudes_by(chosen, *flat).reshape(shape)[()]
 
 
-def critical_amplitude_nonlinear(
-    omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike, *, threads: int | None = None, progress: bool | None = None
-) -> Floats:
+def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike) -> Floats:
     """Compute the critical amplitude of the nonlinear block, which tends to `critical_amplitude` in the slender limit.
 
     Parameters
@@ -399,8 +397,6 @@ def critical_amplitude_nonlinear(
         As in `critical_amplitude`.
     alpha : array_like
         Slenderness angle, rad, between 0 and pi/2.
-    threads, progress : int or bool, optional
-        As in `rocking.simulate_many`.
 
     Returns
     -------
@@ -424,12 +420,11 @@ def critical_amplitude_nonlinear(
     '-7.3e-06'
     """
     parameters = checked_frequency(omega), checked_restitution(eta), checked_slenderness(alpha)
-    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     shape, flat = broadcast(*parameters)
     cases = list(zip(*(values.tolist() for values in flat), strict=True))
     found = np.empty(len(cases))
-    with Progress("bisecting", len(cases), show=progress) as bar:
-        for k, amplitude in enumerate(in_threads(lambda case: _critical(*case), cases, threads=count)):
+    with Progress("bisecting", len(cases)) as bar:
+        for k, amplitude in enumerate(in_threads(lambda case: _critical(*case), cases)):
             found[k] = amplitude
             bar.advance()
     return found.reshape(shape)[()]

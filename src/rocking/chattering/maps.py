@@ -103,9 +103,6 @@ _ATTRIBUTES: Final[dict[str, dict[str, Any]]] = {
 def chattering_map(
     family: Family,
     parameters: Mapping[str, ArrayLike],
-    *,
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> ChatteringMap:
     """Simulate a family of inputs on a grid, and determine where chattering after the first uplift is complete.
 
@@ -117,8 +114,6 @@ def chattering_map(
     parameters : mapping
         Names and values of the two parameters, in the order of the arguments of the family. The first is the vertical
         axis of the figure.
-    threads, progress : int or bool, optional
-        As in `rocking.simulate_many`.
 
     Returns
     -------
@@ -156,7 +151,6 @@ def chattering_map(
     checks.mapping(parameters, "parameters", InvalidOption, '{"a": [1.0, 1.1], "omega": [1.0, 2.0]}')
     if len(parameters) != 2:
         raise InvalidOption(f"{{}} must be two, not {len(parameters)}", "parameters", value=parameters)
-    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     if not callable(family):
         raise InvalidOption(
             f"{{}} must be a function of two numbers, as rocking.chattering.families.sine(block), not {family!r}",
@@ -172,8 +166,8 @@ def chattering_map(
                 "{} must return a SimulationInput of a block and a Motion for each pair", "family", value=each
             )
     points: list[_Point] = []
-    with Progress("mapping", len(inputs), show=progress) as bar:
-        for point in in_threads(_simulated, inputs, threads=count):
+    with Progress("mapping", len(inputs)) as bar:
+        for point in in_threads(_simulated, inputs):
             points.append(point)
             bar.advance()
     columns = zip(_Point._fields, zip(*points, strict=True), strict=True)

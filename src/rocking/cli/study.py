@@ -24,6 +24,7 @@ from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.result import Result
 from rocking.core.tables import counted, write_text
+from rocking.core.threads import set_options
 from rocking.errors import InvalidOption, OutputError, StudyError, Unfitted
 from rocking.inputs.quantities import values
 from rocking.studies.file import TEMPLATE, read_study
@@ -103,7 +104,8 @@ def run(
         raise InvalidOption(f"{into} is for a study from a TOML file, which {folder} is not; name one place only")
     is_file = folder.endswith(".toml")
     found = _created(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
-    report = found.run(threads=threads, part=part)
+    with set_options(threads=threads):
+        report = found.run(part=part)
     print(f"{report}\n{found.place}: {found.status}")
     for unit, why in [*report.failed.items()][:_SHOWN]:
         note(f"{unit} failed: {why}")

@@ -12,6 +12,7 @@ from datetime import timedelta
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Literal
 
+from rocking.core.threads import progress_option, set_options
 from rocking.errors import Message, OutsideFit, Spelling, as_argument
 
 if TYPE_CHECKING:
@@ -79,23 +80,26 @@ def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[
 class Progress:
     """Progress bar on stderr with rate and remaining time, shown after one second.
 
-    The bar appears only on a terminal unless `show` is set. Steps that were already `done` do not count towards the
-    rate.
+    The bar appears only on a terminal unless `set_options` says otherwise, and not inside another one. Steps that were
+    already `done` do not count towards the rate.
     """
 
-    def __init__(self, what: str, total: int, *, show: bool | None = None, done: int = 0) -> None:
+    def __init__(self, what: str, total: int, *, done: int = 0) -> None:
         self.what, self.total = what, total
+        show = progress_option()
         self._show = (_listener.audience != "nobody" and sys.stderr.isatty()) if show is None else show
         self._start = time.monotonic()
         self._before = self.done = done
         self._bar: rich.progress.Progress | None = None
 
     def __enter__(self) -> Progress:
+        self._nested = set_options(progress=False)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        self._nested.__exit__()
         if self._bar is not None:
             self._bar.stop()
 

@@ -8,13 +8,88 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Final, TypeVar
+from contextvars import ContextVar
+from typing import Final, NamedTuple, TypeVar
+
+from rocking.core import checks
+from rocking.errors import InvalidOption
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 
 #: Items per thread that are submitted ahead of the oldest pending result.
 AHEAD: Final = 16
+
+
+class _Options(NamedTuple):
+    """Options of long computations; None is the default."""
+
+    threads: int | None = None
+    progress: bool | None = None
+
+
+_DEFAULT: Final = _Options()
+_options: Final = ContextVar[_Options]("options")
+
+
+class set_options:  # noqa: N801 - used as a function and as a context manager
+    """Set the number of threads and the progress bar of long computations, for a ``with`` block or until changed.
+
+    Parameters
+    ----------
+    threads : int, optional
+        Number of threads; one per available core until it is set.
+    progress : bool, optional
+        Whether to draw progress bars on stderr; until it is set, if stderr is a terminal.
+
+    Raises
+    ------
+    InvalidOption
+        If `threads` is not a positive integer, or `progress` is not a boolean.
+
+    See Also
+    --------
+    simulate_many : Simulate many blocks under many motions.
+
+    Notes
+    -----
+    The options apply to the current thread (or task of asyncio). An argument that is left out keeps its value. Results
+    do not depend on the number of threads.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> with rocking.set_options(threads=1, progress=False):
+    ...     table = rocking.simulate_many(rocking.Block(width=0.4, height=2.0), rocking.records.load("el-centro-ns"))
+    >>> table.overturned.item()
+    False
+    """
+
+    def __init__(self, *, threads: int | None = None, progress: bool | None = None) -> None:
+        before = _options.get(_DEFAULT)
+        if threads is not None:
+            threads = checks.whole(threads, "threads", InvalidOption, least=1)
+        if progress is not None:
+            progress = checks.flag(progress, "progress", InvalidOption)
+        self._token = _options.set(
+            _Options(before.threads if threads is None else threads, before.progress if progress is None else progress)
+        )
+
+    def __enter__(self) -> None:
+        return
+
+    def __exit__(self, *error: object) -> None:
+        _options.reset(self._token)
+
+
+def thread_count() -> int:
+    """Return the number of threads of long computations."""
+    return _options.get(_DEFAULT).threads or cores()
+
+
+def progress_option() -> bool | None:
+    """Return whether to draw progress bars, or None by default."""
+    return _options.get(_DEFAULT).progress
 
 
 def cores() -> int:
@@ -26,16 +101,15 @@ def in_threads(
     work: Callable[[Item], Found],
     items: Iterable[Item],
     *,
-    threads: int | None = None,
     cancelled: threading.Event | None = None,
 ) -> Iterator[Found]:
-    """Yield the results of some work on each item, in order, by default with one thread per core.
+    """Yield the results of some work on each item, in order, from the number of threads in `set_options`.
 
     Items are consumed as needed, some per thread ahead of the results. The first of several failed items determines the
     error. On an early exit, for example an interrupt, `cancelled` is set, running work is awaited, and other work is
     discarded.
     """
-    count = min(cores() if threads is None else threads, len(items) if isinstance(items, Sized) else 2**16)
+    count = min(thread_count(), len(items) if isinstance(items, Sized) else 2**16)
     if count < 2:
         yield from map(work, items)
         return

@@ -198,7 +198,7 @@ class KnownAttractors:
             first, known = unsettled[0], len(self.attractors)
             owner = self._add(attractor_from(self.strobe, states[first], self.size))
             if owner == known:
-                passing = self.settled(made[unsettled], self.attractors[owner].period, threads=1)[0]
+                passing = self.settled(made[unsettled], self.attractors[owner].period)[0]
                 found[unsettled] = np.append(self.owner, -1)[passing]
             if owner < 0 or owner == known:  # known attractors do not count as tries
                 tries -= 1
@@ -206,7 +206,7 @@ class KnownAttractors:
         found[found == -2] = -1
         return found
 
-    def settled(self, made: Records, periods: int, threads: int) -> tuple[Integers, Integers]:
+    def settled(self, made: Records, periods: int) -> tuple[Integers, Integers]:
         """Advance states, and return the trap that each reaches within these periods, or -1, and how many it takes."""
         setting, traps, orbits = self.strobe._setting(), self.traps, np.empty((len(made), 0, 3))
         found, taken = np.empty(len(made), dtype=np.int64), np.empty(len(made), dtype=np.int64)
@@ -214,7 +214,7 @@ class KnownAttractors:
         def follow(part: slice) -> None:
             iterate(setting, new_scratch(), made[part], periods, orbits[part], traps, found[part], taken[part])
 
-        for _ in in_threads(follow, parts_of(len(made), periods), threads=threads):
+        for _ in in_threads(follow, parts_of(len(made), periods)):
             pass
         return found, taken
 

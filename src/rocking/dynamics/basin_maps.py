@@ -16,7 +16,6 @@ from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import as_written, counted, text_table
-from rocking.core.threads import cores
 from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.maps import StroboscopicMap, described, scale_of, sensible
 from rocking.engine.treatment import Treatment
@@ -133,8 +132,6 @@ def basins(
     *,
     model: Model | None = None,
     chattering: str | Treatment = "certified",
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> Basins:
     """Compute the basins of attraction of a body under periodic motion on a grid of initial states.
 
@@ -150,8 +147,6 @@ def basins(
         Maximum number of periods per state.
     model, chattering : str, optional
         As in `stroboscopic_map`.
-    threads, progress : int or bool, optional
-        As in `rocking.simulate_many`.
 
     Returns
     -------
@@ -193,17 +188,16 @@ def basins(
     sensible(v, "velocities")
     checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
     most = checks.whole(periods, "periods", InvalidOption, least=1)
-    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
-    work = _Grid(strobe, x, v, most, cores() if count is None else count)
-    work.run(progress)
+    work = _Grid(strobe, x, v, most)
+    work.run()
     return Basins(work.dataset())
 
 
 class _Grid:
     """Cells of a grid, and the attractors found so far."""
 
-    def __init__(self, strobe: StroboscopicMap, x: Floats, v: Floats, periods: int, threads: int) -> None:
-        self.strobe, self.x, self.v, self.periods, self.threads = strobe, x, v, periods, threads
+    def __init__(self, strobe: StroboscopicMap, x: Floats, v: Floats, periods: int) -> None:
+        self.strobe, self.x, self.v, self.periods = strobe, x, v, periods
         # Later states of a small grid are as large as others. Comparison within their rounding error would find no
         # attractor.
         size = np.maximum([float(np.ptp(each) or abs(each[0]) or 1.0) for each in (x, v)], scale_of(strobe))
@@ -214,12 +208,12 @@ class _Grid:
         # Raises an error for a start behind or into a stop.
         strobe._states(self.states[[0, -1]], "positions", "velocities")
 
-    def run(self, progress: bool | None) -> None:
+    def run(self) -> None:
         """Follow all cells in a mixed order."""
         count = len(self.outcome)
         cells = np.random.default_rng(0).permutation(count)
         later = range(_BEFORE, count, _BETWEEN)
-        with Progress("basins", count, show=progress) as bar:
+        with Progress("basins", count) as bar:
             for first, last in zip((0, *later), (*later, count), strict=True):
                 self._follow(cells[first:last])
                 bar.advance(last - first)
@@ -227,7 +221,7 @@ class _Grid:
     def _follow(self, cells: Integers) -> None:
         strobe = self.strobe
         _, made = strobe._states(self.states[cells])
-        traps, taken = self.known.settled(made, self.periods, self.threads)
+        traps, taken = self.known.settled(made, self.periods)
         outcome = np.where(traps >= 0, _FIRST + np.append(self.known.owner, 0)[traps], _UNSETTLED)
         over = made["ending"] == Fate.OVERTURNED
         outcome[over] = np.where(made["side"][over] > 0, _TO_MINUS, _TO_PLUS)

@@ -150,7 +150,6 @@ def bifurcation_diagram(
     parameter: str = "parameter",
     model: Model | None = None,
     chattering: str | Treatment = "certified",
-    progress: bool | None = None,
 ) -> BifurcationDiagram:
     """Compute the long-term states of orbits of a body under periodic motion against a parameter.
 
@@ -172,8 +171,6 @@ def bifurcation_diagram(
         Name of the parameter with its unit, for tables and figures.
     model, chattering : str, optional
         As in `stroboscopic_map`.
-    progress : bool, optional
-        As in `rocking.simulate_many`.
 
     Returns
     -------
@@ -238,7 +235,7 @@ def bifurcation_diagram(
     ends = [_map_of(case(float(each)), model, chattering) for each in levels[[0, -1]]]
     for strobe in ends:
         strobe.checked_starts(first, "starts")  # raises an error for a start behind a stop
-    with Progress("bifurcation diagram", len(ways) * levels.size, show=progress) as bar:
+    with Progress("bifurcation diagram", len(ways) * levels.size) as bar:
         for start in range(0, levels.size, _CHUNK):
             chunks = [(w, each[start : start + _CHUNK]) for w, each in order.items()]
             for done in in_threads(follow, [(0, [k]) for k in chunks[0][1]] if afresh else chunks):

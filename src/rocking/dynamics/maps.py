@@ -14,7 +14,7 @@ from rocking.block.sides import in_line
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers, ranges
 from rocking.core.constants import MODELS, Model
-from rocking.core.threads import cores, in_threads
+from rocking.core.threads import in_threads
 from rocking.dynamics.bodies import LinearBody
 from rocking.engine.problem import FASTEST, one_body, set_start
 from rocking.engine.tasks import Setup
@@ -324,7 +324,7 @@ class StroboscopicMap(PeriodicForcing):
             found, taken = counts[:, part]
             iterate(setting, state.new_scratch(), made[part], periods, orbits[part], traps, found, taken)
 
-        for _ in in_threads(follow, parts_of(len(made), periods), threads=cores()):
+        for _ in in_threads(follow, parts_of(len(made), periods)):
             pass
 
 

@@ -110,9 +110,7 @@ class Task:
     key: tuple[int, ...] = ()  # index of the outcomes for the caller
 
 
-def simulate_tasks(
-    setup: Setup, tasks: Iterable[Task], *, threads: int | None = None
-) -> Iterator[tuple[Task, NDArray[np.void]]]:
+def simulate_tasks(setup: Setup, tasks: Iterable[Task]) -> Iterator[tuple[Task, NDArray[np.void]]]:
     """Simulate tasks, and yield their outcomes in order: structured arrays (`OUTCOME`), one row per body.
 
     Tasks are consumed as needed, slightly ahead of the results. The outcome of a body depends only on the body and its
@@ -123,7 +121,7 @@ def simulate_tasks(
     def simulated(task: Task) -> tuple[Task, NDArray[np.void]]:
         return task, simulate_task(setup, task, cancelled)
 
-    yield from in_threads(simulated, tasks, threads=threads, cancelled=cancelled)
+    yield from in_threads(simulated, tasks, cancelled=cancelled)
 
 
 def parts_of(count: int, motion: Motion) -> Iterator[slice]:
@@ -132,9 +130,7 @@ def parts_of(count: int, motion: Motion) -> Iterator[slice]:
     yield from ranges(count, size)
 
 
-def simulate_each(
-    setup: Setup, motion: Motion, factors: Floats, *, threads: int | None = None
-) -> Iterator[tuple[Task, NDArray[np.void]]]:
+def simulate_each(setup: Setup, motion: Motion, factors: Floats) -> Iterator[tuple[Task, NDArray[np.void]]]:
     """Yield outcomes of body k under the motion times factor k; bodies with equal factors are simulated together."""
     order = np.argsort(factors, kind="stable")
     starts = np.flatnonzero(np.diff(factors[order], prepend=np.nan) != 0.0)
@@ -142,7 +138,7 @@ def simulate_each(
     tasks = (
         Task(group[part], motion, float(factors[group[0]])) for group in groups for part in parts_of(len(group), motion)
     )
-    yield from simulate_tasks(setup, tasks, threads=threads)
+    yield from simulate_tasks(setup, tasks)
 
 
 def require_finished(unfinished: bool) -> None:

@@ -173,7 +173,7 @@ def _stripes(assessment: Assessment, motion: Motion) -> Floats:
     many = Blocks.of(case.block)
     table = simulate_levels(
         many, [motion], assessment.measure, assessment.levels, model=case.model, chattering=case.treatment,
-        polarity="+" if many.is_symmetric else "both", progress=False,
+        polarity="+" if many.is_symmetric else "both",
     )  # fmt: skip
     if "polarity" not in table.dims:
         table = table.expand_dims("polarity")
@@ -247,7 +247,6 @@ def _margin(case: Case) -> dict[str, Any] | None:
     def fall(factors: Floats) -> Flags:
         table = simulate_levels(
             Blocks.of(case.block), [motion], FACTOR, factors, model=case.model, chattering=case.treatment,
-            progress=False,
         )  # fmt: skip
         return np.asarray(table.overturned.values.ravel())
 

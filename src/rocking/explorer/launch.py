@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
 from rocking.core.progress import note
+from rocking.core.threads import set_options
 from rocking.errors import InvalidOption, install
 from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
 from rocking.response import Response
@@ -58,7 +59,7 @@ class Server:
 
     def run(self) -> None:
         """Serve until interrupted."""
-        with suppress(KeyboardInterrupt):
+        with suppress(KeyboardInterrupt), set_options(progress=False):
             self.server.run(sockets=[self.socket])
 
     def run_in_background(self) -> None:

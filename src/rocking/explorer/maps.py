@@ -121,12 +121,12 @@ def grid_of(case: Case, texts: Texts) -> MapGrid:
     return grid
 
 
-def parts(grid: MapGrid, threads: int | None = None) -> Generator[Part]:
+def parts(grid: MapGrid) -> Generator[Part]:
     """Simulate the points of a grid from coarse to fine, and yield them as they are completed."""
     blocks, factors, scale = _points(grid)
     setup = Setup(blocks, grid.case.model, Certified())
     last: dict[tuple[tuple[float, float], float], float | None] = {}
-    for task, ends in simulate_tasks(setup, _tasks(grid, factors), threads=threads):
+    for task, ends in simulate_tasks(setup, _tasks(grid, factors)):
         chosen = task.bodies
         assert isinstance(chosen, np.ndarray)
         alpha = blocks.alpha[chosen]

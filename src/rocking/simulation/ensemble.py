@@ -17,7 +17,6 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
-from rocking.core.threads import cores
 from rocking.engine.problem import bodies_of, settings_of
 from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, parts_of, simulate_tasks
 from rocking.engine.treatment import Treatment, treatment
@@ -278,8 +277,6 @@ def simulate_many(
     duration: float | None = None,
     times: bool = False,
     robust: bool = False,
-    threads: int | None = None,
-    progress: bool | None = None,
 ) -> xr.Dataset:
     """Simulate every block under every motion.
 
@@ -305,9 +302,6 @@ def simulate_many(
     robust : bool
         Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6 (`Response.perturbed`), in
         five times the computing time.
-    threads, progress : int or bool, optional
-        Number of threads (default: one per core), and whether to draw a progress bar (default: if stderr is a terminal
-        and the computation is long).
 
     Returns
     -------
@@ -344,10 +338,10 @@ def simulate_many(
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
     names = (*VARIABLES, *(TIMES if checks.flag(times, "times", InvalidOption) else ()))
     setup = setup_of(product)
-    found = outcomes_of(product, setup, threads, progress, names)
+    found = outcomes_of(product, setup, names)
     if checks.flag(robust, "robust", InvalidOption):
         near = [factor for factor in factors_near(RELATIVE, COUNT) if factor != 1.0]
-        again = [outcomes_of(product, setup, threads, progress, ["overturned"], factor) for factor in near]
+        again = [outcomes_of(product, setup, ["overturned"], factor) for factor in near]
         found["overturned_share"] = np.mean([each["overturned"].astype(bool) for each in (found, *again)], axis=0)
     return dataset_of(product, found)
 
@@ -355,16 +349,13 @@ def simulate_many(
 def outcomes_of(
     product: Product,
     setup: Setup,
-    threads: int | None,
-    progress: bool | None,
     names: Iterable[str] = tuple(VARIABLES),
     near: float = 1.0,
 ) -> dict[str, NDArray[np.generic]]:
     """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME`."""
-    count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
-    with Progress("simulating", math.prod(product.shape), show=progress) as bar:
-        for task, outcomes in simulate_tasks(setup, _tasks(product, near), threads=count):
+    with Progress("simulating", math.prod(product.shape)) as bar:
+        for task, outcomes in simulate_tasks(setup, _tasks(product, near)):
             for name, values in results.items():
                 values[(*task.key, task.bodies)] = outcomes[name]
             bar.advance(len(outcomes))

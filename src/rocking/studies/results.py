@@ -122,11 +122,11 @@ def _selected(store: Store, names: Sequence[str], complete: bool, key: _Selectio
     return [values.squeeze(axis=single) for values in found]
 
 
-def write_table(kind: str, path: str | Path, dataset: xr.Dataset, step: int, progress: bool | None) -> None:
+def write_table(kind: str, path: str | Path, dataset: xr.Dataset, step: int) -> None:
     """Write a row for each simulation or change as CSV or Parquet, in chunks of the first dimension."""
     along = next(iter(dataset.sizes))
     table, count = _for_tables(dataset), max(1, dataset.sizes[along])
-    with Progress("writing", count, show=progress) as bar:
+    with Progress("writing", count) as bar:
 
         def frames() -> Iterator[pd.DataFrame]:
             for part in ranges(count, step):
@@ -341,7 +341,7 @@ def _check_fit(limits: Mapping[str, float], confidence: float) -> None:
         checked_limit(limit, name)
 
 
-def study_spectrum(store: Store, fractiles: Sequence[float], progress: bool | None) -> BlockTable:
+def study_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
     """Compute fractiles of the normalised peak rotation for each scale and block."""
     import xarray as xr
 
@@ -349,7 +349,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float], progress: bool | No
     product, scales, count = store.product, store.product.scales, len(store.product.bodies)
     values = np.empty((len(shares), scales.count, count))
     overturned, missing = np.empty((scales.count, count)), 0
-    with Progress("reading", count, show=progress) as bar:
+    with Progress("reading", count) as bar:
         for blocks, ratios in _peak_ratios(store):
             repeated = _repeated(product.bodies.select(blocks), ratios.shape[2])
             missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
@@ -439,7 +439,6 @@ def block_fragilities(
     limits: Mapping[str, float],
     confidence: float,
     clusters: ArrayLike | None,
-    progress: bool | None,
 ) -> BlockTable:
     """Fit a curve to the outcomes of each block."""
     import xarray as xr
@@ -451,7 +450,7 @@ def block_fragilities(
     intensities, units = _intensities(product, measure).ravel(), units_of(bodies, measure, product.model)
     together = np.repeat(clusters_of(product.motions, clusters), scales)
     fit = partial(fit_fragility, measure=measure, confidence=confidence)
-    with Progress("fitting", len(bodies) * len(limits), show=progress) as bar:
+    with Progress("fitting", len(bodies) * len(limits)) as bar:
         for blocks, ratios in _peak_ratios(store):
             repeated = _repeated(bodies.select(blocks), ratios.shape[2])
             missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))

@@ -31,7 +31,7 @@ from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.tables import counted, write_netcdf
-from rocking.core.threads import cores
+from rocking.core.threads import cores, thread_count
 from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
@@ -154,25 +154,19 @@ class Study:
 
     def run(
         self,
-        threads: int | None = None,
         executor: Executor | Any = None,
         *,
         part: str | None = None,
-        progress: bool | None = None,
     ) -> RunReport:
         """Compute every unit that is not done.
 
         Parameters
         ----------
-        threads : int, optional
-            As for `simulate_many`.
         executor : concurrent.futures.Executor or dask.distributed.Client, optional
             Pool of processes or cluster client that computes instead; only this process writes.
         part : str, optional
             Fixed share of the units, for example "3/10", the third of ten. Different shares may run at the same time,
             on machines with a common file system; a run without a part then computes the missing units.
-        progress : bool, optional
-            As for `simulate_many`.
 
         Returns
         -------
@@ -188,12 +182,11 @@ class Study:
         OutputError
             If a unit cannot be written.
         """
-        number = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
         first, step = (1, 1) if part is None else _part(part)
         self._store.check_program()
         with locked(self.place, shared=part is not None):
             share = [*itertools.islice(self._store.grid, first - 1, None, step)]
-            return _run(self._store, share, number, executor, progress)
+            return _run(self._store, share, executor)
 
     def results(self) -> xr.Dataset:
         """Return the outcomes so far as `simulate_many` does, read lazily from the folder.
@@ -203,9 +196,7 @@ class Study:
         """
         return results_of(self._store)
 
-    def verify(
-        self, recompute: int = 0, *, repair: bool = False, seed: int = 0, progress: bool | None = None
-    ) -> list[str]:
+    def verify(self, recompute: int = 0, *, repair: bool = False, seed: int = 0) -> list[str]:
         """Read and check every unit, and recompute some units bit for bit.
 
         Parameters
@@ -216,8 +207,6 @@ class Study:
             Whether to compute damaged units again and store them.
         seed : int
             Seed of the draw.
-        progress : bool, optional
-            As for `simulate_many`.
 
         Returns
         -------
@@ -234,7 +223,7 @@ class Study:
             store.check_program()
         done = sorted(store.done())
         drawn = {*np.random.default_rng(seed).permutation(len(done))[:recompute].tolist()}
-        with Progress("verifying", len(done), show=progress) as bar:
+        with Progress("verifying", len(done)) as bar:
             for k, key in enumerate(done):
                 try:
                     store.outcomes(key)
@@ -297,7 +286,6 @@ class Study:
         limits: Mapping[str, float] = OVERTURNING,
         confidence: float = 0.9,
         clusters: ArrayLike | None = None,
-        progress: bool | None = None,
     ) -> BlockTable:
         """Fit a fragility curve to the outcomes of each block, with the arguments and errors of `Study.fragility`.
 
@@ -305,17 +293,15 @@ class Study:
         (median_lower, median_upper, ...; SI units), exceeded and outcomes (counts; for a symmetric block of one
         polarity), and fault: the reason why no lognormal fits, or an empty string.
         """
-        return block_fragilities(self._store, Measure.of(measure), limits, confidence, clusters, progress)
+        return block_fragilities(self._store, Measure.of(measure), limits, confidence, clusters)
 
-    def spectrum(self, fractiles: Sequence[float] = (0.16, 0.5, 0.84), *, progress: bool | None = None) -> BlockTable:
+    def spectrum(self, fractiles: Sequence[float] = (0.16, 0.5, 0.84)) -> BlockTable:
         """Compute fractiles of the normalised peak rotation over the motions, for each scale and block.
 
         Parameters
         ----------
         fractiles : sequence of float
             Fractions of the motions, in (0, 1), that stay below.
-        progress : bool, optional
-            As for `simulate_many`.
 
         Returns
         -------
@@ -330,13 +316,13 @@ class Study:
         InvalidOption
             If a fractile is out of its range.
         """
-        return study_spectrum(self._store, fractiles, progress)
+        return study_spectrum(self._store, fractiles)
 
     def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
         """Write the `results`, or the critical scales as `to_csv` does, to a NetCDF file."""
         write_netcdf(path, self.critical_scales(critical) if critical else self.results())
 
-    def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
+    def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
         """Write a CSV row for each simulation, with units in the column names.
 
         Parameters
@@ -345,8 +331,6 @@ class Study:
             File, written atomically.
         critical : {"overturning", "complete_chattering"}, optional
             Write the `critical_scales` of this outcome instead, a row for each change.
-        progress : bool, optional
-            As for `simulate_many`.
 
         Raises
         ------
@@ -355,17 +339,15 @@ class Study:
         StudyError
             If a unit is damaged, or units are missing for critical scales.
         """
-        self._write("csv", path, critical, progress)
+        self._write("csv", path, critical)
 
-    def to_parquet(
-        self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None
-    ) -> None:
+    def to_parquet(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
         """Write the table of `to_csv` as Parquet, with the same arguments and errors; requires pyarrow."""
-        self._write("parquet", path, critical, progress)
+        self._write("parquet", path, critical)
 
-    def _write(self, kind: str, path: str | Path, critical: StudyVerdict | None, progress: bool | None) -> None:
+    def _write(self, kind: str, path: str | Path, critical: StudyVerdict | None) -> None:
         dataset = self.critical_scales(critical) if critical else self.results()
-        write_table(kind, path, dataset, 1 << 16 if critical else self._store.grid.unit[0], progress)
+        write_table(kind, path, dataset, 1 << 16 if critical else self._store.grid.unit[0])
 
     def __repr__(self) -> str:
         names = ("motion", "scale", "polarity", "block")
@@ -467,7 +449,7 @@ def _part(part: str) -> tuple[int, int]:
     return int(number), int(count)
 
 
-def _run(store: Store, share: Sequence[Key], threads: int, executor: Any, progress: bool | None) -> RunReport:
+def _run(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
     """Compute the missing units of a share until SIGTERM."""
     start, grid, pending = time.monotonic(), store.grid, dict[Future[bytes], Key]()
     units, simulations, failed = 0, 0, dict[str, str]()
@@ -476,8 +458,8 @@ def _run(store: Store, share: Sequence[Key], threads: int, executor: Any, progre
     left, total = iter(missing), sum(map(grid.simulations, share))
     before = total - sum(map(grid.simulations, missing))
     with (
-        Progress("simulations", total, show=progress, done=before) as bar,
-        _workers(executor, threads) as (submit, count),
+        Progress("simulations", total, done=before) as bar,
+        _workers(executor) as (submit, count),
         _terminated() as stop,
     ):
         try:
@@ -524,12 +506,12 @@ def _terminated() -> Iterator[threading.Event]:
 
 
 @contextlib.contextmanager
-def _workers(executor: Any, threads: int) -> Iterator[tuple[Callable[[Work], Future[bytes]], Callable[[], int]]]:
+def _workers(executor: Any) -> Iterator[tuple[Callable[[Work], Future[bytes]], Callable[[], int]]]:
     """Yield functions that submit a unit and count the workers; errors stop the threads."""
     if executor is None:
-        cancelled, pool = threading.Event(), ThreadPoolExecutor(threads)
+        cancelled, pool = threading.Event(), ThreadPoolExecutor(thread_count())
         try:
-            yield lambda work: pool.submit(compute, work, cancelled), lambda: threads
+            yield lambda work: pool.submit(compute, work, cancelled), thread_count
         finally:
             cancelled.set()
             pool.shutdown(cancel_futures=True)
