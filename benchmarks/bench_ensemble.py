@@ -20,7 +20,7 @@ import numpy as np
 import rocking
 from rocking.core.constants import Model
 from rocking.engine.problem import ground_of, settings_of
-from rocking.engine.treatment import Certified
+from rocking.engine.schemes import Certified
 from rocking.kernels import lanes, state
 
 ROOT = Path(__file__).resolve().parents[1]

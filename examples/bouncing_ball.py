@@ -21,7 +21,7 @@ e, g, h = 0.8, 9.80665, 1.0
 ball = dynamics.BouncingBall(restitution=e, gravity=g)
 response = dynamics.simulate(ball, None, initial_position=h)
 
-rest = response.chattering[0]
+rest = response.sequences[0]
 closed_form = np.sqrt(2.0 * h / g) * (1.0 + e) / (1.0 - e)
 difference = rest["end"] - closed_form
 resolved = len(response.impacts)

@@ -25,8 +25,8 @@ print(response.summary())
 # The piece comes to rest six times while the ground goes on moving, each time by infinitely many
 # impacts in a finite time. A proof closes each of these sequences, with a bracket on the time of rest.
 
-peak, last = response.peak_over_slenderness, response.chattering[-1]
-rests, bracket = len(response.chattering), last["upper"] - last["lower"]
+peak, last = response.peak_over_slenderness, response.sequences[-1]
+rests, bracket = len(response.sequences), last["upper"] - last["lower"]
 print(f"it turns by {peak:.4f} of its slenderness at most, and rests {rests} times,")
 print(f"the last time at {last['end']:.4f} s; the bracket is {bracket:.0e} s wide")
 

@@ -22,12 +22,12 @@ motion = rocking.pulses.sine(1.05 * block.gravity * block.alpha, 0.5 / np.pi, cy
 
 thresholds = np.geomspace(1e-4, 1e-1, 13)
 certified = rocking.simulate(block, motion, model="linear")
-print(f"certified: {len(certified.chattering)} rests")
+print(f"certified: {len(certified.sequences)} rests")
 responses = [
     rocking.simulate(block, motion, model="linear", chattering=rocking.VelocityThreshold(float(threshold)))
     for threshold in thresholds
 ]
-false_rests = [len(response.chattering) for response in responses]
+false_rests = [len(response.sequences) for response in responses]
 for threshold, rests in zip(thresholds[::4], false_rests[::4], strict=True):
     print(f"threshold {threshold:.1e}: {rests} false rests")
 

@@ -141,7 +141,7 @@ def of_response(response: Any) -> dict[str, Any]:
     """Everything that one simulation found, but for the bracket on the time of a rest."""
     fields = ("outcome", "overturned", "unfinished", "stopped", "overturn_time", "peak_rotation", "peak_time")
     times = np.arange(26) * (response.duration / 25.0)
-    sequences = response.chattering
+    sequences = response.sequences
     return {
         **{name: getattr(response, name) for name in (*fields, "duration", "stalled", "near_ties")},
         "events": {name: response.events[name] for name in ("time", "kind", "side")},
@@ -367,7 +367,7 @@ def chattering_brackets() -> Iterator[Item]:
     bodies = [STATUE, SLENDER, UNEVEN[0], WALL, HELD["spring"][0]]
     between_stops = ((f"{kind}: {label}", response) for kind in BETWEEN for label, response in moved(kind))
     for label, response in (*under(bodies, [*shaking(), *scaled(0.6)]), *between_stops):
-        yield label, {name: response.chattering[name] for name in ("lower", "upper")}
+        yield label, {name: response.sequences[name] for name in ("lower", "upper")}
 
 
 # Responses of restrained blocks
@@ -1049,7 +1049,7 @@ def studies() -> Iterator[Item]:
         folder = Path(name)
         (folder / "study.toml").write_text(STUDY, encoding="utf-8")
         product = read_study(folder / "study.toml").product
-        yield "product", [product.shape, product.model, str(product.treatment)]
+        yield "product", [product.shape, product.model, str(product.chattering)]
         motions = dict(list(suite().items())[:5])
         study = rocking.study(folder / "study", SUITE_BLOCKS, motions, levels=LEVELS, measure="pga")
         with rocking.set_options(threads=1):

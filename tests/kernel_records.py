@@ -78,7 +78,7 @@ def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Reco
 def rules_for(
     *,
     nonlinear: bool = False,
-    treatment: int = state.RestRule.CERTIFIED,
+    rest_rule: int = state.RestRule.CERTIFIED,
     tolerance: float = 1e-12,
     stop: float = math.inf,
     record: bool = True,
@@ -86,7 +86,7 @@ def rules_for(
     return state.record(
         state.SETTINGS,
         nonlinear=nonlinear,
-        treatment=treatment,
+        rest_rule=rest_rule,
         tolerance=tolerance,
         stop=stop,
         no_end_time=stop == math.inf,

@@ -8,8 +8,8 @@ import rocking
 from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, dynamics, simulate, simulate_many
 from rocking.block.body import Bodies, Body
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
-from rocking.engine.treatment import Certified
 
 G = 9.81
 
@@ -104,7 +104,7 @@ def test_a_start_of_next_to_nothing_ends_next_to_at_once(block, rotation):
 def test_a_sequence_begins_after_the_last_impact_at_the_other_stop():
     between = dynamics.ImpactOscillator(1.0, 0.9, stop=-1.0, second_stop=1.001)
     response = dynamics.simulate(between, None, initial_position=1.0, initial_velocity=1.0, duration=20.0)
-    (sequence,) = response.chattering
+    (sequence,) = response.sequences
     others = response.impacts["time"][response.impacts["side"] != response.impacts["side"][-1]]
     assert len(others) > 5 and sequence["start"] > others.max()
 

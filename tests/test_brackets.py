@@ -26,7 +26,7 @@ def test_a_bracket_holds_the_rest_of_a_block_that_starts_next_to_its_balance(mod
         assert (true is None) == response.overturned, given
         if true is None or response.ambiguous:
             continue
-        sequence = response.chattering[0]
+        sequence = response.sequences[0]
         assert math.isfinite(sequence["lower"]) and sequence["lower"] <= sequence["end"] <= sequence["upper"]
         assert sequence["lower"] <= true <= sequence["upper"], (given, float(true))
         judged += 1
@@ -37,7 +37,7 @@ def test_a_bracket_is_without_end_where_rounding_moves_the_rest_as_far_as_the_bl
     """And the response is ambiguous; a rest is still one that is proven."""
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     response = simulate(block, None, initial_rotation=0.2 * (1.0 - 4.0 * ULP))
-    (sequence,) = response.chattering
+    (sequence,) = response.sequences
     assert (sequence["lower"], sequence["upper"]) == (-math.inf, math.inf)
     assert response.ambiguous
     assert "not proven" not in response.summary()
@@ -47,7 +47,7 @@ def test_a_bracket_is_without_end_where_rounding_moves_the_rest_as_far_as_the_bl
 @pytest.mark.parametrize("treatment", ["velocity", "bypass", "interval"])
 def test_other_treatments_have_no_bracket(treatment: str) -> None:
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    found = simulate(block, None, chattering=treatment, initial_rotation=0.1).chattering
+    found = simulate(block, None, chattering=treatment, initial_rotation=0.1).sequences
     assert np.isnan(found["lower"]).all() and np.isnan(found["upper"]).all()
 
 
@@ -57,7 +57,7 @@ def test_a_bracket_is_hardly_wider_where_nothing_is_magnified() -> None:
     for number in range(60):
         response = random_case(7, number, vertical=False).simulate()
         if not response.ambiguous:
-            added += (response.chattering["upper"] - response.solution.sequences["upper"]).tolist()
+            added += (response.sequences["upper"] - response.solution.sequences["upper"]).tolist()
     assert len(added) >= 30 and np.nanmin(added) >= 0.0
     assert np.nanmedian(added) < 1e-13
 
@@ -66,7 +66,7 @@ def test_a_ball_without_restitution_rests_in_its_bracket() -> None:
     """Its last impact has no speed left: the bracket is that of the fall."""
     ball = BouncingBall(restitution=0.0)
     height = 0.5 * ball.gravity * 0.25**2
-    (sequence,) = simulate(ball, None, model="linear", initial_rotation=height).chattering
+    (sequence,) = simulate(ball, None, model="linear", initial_rotation=height).sequences
     assert sequence["lower"] <= math.sqrt(2.0 * height / ball.gravity) <= sequence["upper"] < sequence["lower"] + 1e-14
 
 

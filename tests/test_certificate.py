@@ -25,7 +25,7 @@ def _bits_enough(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 def proofs(response: rocking.Response) -> list[tuple[State, float, float, float]]:
     """Of each sequence: the state at its last resolved impact, where the proof was made; rest, bracket."""
     found = []
-    for sequence in response.chattering:
+    for sequence in response.sequences:
         before = [impact for impact in impacts_of(response) if impact[0] <= sequence["end"]]
         time, side, _, speed = before[-1]
         found.append(((time, side, speed), *(float(sequence[k]) for k in ("end", "lower", "upper"))))
@@ -116,7 +116,7 @@ def test_ball_arithmetic_proves_chattering_from_the_first_certified_impact_on(
 ) -> None:
     case = Case(model, *block, MOTIONS[motion]())
     response = case.simulate()
-    sequence = response.chattering[0]
+    sequence = response.sequences[0]
     ((time, side, _, speed),) = [i for i in impacts_of(response) if i[0] == sequence["start"]]
     rest = balls.rest_enclosure(case.problem, time, side, speed)
     assert balls.within(rest, sequence["end"] - 1e-11, sequence["end"] + 1e-11)

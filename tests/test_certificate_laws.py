@@ -19,12 +19,12 @@ def constant(acceleration: float, error: float = 0.0) -> Motion:
 
 def last_impact_of_the_sequence(response: Response) -> tuple[float, int, float]:
     """Where the proof was made that closed the first sequence."""
-    before = response.impacts[response.impacts["time"] <= response.chattering["end"][0]][-1]
+    before = response.impacts[response.impacts["time"] <= response.sequences["end"][0]][-1]
     return float(before["time"]), int(before["side"]), float(before["speed_after"])
 
 
 def assert_bracket_holds(response: Response, problem: Problem) -> None:
-    sequence = response.chattering[0]
+    sequence = response.sequences[0]
     assert sequence["end"] < LONG
     rest = rest_time(problem, *last_impact_of_the_sequence(response))
     assert mpf(float(sequence["lower"])) <= rest <= mpf(float(sequence["upper"])), (sequence, float(rest))
@@ -73,7 +73,7 @@ def test_a_bracket_holds_for_a_motion_that_changes_within_the_error_at_the_worst
         fast *= e[k] * (strong / weak) ** 0.5
         slow *= e[k] * (weak / strong) ** 0.5
         side = -side
-    sequence = response.chattering[0]
+    sequence = response.sequences[0]
     assert 0.0 < shortest < longest
     assert sequence["lower"] <= time + shortest * (1.0 + 1e-9)
     assert time + longest * (1.0 - 1e-9) <= sequence["upper"]
@@ -90,7 +90,7 @@ def test_no_rest_is_proven_where_the_motion_may_reach_the_threshold(
     response = simulate(
         block, constant(share * threshold, doubt * threshold), model=model, initial_rotation=0.02, duration=10.0
     )
-    proven = ~np.isnan(response.chattering["upper"])
+    proven = ~np.isnan(response.sequences["upper"])
     assert np.any(proven) if provable else not np.any(proven)
 
 
@@ -131,7 +131,7 @@ def test_a_proof_does_not_span_the_uplift_that_follows_a_rest() -> None:
     threshold = 0.2 * GRAVITY
     motion = Motion([0.0, 0.4, 2.0, 4.0], [[1.3 * threshold, 0.0], [0.0, 0.0], [0.0, threshold]])
     response = rocking.simulate(block, motion, model="linear")
-    proven = response.chattering[np.isfinite(response.chattering["upper"])]
+    proven = response.sequences[np.isfinite(response.sequences["upper"])]
     uplifts = response.events["time"][response.events["kind"] == "uplift"]
     assert len(proven) >= 1
     assert uplifts[-1] > proven["start"][0]

@@ -275,7 +275,7 @@ def test_rests_that_are_proven_are_episodes_with_shaking_and_without(motion, opt
     response = rocking.simulate(BLOCK, motion, model="linear", **options)
     found = chattering_episodes(response)
     assert len(found.episodes) == count and np.all(found.episodes["uplift"] == 0.0)
-    assert (len(response.chattering) > 0) == (motion is None or "chattering" in options)
+    assert (len(response.sequences) > 0) == (motion is None or "chattering" in options)
     assert math.isnan(found.share_at_rest) == ("chattering" not in options) and not found.amid_shaking.any()
     assert ("never passes a threshold" in str(found)) == ("chattering" not in options)
 

@@ -84,7 +84,7 @@ def test_impacts_are_those_of_an_independent_integration(seeds):
         times, speeds, last, peak = integrated(body, motion, end, position, velocity)
         found = dynamics.simulate(body, motion, duration=end, initial_position=position, initial_velocity=velocity)
         known = list(zip(times, speeds, strict=True))
-        if len(found.chattering):  # closed by proof before the speed is small
+        if len(found.sequences):  # closed by proof before the speed is small
             known = known[: len(found.impacts)]
         assert len(found.impacts) >= len(known)
         if known:
@@ -150,14 +150,14 @@ def test_positions_are_right_between_the_proof_and_the_rest():
 def test_a_rest_at_the_first_impact_is_proven(restitution):
     ball, motion = dynamics.BouncingBall(restitution, gravity=10.0), pulses.sine(15.0, 2.0, cycles=4)
     dropped = dynamics.simulate(ball, None, initial_position=0.2)
-    assert dropped.stalled == 0 and dropped.chattering["lower"][0] <= 0.2 <= dropped.chattering["upper"][0]
+    assert dropped.stalled == 0 and dropped.sequences["lower"][0] <= 0.2 <= dropped.sequences["upper"][0]
     for body in (
         ball,
         dynamics.InvertedPendulum(2.0, 0.1, restitution),
         dynamics.ImpactOscillator(1.0, restitution, stop=-0.1),
     ):
         found = dynamics.simulate(body, motion, duration=motion.end)
-        rests = found.chattering
+        rests = found.sequences
         assert len(rests) >= 2 and found.stalled == 0 and "not proven" not in found.summary()
         proven = found.solution.sequences
         assert np.all(proven["upper"] - proven["lower"] <= 64.0 * np.spacing(rests["end"]))

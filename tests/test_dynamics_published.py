@@ -47,7 +47,7 @@ def sticking(restitution, sigma, frequency):
     (_, release), *later = response.rest_intervals
     if not later or later[0][0] > release + 0.5 * motion.duration:
         return Sticking(0.0, None)
-    (start, end), row = later[0], response.chattering[0]
+    (start, end), row = later[0], response.sequences[0]
     return Sticking(end - start, (row["lower"] - release, row["upper"] - release))
 
 

@@ -154,7 +154,7 @@ def test_the_first_page_shows_a_block_that_chatters(opened):
     rests = [
         row.query_selector_all("td")[3].text_content() for row in page.page.query_selector_all("#sequences tbody tr")
     ]
-    assert rests == [f"{time:.9f}" for time in response.chattering["end"]]
+    assert rests == [f"{time:.9f}" for time in response.sequences["end"]]
     cells = page.page.locator("#sequences tbody tr:last-child td").all_text_contents()
     assert cells[4] == "± 1.25 s" and cells[5].endswith(" ns")
 
@@ -317,7 +317,7 @@ def test_a_zoom_shows_the_engines_own_values(opened, width):
 def test_ten_times_closer_again_and_again(opened):
     page = opened(STATUE)
     response = statue(0.4 * 9.80665)
-    rest = float(response.chattering["end"][-1])
+    rest = float(response.sequences["end"][-1])
     for _ in range(12):
         before = page.text("#depth")
         page.page.click("#deeper")

@@ -374,7 +374,7 @@ def test_a_window_has_the_engines_own_values_however_narrow_it_is(explorer, widt
 def test_a_window_close_to_a_rest_is_resolved_as_far_as_it_shows(explorer, width):
     case = explorer.show(STATUE).case
     fine = rocking.simulate(case.block, case.motion, chattering=rocking.Certified(1e-40))
-    rest = float(explorer.show(STATUE).response.chattering["end"][-1])
+    rest = float(explorer.show(STATUE).response.sequences["end"][-1])
     payload = explorer.window(STATUE, (rest - width, rest + 0.1 * width))
     start, arrays = payload.header["window"]["from"], payload.arrays
     assert len(arrays["impact"]) == payload.header["window"]["impacts"] > 10
@@ -384,7 +384,7 @@ def test_a_window_close_to_a_rest_is_resolved_as_far_as_it_shows(explorer, width
     coarse = explorer.show(STATUE).response.impacts["time"]
     nearest = np.abs(fine.impacts["time"][:, None] - coarse).min(axis=0)
     assert nearest.max() < 1e-12
-    assert fine.chattering["end"] == pytest.approx(explorer.show(STATUE).response.chattering["end"], abs=1e-12)
+    assert fine.sequences["end"] == pytest.approx(explorer.show(STATUE).response.sequences["end"], abs=1e-12)
 
 
 def test_peaks_survive_the_thinning_of_a_wide_window(explorer):
@@ -420,11 +420,11 @@ def test_ratios_of_intervals_tend_to_the_product_of_both_restitutions(explorer):
 def test_what_a_millionth_of_the_motion_moves_a_rest_by_is_told_beside_its_bracket(explorer):
     rows = explorer.case(STATUE).arrays["sequence"].reshape(-1, 6)
     response = explorer.show(STATUE).response
-    assert np.array_equal(rows[:, 1], response.chattering["end"]) and len(rows) == 4
+    assert np.array_equal(rows[:, 1], response.sequences["end"]) and len(rows) == 4
     moved = []
     for sign in (1.0, -1.0):
         motion = response.motion.scaled(1.0 + sign * 1e-10)
-        moved.append(rocking.simulate(response.block, motion).chattering["end"][:3])
+        moved.append(rocking.simulate(response.block, motion).sequences["end"][:3])
     # Of the three short sequences a change by 1e-10 is linear; the motion drives the block by more than its scale.
     by_scale = 1e4 * 0.5 * np.abs(moved[0] - moved[1])
     assert (rows[:3, 5] >= 0.5 * by_scale).all() and (rows[:3, 5] < 1e-5).all()
@@ -751,8 +751,8 @@ def test_points_and_scripts_of_a_map_are_what_it_shows(texts, axes, tmp_path):
         smaller = min(side.alpha for side in response.block.sides)
         peak = math.inf if response.overturned else response.peak_rotation / smaller
         assert mapped["peak"][row, column] == pytest.approx(peak, rel=1e-4, abs=1e-12)
-        if len(response.chattering):
-            rest = response.chattering["end"][0] - response.events["time"][0]
+        if len(response.sequences):
+            rest = response.sequences["end"][0] - response.events["time"][0]
             assert mapped["rest"][row, column] == pytest.approx(rest, rel=1e-5)
         assert response.block.gravity == grid.case.block.gravity
         judged += 0.0 < peak < math.inf

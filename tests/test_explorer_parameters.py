@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rocking.engine.treatment import treatment
+from rocking.engine.schemes import chattering_scheme
 from rocking.errors import InvalidOption
 from rocking.explorer.parameters import (
     PARAMETERS,
@@ -112,5 +112,7 @@ def test_what_the_page_shows_where_a_text_names_nothing_is_what_the_package_take
             assert values[0] == optional[choice]
             judged += 1
     limited = [each for each in specification()["treatments"] if "limit" in each]
-    assert [float(each["unnamed"]) for each in limited] == [treatment(each["name"]).threshold for each in limited]
+    assert [float(each["unnamed"]) for each in limited] == [
+        chattering_scheme(each["name"]).threshold for each in limited
+    ]
     assert judged >= 2 and len(limited) == 3

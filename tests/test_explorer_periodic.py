@@ -48,7 +48,7 @@ def long_simulation(case, periods):
         case.block,
         motion,
         model=case.model,
-        chattering=case.treatment,
+        chattering=case.chattering,
         duration=periods / given.frequency,
         initial_rotation=case.initial_rotation,
         initial_velocity=case.initial_velocity,

@@ -229,7 +229,7 @@ def judged_after_proofs(body: Any, motion: Motion, start: float) -> int:
         for how in ("certified", VelocityThreshold(1e-8))
     )
     judged = 0
-    for end in proven.chattering["end"]:
+    for end in proven.sequences["end"]:
         closing = proven.impacts["time"][proven.impacts["time"] < end].max()
         times = closing + np.linspace(0.05, 0.6, 12) * (end - closing)
         expected = followed.rotation(times)

@@ -47,7 +47,7 @@ def test_a_response_under_more_gravity_is_the_same(name, model):
     for number in ("peak_rotation", "required_friction", "minimum_normal_force", "duration"):
         assert getattr(one, number) == pytest.approx(getattr(other, number), **close), number
     assert one.balance == pytest.approx(other.balance, **close)
-    lifting = (each.body.uplift_thresholds(model) for each in (one, other))
+    lifting = (each.block.uplift_thresholds(model) for each in (one, other))
     assert K * np.array(next(lifting)) == pytest.approx(np.array(next(lifting)), **close)
     assert one.sensitivity.peak["motion"] == pytest.approx(other.sensitivity.peak["motion"], rel=1e-7)
     for of, at in (("peak", None), ("impact", 1), ("rotation", 1.0)):
@@ -122,7 +122,7 @@ def test_a_level_in_the_unit_of_a_block_lifts_it_under_more_gravity(name, model)
 def test_a_figure_has_the_thresholds_of_both_sides_under_the_weight_of_the_moment(k, model):
     response = rocking.simulate(body_of("free", k), motion_of(k), model=model)
     lines = [line for line in response.plot().axes[1].lines if line.get_label() == "uplift thresholds"]
-    for line, side, sign in zip(lines, response.body.sides, (-1.0, 1.0), strict=True):
+    for line, side, sign in zip(lines, response.block.sides, (-1.0, 1.0), strict=True):
         own = side.alpha if model == "linear" else np.tan(side.alpha)
         weight = 1.0 + response.motion.vertical.acceleration(line.get_xdata()) / (k * G)
         assert sign * line.get_ydata() == pytest.approx(k * own * weight, rel=1e-12)

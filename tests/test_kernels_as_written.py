@@ -43,7 +43,7 @@ def told(response: Any) -> Numbers:
     yield from response.events["time"]
     for impact in list(response.impacts)[:40]:
         yield from (float(impact[name]) for name in impact.dtype.names if name != "side")
-    for each in response.chattering:
+    for each in response.sequences:
         yield from (float(each[name]) for name in ("start", "end", "lower", "upper"))
     times = np.linspace(0.0, response.duration, 7)
     yield from np.ravel(response.states(times))
@@ -77,7 +77,7 @@ def from_above(model: str) -> Numbers:
 
 
 def treatments(model: str) -> Numbers:
-    """Every treatment of chattering."""
+    """Every chattering scheme."""
     motion = pulses.sine(2.6, 1.2, cycles=1.5)
     for words in ("certified", "velocity=5e-2", "interval=1e-2", "bypass=1e-3", "time"):
         yield from told(simulate(STATUE, motion, model=model, chattering=words))

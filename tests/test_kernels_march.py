@@ -73,7 +73,7 @@ def run(
     alpha: Pair = (0.15, 0.15),
     e: Pair = (0.9, 0.9),
     nonlinear: bool = False,
-    treatment: int = state.RestRule.CERTIFIED,
+    rest_rule: int = state.RestRule.CERTIFIED,
     limit: float = 0.0,
     stop: float = math.inf,
     rotation: float = 0.0,
@@ -84,7 +84,7 @@ def run(
 ) -> Run:
     if block is None:
         block = rocking_block(p, alpha, e, nonlinear=nonlinear, limit=limit)
-    rules = rules_for(nonlinear=nonlinear, treatment=treatment, stop=stop, record=keep)
+    rules = rules_for(nonlinear=nonlinear, rest_rule=rest_rule, stop=stop, record=keep)
     table, at, scratch = state.new_table(rows), started(rotation, velocity), new_scratch()
     ending = march(ground, block, rules, table, scratch, at)
     while ending == state.Ending.FULL and len(table) < 200_000:
@@ -320,7 +320,7 @@ def test_a_block_on_its_corner_balances() -> None:
 
 
 def test_intervals_that_time_can_no_longer_tell_apart_end_a_sequence() -> None:
-    found = run(NO_GROUND, velocity=0.1, treatment=state.RestRule.TIME, limit=math.inf)
+    found = run(NO_GROUND, velocity=0.1, rest_rule=state.RestRule.TIME, limit=math.inf)
     exact = run(NO_GROUND, velocity=0.1)
     assert found.at["rests_by_rounding"] == 1
     assert np.isnan(found.sequences["lower"][0])
@@ -329,17 +329,17 @@ def test_intervals_that_time_can_no_longer_tell_apart_end_a_sequence() -> None:
 
 
 @pytest.mark.parametrize(
-    "treatment, limit", [(state.RestRule.VELOCITY, 1e-9), (state.RestRule.INTERVAL, 1e-9), (state.RestRule.TIME, 2.0)]
+    "rest_rule, limit", [(state.RestRule.VELOCITY, 1e-9), (state.RestRule.INTERVAL, 1e-9), (state.RestRule.TIME, 2.0)]
 )
-def test_other_treatments_end_a_sequence_at_their_threshold(treatment: int, limit: float) -> None:
-    found = run(NO_GROUND, velocity=0.1, treatment=treatment, limit=limit)
+def test_other_rest_rules_end_a_sequence_at_their_threshold(rest_rule: int, limit: float) -> None:
+    found = run(NO_GROUND, velocity=0.1, rest_rule=rest_rule, limit=limit)
     assert (found.ending, found.kinds, found.at["rests_by_rounding"]) == (state.Ending.DONE, [state.EventKind.REST], 0)
     measure = {
         state.RestRule.VELOCITY: -found.impacts["speed_after"],
         state.RestRule.INTERVAL: -np.diff(found.impacts["time"], prepend=0.0),
         state.RestRule.TIME: found.impacts["time"],
-    }[treatment]
-    threshold = limit if treatment == state.RestRule.TIME else -limit
+    }[rest_rule]
+    threshold = limit if rest_rule == state.RestRule.TIME else -limit
     assert np.all(measure[:-1] < threshold)
     assert measure[-1] >= threshold
 

@@ -66,7 +66,7 @@ def test_a_ball_on_a_table_at_rest_stops_bouncing_at_zenos_time(e: float, v: flo
 def test_a_geometric_bypass_is_exact_for_a_ball_on_a_table_at_rest(e: float) -> None:
     made = ball(e)
     made["limit"] = 0.05
-    found, zeno = thrown(NO_GROUND, made, 1.0, treatment=state.RestRule.BYPASS), 2.0 / (G * (1.0 - e))
+    found, zeno = thrown(NO_GROUND, made, 1.0, rest_rule=state.RestRule.BYPASS), 2.0 / (G * (1.0 - e))
     assert found.impacts["speed_after"][-2] > 0.05 >= found.impacts["speed_after"][-1]
     assert found.events["time"] == pytest.approx([zeno], rel=1e-13)
     assert np.isnan(found.sequences["upper"]).all()
@@ -76,7 +76,7 @@ def test_a_geometric_bypass_waits_until_the_motion_presses_the_ball_down() -> No
     made = ball(0.5)
     made["limit"] = 1e9
     table = in_units_of_g([0.0, 0.1], [[-1.5, 0.0]])
-    found = thrown(table, made, 0.0, treatment=state.RestRule.BYPASS)
+    found = thrown(table, made, 0.0, rest_rule=state.RestRule.BYPASS)
     start, v = 0.1, 0.5 * G * 0.1  # the table falls away and stops, and the ball comes down on it
     u = 0.25 * G * 0.1 * 0.1
     speed = 0.5 * math.sqrt(v * v + 2.0 * G * u)

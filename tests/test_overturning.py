@@ -12,8 +12,8 @@ import rocking
 from rocking.analysis.levels import boundaries
 from rocking.analysis.overturning import PULSES, mode_name, overturning_map
 from rocking.block import Blocks
+from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, simulate_each
-from rocking.engine.treatment import Certified
 from rocking.inputs.pulses import FAMILIES
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -211,7 +211,7 @@ def test_blocks_that_each_have_their_own_scaling_do_what_simulate_says():
                 assert outcome["overturned"] == response.overturned
                 assert outcome["peak_rotation"] == response.peak_rotation
                 assert outcome["impacts"] == len(response.impacts)
-                assert outcome["rests"] == len(response.chattering)
+                assert outcome["rests"] == len(response.sequences)
 
 
 def test_a_map_that_never_overturns_has_no_overturning_amplitude():

@@ -98,7 +98,7 @@ def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     figure = free.plot(longest_sequence=True)
     (points,) = figure.axes[1].lines
     to_rest, intervals = points.get_data()
-    (sequence,) = free.chattering
+    (sequence,) = free.sequences
     times = free.impacts["time"][free.impacts["time"] >= sequence["start"]]
     np.testing.assert_allclose(to_rest, 0.5 * (sequence["lower"] + sequence["upper"]) - times[:-1], rtol=1e-9)
     np.testing.assert_array_equal(intervals, np.diff(times))

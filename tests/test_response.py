@@ -52,7 +52,7 @@ def test_rotation_is_continuous_and_its_derivatives_agree(shaken):
 
 def test_rotation_vanishes_at_impacts_and_speeds_match(shaken):
     times = shaken.impacts["time"]
-    early = times < shaken.chattering["start"][0] if len(shaken.chattering) else np.ones(len(times), bool)
+    early = times < shaken.sequences["start"][0] if len(shaken.sequences) else np.ones(len(times), bool)
     times = times[early]
     assert np.max(np.abs(shaken.rotation(times))) < 1e-14
     after = shaken.angular_velocity(np.nextafter(times, np.inf))
@@ -100,7 +100,7 @@ def test_a_response_that_nobody_can_know_is_flagged():
 def test_tolerance_sets_the_width_of_the_bracket(block):
     motion = sine(1.03, 2.0, block)
     for tolerance in (1e-4, 1e-7, 1e-11):
-        rows = simulate(block, motion, model="linear", chattering=Certified(tolerance)).chattering
+        rows = simulate(block, motion, model="linear", chattering=Certified(tolerance)).sequences
         assert np.all(rows["upper"] - rows["lower"] <= tolerance + 1e-12)  # and the rounding before the proof
         assert np.all((rows["lower"] <= rows["end"]) & (rows["end"] <= rows["upper"]))
 
@@ -108,10 +108,10 @@ def test_tolerance_sets_the_width_of_the_bracket(block):
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 def test_a_tolerance_below_all_rounding_proves_the_rest_that_a_wider_one_proves(model):
     block = Block(width=0.4, height=2.0)
-    (known,) = simulate(block, None, model=model, initial_rotation=0.05).chattering
+    (known,) = simulate(block, None, model=model, initial_rotation=0.05).sequences
     for tolerance in (1e-30, 1e-80, 1e-300):
         found = simulate(block, None, model=model, initial_rotation=0.05, chattering=Certified(tolerance))
-        (row,), (proof,) = found.chattering, found.solution.sequences
+        (row,), (proof,) = found.sequences, found.solution.sequences
         assert found.stalled == 0
         assert row["start"] == known["start"]
         assert row["lower"] <= proof["lower"] <= row["end"] <= proof["upper"] <= row["upper"]
@@ -207,7 +207,7 @@ def test_of_equal_maxima_of_a_motion_that_comes_again_the_first_has_the_time(mod
         times = rocking.simulate_many(many, motion, model=model).peak_time.values.ravel()
         assert 0.0 < one.peak_time < len(again) * step
         assert times == pytest.approx(one.peak_time, abs=1e-12)
-        judged += len(one.chattering) >= 3 and not one.overturned
+        judged += len(one.sequences) >= 3 and not one.overturned
     assert judged >= 2
 
 

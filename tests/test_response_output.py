@@ -20,7 +20,7 @@ from rocking.rules import Check
 TABLES = {
     "events": ["time_s", "kind", "side"],
     "impacts": ["time_s", "side", "speed_before_rad_s", "speed_after_rad_s"],
-    "chattering": ["start_s", "end_s", "lower_s", "upper_s", "impacts"],
+    "sequences": ["start_s", "end_s", "lower_s", "upper_s", "impacts"],
 }
 
 
@@ -88,7 +88,7 @@ def test_the_dictionary_is_plain_and_names_its_units(shaken, fallen):
         assert result["block"]["p_rad_s"][0] == response.block.sides[0].p
         assert result["impacts_resolved"] == len(response.impacts)
         assert [event["time_s"] for event in result["events"]] == response.events["time"].tolist()
-        assert [row["lower_s"] for row in result["chattering"]] == response.chattering["lower"].tolist()
+        assert [row["lower_s"] for row in result["sequences"]] == response.sequences["lower"].tolist()
     assert shaken.to_dict()["motion"]["pga_m_s2"] == shaken.motion.pga
     assert shaken.to_dict()["tipping_time_s"] is None
     assert fallen.to_dict()["tipping_time_s"] == fallen.tipping_time

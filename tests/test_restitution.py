@@ -137,7 +137,7 @@ def test_draws_are_even_between_their_bounds():
 def test_a_restitution_that_may_be_one_on_both_sides_proves_nothing():
     lively = RestrainedBlock(COLUMN, restitution=Restitution(1.0, 0.9, seed=2))
     found = rocking.simulate(lively, None, initial_rotation=0.1, duration=9.0)
-    assert not len(found.chattering)
+    assert not len(found.sequences)
     assert len(found.impacts) >= 10
 
 
@@ -148,7 +148,7 @@ def test_bounds_that_meet_are_a_constant():
         count = min(len(found.impacts), len(plain.impacts), 30)
         assert count == 30
         assert np.array_equal(found.impacts["time"][:count], plain.impacts["time"][:count])
-        rest, known = found.chattering[0], plain.chattering[0]
+        rest, known = found.sequences[0], plain.sequences[0]
         assert rest["lower"] - 1e-12 <= known["upper"] and known["lower"] - 1e-12 <= rest["upper"]
 
 

@@ -68,10 +68,10 @@ def test_rest_is_proven_where_impacts_accumulate(kind, model):
         options = {"initial_rotation": start or 0.05 * min(*ours.balance, 0.5), "model": model}
         wide = rocking.simulate(ours, shaken, chattering=rocking.Certified(1e-4), **options)
         stepped = rocking.simulate(ours, shaken, chattering=rocking.VelocityThreshold(1e-13), **options)
-        if wide.overturned or not len(wide.chattering):
+        if wide.overturned or not len(wide.sequences):
             continue
         end = stepped.events["time"][stepped.events["kind"] == "rest"][0]
-        first, fine = wide.chattering[0], rocking.simulate(ours, shaken, **options).chattering[0]
+        first, fine = wide.sequences[0], rocking.simulate(ours, shaken, **options).sequences[0]
         assert first["lower"] - 1e-11 <= end <= first["upper"] + 1e-11, number
         assert first["lower"] <= fine["lower"] <= fine["upper"] <= first["upper"], number
         assert fine["upper"] - fine["lower"] <= 1e-10
@@ -249,7 +249,7 @@ def test_without_a_restraint_it_is_the_block_bit_for_bit(block, model, sign, ver
     assert held.uplift_thresholds(model) == block.uplift_thresholds(model)
     for motion in motions:
         found, expected = (rocking.simulate(each, motion, **options) for each in (held, block))
-        for table in ("events", "impacts", "chattering"):
+        for table in ("events", "impacts", "sequences"):
             assert getattr(found, table).tobytes() == getattr(expected, table).tobytes()
         times = np.linspace(0.0, found.duration, 200)
         assert np.array_equal(found.states(times), expected.states(times))

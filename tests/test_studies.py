@@ -426,7 +426,7 @@ def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
     [
         ({"levels": [2.0, 4.5]}, "scales/values"),
         ({"model": "nonlinear"}, "rules/model"),
-        ({"chattering": "velocity"}, "rules/treatment"),
+        ({"chattering": "velocity"}, "rules/chattering"),
         ({"duration": 3.0}, "rules/duration"),
         ({"polarity": "-"}, "rules/polarity"),
         ({"measure": "pgv"}, "scales/measure"),

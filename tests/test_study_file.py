@@ -80,7 +80,7 @@ def test_a_file_is_the_product_that_it_describes(file):
     np.testing.assert_allclose(np.unique(product.blocks.alpha), [np.deg2rad(10.0), 0.2])
     assert [round(motion.pga / 9.80665, 6) for motion in product.motions[1:]] == [0.3, 0.3, 0.5, 0.5]
     assert product.model == "linear"
-    assert product.treatment == rocking.Certified(1e-9)
+    assert product.chattering == rocking.Certified(1e-9)
     assert product.scales.values.tolist() == [0.5, 1.0]
 
 

@@ -1,4 +1,4 @@
-"""Every treatment of chattering against the certified response: right where it is, and shown wrong where not."""
+"""Every chattering scheme against the certified response: right where it is, and shown wrong where not."""
 
 import math
 import runpy
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking.chattering import chattering_time
-from rocking.engine.treatment import treatment
+from rocking.engine.schemes import chattering_scheme
 from rocking.errors import OutsideFit
 
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks/bench_schemes.py"))
@@ -122,18 +122,18 @@ def test_the_asymptotic_time_counts_in_the_model_s_own_threshold():
     motion = sine(1.03, threshold=block.uplift_thresholds("nonlinear")[0])
     response = rocking.simulate(block, motion, model="nonlinear", chattering="time")
     assert response.stalled == 0
-    assert len(response.chattering) == 5
+    assert len(response.sequences) == 5
 
 
 def test_a_treatment_is_made_of_its_name_and_parameter():
-    assert treatment("time=exact") == rocking.AsymptoticTime("exact")
-    assert treatment("interval=1e-6") == rocking.IntervalThreshold(1e-6)
+    assert chattering_scheme("time=exact") == rocking.AsymptoticTime("exact")
+    assert chattering_scheme("interval=1e-6") == rocking.IntervalThreshold(1e-6)
     for wrong, sentence in (
         ("time=eq78", "eq76, eq77, exact"),
         ("velocity=x", "one number"),
     ):
         with pytest.raises(rocking.InvalidOption, match=sentence):
-            treatment(wrong)
+            chattering_scheme(wrong)
 
 
 def test_a_coarse_threshold_hides_overturning():
@@ -174,7 +174,7 @@ def test_blocks_that_rest_together_are_lifted_together(lobes, omega, eta, thresh
         assert lifted(outcome.response, rest) == pytest.approx(lifted(certified, proven), abs=1e-12)
     # Each certified rest has exactly one counterpart, or is missed.
     assert len(np.unique(outcome.certified[true])) == np.count_nonzero(true)
-    assert np.count_nonzero(true) + outcome.missed.size == len(certified.chattering)
+    assert np.count_nonzero(true) + outcome.missed.size == len(certified.sequences)
 
 
 def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():

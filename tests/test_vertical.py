@@ -301,7 +301,7 @@ def test_extreme_forces_hold_those_of_the_last_impacts_before_a_rest(seed: int) 
     """Also of the impacts that are closed by proof: where forces change until the rest, the last are extreme."""
     block, motion = small_record(seed)
     response, judged = rocking.simulate(block, motion), 0
-    for row in response.chattering:
+    for row in response.sequences:
         rest = float(row["end"])
         for side in (1, -1):
             horizontal, vertical = forces_before_rest(block, motion, rest, side)
@@ -381,7 +381,7 @@ def test_a_jump_beyond_one_threshold_lifts_off_though_the_other_is_only_reached(
 @pytest.mark.parametrize("seed", [86, 263])
 def test_extreme_forces_hold_the_impacts_up_to_a_duration_that_ends_before_their_rest(seed: int) -> None:
     block, motion = small_record(seed)
-    rest = float(rocking.simulate(block, motion).chattering["end"][0])
+    rest = float(rocking.simulate(block, motion).sequences["end"][0])
     before, after = (rocking.simulate(block, motion, duration=rest + shift) for shift in (-1e-9, 1e-9))
     assert before.moves_at_end and not after.moves_at_end
     assert before.minimum_normal_force == pytest.approx(after.minimum_normal_force, abs=1e-7)

@@ -156,7 +156,7 @@ def solved(case: dict[str, Any]) -> dict[str, Any] | None:
     certified, followed = simulated(case, "certified"), simulated(case, rocking.VelocityThreshold(1e-8))
     if certified.overturned or certified.stalled or certified.unfinished:
         return None
-    ends = certified.chattering["end"]
+    ends = certified.sequences["end"]
     rests = ends[ends <= case["duration"]]
     times = followed.impacts["time"]
     over = [bool(np.any((a < rests) & (rests <= b))) for a, b in pairwise(times)]
@@ -177,7 +177,7 @@ def bracketed(case: dict[str, Any]) -> list[dict[str, float]] | None:
     if {"events", "touch"} & set(found.ambiguities):
         return None
     change = found.sensitivity.events[found.events["kind"] == "rest"]
-    rows = found.chattering[found.chattering["end"] <= case["duration"]]
+    rows = found.sequences[found.sequences["end"] <= case["duration"]]
     wide = ROUNDING * (rows["end"] + sum(np.abs(change[name]) for name in change.dtype.names))
     columns = rows["end"], rows["lower"] - wide, rows["upper"] + wide
     return [dict(zip(("time", "lower", "upper"), map(float, row), strict=True)) for row in zip(*columns, strict=True)]

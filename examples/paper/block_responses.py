@@ -26,7 +26,7 @@ from sketches import Box, Flowchart, Way, block_figure, flowchart_figure
 
 from rocking.chattering.duration import chattering_time, critical_amplitude
 from rocking.core.arrays import Floats
-from rocking.engine.treatment import AsymptoticTime, Certified, Treatment, VelocityThreshold
+from rocking.engine.schemes import AsymptoticTime, Certified, ChatteringScheme, VelocityThreshold
 from rocking.response import Response
 
 #: Amplitude of Fig. 11.
@@ -44,11 +44,11 @@ _BLOCK: Final = ("p", "alpha")
 
 
 class _Scheme(NamedTuple):
-    """A scheme: what it is called in statements and in legends, and the treatment."""
+    """A scheme: what it is called in statements and in legends, and the scheme."""
 
     words: str
     label: str
-    treatment: Treatment
+    scheme: ChatteringScheme
 
 
 _SCHEMES: Final = {
@@ -195,7 +195,7 @@ def figure_11(
 
 
 def _responses(case: BlockUnderSine, names: tuple[str, ...]) -> dict[str, Response]:
-    return {name: case.simulated(_SCHEMES[name].treatment) for name in names}
+    return {name: case.simulated(_SCHEMES[name].scheme) for name in names}
 
 
 def _history(

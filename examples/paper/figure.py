@@ -24,7 +24,7 @@ from rocking.chattering.expansions import (
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import write_figure
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
@@ -95,10 +95,10 @@ class BlockUnderSine:
         """Return the sine."""
         return pulses.sine(self.a * self.block().gravity * self.alpha, 1.0 / self.period, cycles=CYCLES)
 
-    def simulated(self, treatment: str | Treatment) -> Response:
+    def simulated(self, scheme: str | ChatteringScheme) -> Response:
         """Response of the linear model over the duration of the excitation; the block must not overturn."""
         motion = self.excitation()
-        response = simulate(self.block(), motion, model="linear", chattering=treatment, duration=motion.duration)
+        response = simulate(self.block(), motion, model="linear", chattering=scheme, duration=motion.duration)
         if response.overturned:
             raise InvalidOption(f"the block overturns under a sine of {{}} = {self.a:g}: take a smaller one", "a")
         if not len(response.impacts):

@@ -30,12 +30,12 @@ from .calibration.tables import read_tests
 from .calibration.validate import ModelValidation, ShakeTest, validate
 from .core.result import DatasetResult, Result, Row
 from .core.threads import set_options
-from .engine.treatment import (
+from .engine.schemes import (
     AsymptoticTime,
     Certified,
+    ChatteringScheme,
     GeometricBypass,
     IntervalThreshold,
-    Treatment,
     VelocityThreshold,
 )
 from .errors import (
@@ -73,6 +73,7 @@ __all__ = [
     "Body",
     "Calibration",
     "Certified",
+    "ChatteringScheme",
     "Coordinate",
     "CriticalScale",
     "DamagedStudy",
@@ -117,7 +118,6 @@ __all__ = [
     "StudyError",
     "Tendon",
     "Thrust",
-    "Treatment",
     "UnequalSides",
     "Unfinished",
     "Unfitted",

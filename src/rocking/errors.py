@@ -147,7 +147,7 @@ class UnreadableRecord(RockingError):
 
 
 class InvalidOption(RockingError):
-    """An argument of an analysis (model, chattering treatment, duration, ...) is invalid."""
+    """An argument of an analysis (model, chattering scheme, duration, ...) is invalid."""
 
 
 class Unfitted(InvalidOption):

@@ -14,7 +14,7 @@ from oracles import balance
 import rocking
 from promises.exact import GRAVITY, Side, rest
 from promises.promise import ABOVE_ENSEMBLES, Found, Promise
-from rocking.engine.treatment import Certified
+from rocking.engine.schemes import Certified
 
 #: Cases of a part, some ten seconds of processor time.
 CASES = 400
@@ -86,10 +86,10 @@ def _judge_case(number: int, found: Found) -> None:
         )
         costs.append(len(response.impacts))
         what = f"case {number}, tolerance {tolerance:g} s"
-        if len(response.chattering) != 1 or [event["kind"] for event in response.events] != ["rest"]:
+        if len(response.sequences) != 1 or [event["kind"] for event in response.events] != ["rest"]:
             found.fail(f"{what}: events {response.events.tolist()}, not one rest")
             return
-        sequence, last = response.chattering[0], response.impacts[-1:]
+        sequence, last = response.sequences[0], response.impacts[-1:]
         after = [(float(each["time"]), float(each["speed_after"]), int(each["side"] < 0)) for each in last]
         time, speed, side = after[0] if after else (0.0, abs(velocity), int(velocity < 0.0))
         proven = time + rest(sides, push, speed, side)
@@ -130,7 +130,7 @@ def _judge_near_balance(model: str, number: int, found: Found) -> None:
     elif true is None:
         found.notes["overturned"] += 1
     else:
-        sequence = response.chattering[0]
+        sequence = response.sequences[0]
         if not sequence["lower"] <= true <= sequence["upper"]:
             found.fail(f"{given}: rest at {float(true)!r} s outside [{sequence['lower']!r}, {sequence['upper']!r}] s")
 

@@ -234,7 +234,7 @@ def package(asked: Question) -> tuple[list[float], bool]:
     times = response.impacts["time"] if asked.kind == "impact" else events["time"][events["kind"] == "uplift"]
     found = [float(t) for t in times[: max(len(asked.true), 1)] if t <= asked.until]
     # Of a sequence that is proven to be complete the last impacts are not resolved; its rest is another promise.
-    if asked.kind == "impact" and len(response.chattering) and np.isfinite(response.chattering["lower"][0]):
+    if asked.kind == "impact" and len(response.sequences) and np.isfinite(response.sequences["lower"][0]):
         found += map(float, asked.true[len(response.impacts) :])
     return found, response.ambiguous
 

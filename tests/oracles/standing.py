@@ -376,7 +376,7 @@ def single_and_integrated(kind: str, seed: int, cases: int) -> Judged:
         times, _, peak, ended = integrated(held, motion, end, start, 0.0, 0, rests=True)
         found.cases += 1
         found.impacts += len(times)
-        found.rested += bool(len(response.chattering))
+        found.rested += bool(len(response.sequences))
         fell = ended == "overturned"
         found.overturned += fell
         apart = _peaks_apart(response, fell, peak)

@@ -390,7 +390,7 @@ def _times_to_compare(given: Case, response: rocking.Response) -> list[float]:
 
 def _closest(response: rocking.Response) -> float:
     """Time that is left after the last impact that a response resolves, of all sequences the shortest; a half of it."""
-    ends, times = response.chattering["end"], response.impacts["time"]
+    ends, times = response.sequences["end"], response.impacts["time"]
     left = [end - np.max(times[times <= end], initial=0.0) for end in ends]
     return 0.5 * max(min(left, default=1.0), 1e-9)
 
@@ -505,7 +505,7 @@ class _Judge:
     def found_rockings(self) -> list[Rocking]:
         """From uplift to rest each."""
         response = self.response
-        brackets = iter(response.chattering[["lower", "upper"]].tolist())
+        brackets = iter(response.sequences[["lower", "upper"]].tolist())
         rockings, events, start = [], [], 0.0
         for k, (time, kind, side) in enumerate(response.events.tolist()):
             events.append(Event(time, kind, side, self.events[k], next(brackets) if kind == "rest" else (time, time)))

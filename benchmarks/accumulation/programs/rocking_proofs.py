@@ -18,7 +18,7 @@ SETTINGS = "the certified treatment; it made the cases"
 
 def solve(case: Case) -> dict[str, Any]:
     found = simulated(case.given, "certified")
-    ends = found.chattering["end"]
+    ends = found.sequences["end"]
     impacts = simulated(case.given, "velocity").impacts["time"]
     return {"impacts": impacts[:KEPT].tolist(), "rests": ends[ends <= case.end].tolist(), "penetration": 0.0}
 

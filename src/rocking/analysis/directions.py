@@ -17,8 +17,8 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import as_written, counted, text_table
+from rocking.engine.schemes import ChatteringScheme
 from rocking.engine.tasks import missing_text
-from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
@@ -47,7 +47,7 @@ def response_rose(
     recorded: tuple[float, float] | None = None,
     restitution: float | Sequence[float] | None = None,
     model: Model = "nonlinear",
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
 ) -> ResponseRose:
     """Simulate a body in the plane of every azimuth under the ground motion along it.
 

@@ -50,8 +50,8 @@ from rocking.core.progress import spelled
 from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, counted, text_table, write_text
 from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup, missing_text
-from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidOption, Message, Unfitted
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, several_motions
@@ -333,7 +333,7 @@ def fragility(
     levels: ArrayLike | None = None,
     limits: Mapping[str, float] = OVERTURNING,
     model: Model = "nonlinear",
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
     polarity: Polarity = "+",
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
@@ -433,7 +433,7 @@ def fragility(
         raise
     scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
     factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
-    setup = Setup(many, model, treatment(chattering))
+    setup = Setup(many, model, chattering_scheme(chattering))
     kind = "cloud" if levels is None else counted(len(intensity), "stripe")
     text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
     return Fragility(

@@ -30,8 +30,8 @@ from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
 from rocking.core.tables import as_written, counted, named, text_table
 from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thresholds_of
+from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, missing_text, simulate_each
-from rocking.engine.treatment import Certified
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion, lifting_factors
 from rocking.motion.scaling import IntensityName, Measure
@@ -137,7 +137,7 @@ def incremental_dynamic_analysis(
         for m in np.unique(motion):
             here = motion == m
             factor = level[here] * factors[m, block[here]]
-            # Use the treatment of the levels, which determines how often the restitution is drawn.
+            # Use the scheme of the levels, which determines how often the restitution is drawn.
             setup = Setup(many.select(block[here]), model, Certified())
             for task, outcomes in simulate_each(setup, shaken[m], factor):
                 verdicts[np.flatnonzero(here)[task.bodies]] = outcomes["overturned"]

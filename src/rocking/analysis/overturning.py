@@ -20,8 +20,8 @@ from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, table_of_some, variable
 from rocking.core.tables import as_written, cell, named, records_of, text_table
+from rocking.engine.schemes import Certified
 from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
-from rocking.engine.treatment import Certified
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.inputs.pulses import pulse_family
 from rocking.motion.motion import Motion

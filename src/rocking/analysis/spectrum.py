@@ -20,8 +20,8 @@ from rocking.core.constants import Model
 from rocking.core.result import DatasetResult, table_of_some, variable
 from rocking.core.tables import as_written, named
 from rocking.engine.problem import bodies_of
+from rocking.engine.schemes import ChatteringScheme
 from rocking.engine.tasks import missing_text
-from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.records.named import Motions, several_motions
 from rocking.simulation.ensemble import simulate_many
@@ -52,7 +52,7 @@ def rocking_spectrum(
     weights: ArrayLike | None = None,
     fractiles: Sequence[float] = (0.16, 0.5, 0.84),
     model: Model = "nonlinear",
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
 ) -> RockingSpectrum:
     """Compute peak rotation against the frequency parameter or the size, for a grid or an ensemble.
 
@@ -236,7 +236,7 @@ class RockingSpectrum(DatasetResult):
             **({"verticals": data.vertical.values} if "vertical" in data.coords else {}),
             **({"blocks": data.sizes["block"], "weights": data.weight.values} if self._of_ensemble else {}),
             "model": data.model,
-            "chattering_treatment": data.chattering,
+            "chattering": data.chattering,
             **{named(name, data[name].units): data[name].values for name in _AXES if name in data.coords},
             "axes": axes,
             "fractile_over_alpha": data.fractile_over_alpha.transpose("fractile", *axes).values,

@@ -124,7 +124,7 @@ class Bodies(Protocol):
         """Return a share of the characteristic speed of each side, shape (n, 2): p alpha for a block, rad/s."""
 
     def kernel_records(self, model: Model, limits: Floats) -> Records:
-        """Return records for kernels (`kernels.state.BLOCK`), with speed limits of a treatment, shape (n, 2)."""
+        """Return records for kernels (`kernels.state.BLOCK`), with speed limits of a scheme, shape (n, 2)."""
 
 
 class Kind(Protocol):

@@ -405,7 +405,7 @@ class Restitution:
     seed : int, optional
         Whole number from 0 to 2^53, preferably different for each body. The factor depends only on the seed and the
         number of the impact. Therefore it is the same under any ground motion, for a body alone or among others. After
-        a rest the count continues from the resolved impacts, of which a finer treatment has more.
+        a rest the count continues from the resolved impacts, of which a finer scheme has more.
 
     Raises
     ------

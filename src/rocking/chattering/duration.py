@@ -30,8 +30,8 @@ from rocking.core.bisection import bisected
 from rocking.core.progress import Progress
 from rocking.core.tables import counted
 from rocking.core.threads import in_threads
+from rocking.engine.schemes import critical_amplitudes_by
 from rocking.engine.tasks import require_finished
-from rocking.engine.treatment import critical_amplitudes_by
 from rocking.errors import InvalidOption, Unfinished
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking.block import one_block
 from rocking.chattering.families import Family, SimulationInput
 from rocking.core import checks
 from rocking.core.arrays import Integers, without_dust
@@ -310,11 +311,11 @@ def _simulated(given: SimulationInput) -> _Point:
     if not len(response.events) or last is None:
         return _Point(Outcome.NO_UPLIFT)
     ends = np.zeros(1, OUTCOME)
-    uplift, rests = float(response.events["time"][0]), len(response.chattering)
+    uplift, rests = float(response.events["time"][0]), len(response.sequences)
     ends["uplifts"], ends["rests"], ends["unfinished"] = 1, rests, response.unfinished
     times: dict[str, float] = {}
     if rests:
-        first = response.chattering[0]
+        first = response.sequences[0]
         times = {"rest": float(first["end"]), "lower": float(first["lower"]), "upper": float(first["upper"])}
         # The motion must not exceed a threshold before the upper bound of the rest.
         ends["first_rest"], ends["stalled"] = times["upper"], math.isnan(times["upper"])
@@ -435,7 +436,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
         raise InvalidOption(
             f"{{}} must be a Response, not a {type(response).__name__}: simulate(block, motion) makes one", "response"
         )
-    proven = response.chattering[np.isfinite(response.chattering["upper"])]
+    proven = response.sequences[np.isfinite(response.sequences["upper"])]
     starts = response.events["time"][response.events["kind"] == "uplift"]
     impacts = response.impacts["time"]
     episodes = np.zeros(len(proven), _EPISODE)
@@ -449,7 +450,9 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     if response.motion is None:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     episodes["ground"] = response.motion.acceleration(proven["end"])
-    beyond = exceedances(response.motion, response.block.uplift_thresholds(response.model), response.block.gravity)
+    beyond = exceedances(
+        response.motion, one_block(response.block).uplift_thresholds(response.model), one_block(response.block).gravity
+    )
     if not len(beyond) or beyond[0, 0] >= response.duration:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)

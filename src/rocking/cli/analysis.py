@@ -28,7 +28,7 @@ from rocking.cli.options import (
     MotionOptions,
     Names,
     ReadRecords,
-    TreatmentOptions,
+    SchemeOptions,
     UnscaledOptions,
     ensemble_of,
     labels_of,
@@ -56,7 +56,7 @@ def spectrum(
     fractiles: str = "0.16,0.5,0.84",
     against: Abscissa = "p",
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
+    model: Annotated[SchemeOptions, MODEL] = SchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.

@@ -26,7 +26,7 @@ from rocking.cli.options import (
     MeasureOptions,
     MotionOptions,
     Names,
-    TreatmentOptions,
+    SchemeOptions,
     labels_of,
     limits_of,
 )
@@ -61,7 +61,7 @@ def fragility(
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
+    model: Annotated[SchemeOptions, MODEL] = SchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Fit the probability that a block overturns, or exceeds a rotation, against the intensity of the motions.

@@ -376,16 +376,16 @@ class ModelOptions:
 
 
 @dataclass(frozen=True)
-class TreatmentOptions(ModelOptions):
-    """Equation of motion and treatment of chattering."""
+class SchemeOptions(ModelOptions):
+    """Equation of motion and chattering scheme."""
 
     chattering: Annotated[str, hint(INPUTS["chattering"].help)] = "certified"
 
     def chosen(self) -> dict[str, Any]:
-        """Return model and treatment as arguments."""
-        from rocking.engine.treatment import treatment
+        """Return model and scheme as arguments."""
+        from rocking.engine.schemes import chattering_scheme
 
-        return {"model": self.model, "chattering": treatment(self.chattering)}
+        return {"model": self.model, "chattering": chattering_scheme(self.chattering)}
 
 
 @_with("duration", "initial_rotation", "initial_velocity")

@@ -21,8 +21,8 @@ from rocking.cli.options import (
     ModelOptions,
     MotionOptions,
     Names,
+    SchemeOptions,
     StartOptions,
-    TreatmentOptions,
     read_each,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, PrintOptions, left_out, print_result, subfolder, write_results
@@ -66,7 +66,7 @@ def simulate(
     start: Annotated[_Start, MODEL] = _Start(),
     block: Annotated[HeldOptions, BLOCK] = HeldOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
+    model: Annotated[SchemeOptions, MODEL] = SchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Simulate one block under a record and describe its response; for several records, print one line each.

@@ -18,7 +18,7 @@ from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import as_written, counted, text_table
 from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.maps import StroboscopicMap, described, scale_of, sensible
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import Fate
 from rocking.motion.motion import Motion
@@ -131,7 +131,7 @@ def basins(
     periods: int = 200,
     *,
     model: Model | None = None,
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
 ) -> Basins:
     """Compute the basins of attraction of a body under periodic motion on a grid of initial states.
 

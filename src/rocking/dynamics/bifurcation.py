@@ -23,7 +23,7 @@ from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.bodies import LinearBody
 from rocking.dynamics.maps import TOGETHER, Fate, Scale, StroboscopicMap, described, scale_of, stroboscopic_map
 from rocking.dynamics.orbits import impacts_of
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import stretch
 from rocking.motion.motion import Motion
@@ -149,7 +149,7 @@ def bifurcation_diagram(
     kept: int = 64,
     parameter: str = "parameter",
     model: Model | None = None,
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
 ) -> BifurcationDiagram:
     """Compute the long-term states of orbits of a body under periodic motion against a parameter.
 
@@ -269,7 +269,7 @@ def bifurcation_diagram(
     return BifurcationDiagram(found)
 
 
-def _map_of(pair: Any, model: Model | None, chattering: str | Treatment) -> StroboscopicMap:
+def _map_of(pair: Any, model: Model | None, chattering: str | ChatteringScheme) -> StroboscopicMap:
     if not isinstance(pair, tuple) or len(pair) != 2:
         raise InvalidOption("{} must return a body and one period of a motion", "case")
     return stroboscopic_map(*pair, model=model, chattering=chattering)
@@ -412,7 +412,7 @@ def lyapunov_exponents(
     *,
     transient: int = 200,
     model: Model | None = None,
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
 ) -> LyapunovExponents:
     """Compute both Lyapunov exponents of a body under periodic motion from one orbit.
 

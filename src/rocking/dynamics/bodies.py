@@ -21,7 +21,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, as_asked
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.problem import never_rests
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 from rocking.motion.motion import Motion
@@ -407,6 +407,12 @@ class Response(rocking.response.Response):
     """
 
     @property
+    def body(self) -> LinearBody:
+        """The body."""
+        assert isinstance(self.block, LinearBody)
+        return self.block
+
+    @property
     def peak_position(self) -> float:
         """Highest position, m; exactly the position of the second stop once the body has reached it."""
         return self.peak_rotation
@@ -429,7 +435,7 @@ def simulate(
     body: LinearBody,
     motion: Motion | None,
     *,
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
     duration: float | None = None,
     initial_position: float | None = None,
     initial_velocity: float = 0.0,
@@ -442,7 +448,7 @@ def simulate(
         Body to simulate.
     motion : Motion or None
         Acceleration of the table (positive upwards) or the support; None for free motion.
-    chattering : str or treatment
+    chattering : str or ChatteringScheme
         As in `rocking.simulate`, with velocity thresholds in m/s. By default rest is proven.
     duration : float, optional
         End time, s. By default rest after the motion, or the end of the motion if the body need not come to rest.

@@ -18,7 +18,7 @@ from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, cell, counted, named, text_table
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, peak_of, sizes_of
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 
@@ -50,7 +50,7 @@ class Bifurcation(NamedTuple):
     ----------
     kind : str
         "fold", "flip", "symmetry breaking", "branch point" (crossing of another branch), "grazing", "loss of complete
-        chattering", "uplift", "overturning", or "start of rest" (only if the treatment imposes rest, because complete
+        chattering", "uplift", "overturning", or "start of rest" (only if the scheme imposes rest, because complete
         chattering does not begin on a branch, whose orbits have finitely many impacts).
     value : float
         Value of the parameter.
@@ -112,7 +112,7 @@ class Branch(Result):
     name: str
     unit: str
     model: Model
-    treatment: Treatment
+    chattering: ChatteringScheme
     limits: tuple[float, float]
     period: int
     values: Floats
@@ -135,7 +135,7 @@ class Branch(Result):
         """Return the orbit at a point of the branch, with its multipliers."""
         index = checks.whole(index, "index", InvalidOption, least=-len(self), most=len(self) - 1)
         body, motion = self.family(float(self.values[index]))
-        return orbit_at(StroboscopicMap(body, motion, self.model, self.treatment), self.states[index], self.period)
+        return orbit_at(StroboscopicMap(body, motion, self.model, self.chattering), self.states[index], self.period)
 
     def _headline(self) -> str:
         impacts = "complete chattering" if math.isinf(self.impacts) else counted(int(self.impacts), "impact")

@@ -133,7 +133,7 @@ def continue_orbit(
     points = [*reversed(backward.points), *forward.points[1:]]
     values, states, multipliers, peaks = (np.array(column) for column in zip(*points, strict=True))
     return Branch(
-        family, name, unit, orbit.model, orbit.treatment, (low, high), orbit.period, values, states, multipliers,
+        family, name, unit, orbit.model, orbit.chattering, (low, high), orbit.period, values, states, multipliers,
         orbit.impacts, peaks, (*reversed(backward.bifurcations), *forward.bifurcations), (backward.end, forward.end),
     )  # fmt: skip
 

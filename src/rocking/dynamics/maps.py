@@ -17,8 +17,8 @@ from rocking.core.constants import MODELS, Model
 from rocking.core.threads import in_threads
 from rocking.dynamics.bodies import LinearBody
 from rocking.engine.problem import FASTEST, one_body, set_start
+from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup
-from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
@@ -41,7 +41,7 @@ _ALMOST: Final = 1.0 - 2.0**-40
 class PeriodicForcing:
     """Body under periodic motion, in the form that kernels accept."""
 
-    def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | Treatment) -> None:
+    def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | ChatteringScheme) -> None:
         given = one_motion(motion)
         if given is None:
             raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")
@@ -53,12 +53,12 @@ class PeriodicForcing:
         if model is not None:
             checks.one_of(model, "model", InvalidOption, MODELS)
             self.model = model
-        self.treatment = treatment(chattering)
+        self.chattering = chattering_scheme(chattering)
         self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
         if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
             raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
         self._ground = repeated(self.motion, self.body.gravity)
-        run = Setup(self.bodies, self.model, self.treatment, self.period).run(self.motion, ground=self._ground)
+        run = Setup(self.bodies, self.model, self.chattering, self.period).run(self.motion, ground=self._ground)
         self._records, self._settings = run.records, run.settings
         self._settings["stop"], self._settings["no_end_time"] = np.inf, True
         if np.any(self._records["yielding"]):
@@ -218,8 +218,8 @@ class StroboscopicMap(PeriodicForcing):
 
     Attributes
     ----------
-    body, motion, model, treatment
-        Body, one period of the motion, model, and treatment of chattering.
+    body, motion, model, chattering
+        Body, one period of the motion, model, and chattering scheme.
     period : float
         Period of the motion, s.
 
@@ -332,7 +332,7 @@ class HalfMap(StroboscopicMap):
     """Map of a mirrored body under an antisymmetric motion to the mirror image of its state half a period later."""
 
     def __init__(self, strobe: StroboscopicMap) -> None:
-        super().__init__(strobe.body, strobe.motion, strobe.model, strobe.treatment)
+        super().__init__(strobe.body, strobe.motion, strobe.model, strobe.chattering)
         motion = strobe.motion
         middle = int(np.argmin(np.abs(motion.breakpoints - motion.breakpoints[0] - 0.5 * self.period)))
         half = Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
@@ -380,7 +380,7 @@ def _signs(side: NDArray[np.int64]) -> Floats:
 
 
 def stroboscopic_map(
-    body: Body, motion: Motion, *, model: Model | None = None, chattering: str | Treatment = "certified"
+    body: Body, motion: Motion, *, model: Model | None = None, chattering: str | ChatteringScheme = "certified"
 ) -> StroboscopicMap:
     """Create the map of a body under periodic motion from one period to the next.
 
@@ -392,7 +392,7 @@ def stroboscopic_map(
         One period of the motion, for example ``pulses.sine(a, f, cycles=1)``.
     model : {"nonlinear", "linear"}, optional
         Equation of motion; by default nonlinear for a rocking body.
-    chattering : str or treatment
+    chattering : str or ChatteringScheme
         As in `rocking.simulate`.
 
     Returns

@@ -21,7 +21,7 @@ from rocking.core.constants import Model
 from rocking.dynamics.branches import Bifurcation
 from rocking.dynamics.maps import Fate, HalfMap, StroboscopicMap, is_mirrored, scale_of
 from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at, peak_of, response_of
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 from rocking.response import Response
@@ -81,7 +81,7 @@ class OrbitEquations:
 
     family: Callable[[float], tuple[Body, Motion]]
     model: Model
-    treatment: Treatment
+    chattering: ChatteringScheme
     period: int
     sizes: Floats
     kind: Kind
@@ -107,14 +107,14 @@ class OrbitEquations:
             raise InvalidOption(
                 "{} must be a function of the parameter that returns a body and one period of a motion", "family"
             )
-        strobe = StroboscopicMap(*pair, orbit.model, orbit.treatment)
+        strobe = StroboscopicMap(*pair, orbit.model, orbit.chattering)
         scale = scale_of(strobe)
         if not np.all(np.abs(strobe(orbit.state, orbit.period) - orbit.state) / scale < 1e-8):
             raise InvalidOption(
                 f"the orbit is none of what {{}} makes at {{}} = {value:g}", "family", "value", value=value
             )
         sizes, kind = np.array([*scale, limits[1] - limits[0]]), kind_of(strobe, orbit.state, orbit.period)
-        made = cls(family, orbit.model, orbit.treatment, orbit.period, sizes, kind, limits)  # type: ignore[arg-type]
+        made = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, limits)  # type: ignore[arg-type]
         made.by_half = orbit.symmetric and not orbit.rests and made.stays_mirrored(value)
         return made
 
@@ -124,7 +124,7 @@ class OrbitEquations:
             breaks, rows = motion.breakpoints, np.roll(motion.coefficients, -k, axis=0)
             later = np.concatenate([breaks[k:] - breaks[k], breaks[1 : k + 1] + (breaks[-1] - breaks[k])])
             motion = Motion(later, rows, motion.name, motion.description, error=motion.error)
-        return StroboscopicMap(body, motion, self.model, self.treatment)
+        return StroboscopicMap(body, motion, self.model, self.chattering)
 
     def _half(self, value: float) -> HalfMap:
         strobe = self.strobe(value)
@@ -228,7 +228,7 @@ class OrbitEquations:
         """Create the bifurcation near a point, between scaled values of the parameter."""
         bracket = sorted(float(each * self.sizes[2]) for each in values)
         value = self.physical(z)[1]
-        strobe = StroboscopicMap(*self.family(value), self.model, self.treatment)
+        strobe = StroboscopicMap(*self.family(value), self.model, self.chattering)
         return Bifurcation(kind, value, (bracket[0], bracket[-1]), orbit_at(strobe, self.state(z), self.period))
 
     def located(self, kind: str, z: Floats, tangent: Floats, length: float, number: int) -> Bifurcation | None:

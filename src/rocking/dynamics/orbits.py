@@ -18,7 +18,7 @@ from rocking.core.result import Result, Row, text_of
 from rocking.core.tables import Column, as_written, counted, named, plain
 from rocking.dynamics.bodies import LinearBody, in_positions
 from rocking.dynamics.maps import StroboscopicMap, is_mirrored, mean_size, scale_of
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
@@ -49,8 +49,8 @@ class PeriodicOrbit(Result):
 
     Attributes
     ----------
-    body, motion, model, treatment
-        Body, one period of the motion, model, and treatment of chattering.
+    body, motion, model, chattering
+        Body, one period of the motion, model, and chattering scheme.
     state : ndarray, shape (2,)
         Coordinate and velocity at the start of a period of the motion.
     period : int
@@ -74,7 +74,7 @@ class PeriodicOrbit(Result):
     body: Body
     motion: Motion
     model: Model
-    treatment: Treatment
+    chattering: ChatteringScheme
     state: Floats
     period: int
     impacts: float
@@ -104,7 +104,7 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def _map(self) -> StroboscopicMap:
-        return StroboscopicMap(self.body, self.motion, self.model, self.treatment)
+        return StroboscopicMap(self.body, self.motion, self.model, self.chattering)
 
     @property
     def _kind(self) -> str:
@@ -208,7 +208,7 @@ def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Respons
         breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
     )
     start = float(state[0]), float(state[1])
-    found = response_to(strobe.body, many, strobe.model, strobe.treatment, duration, start, "initial_position")
+    found = response_to(strobe.body, many, strobe.model, strobe.chattering, duration, start, "initial_position")
     return in_positions(found) if isinstance(strobe.body, LinearBody) else found
 
 
@@ -227,7 +227,7 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
         after = response_of(strobe, state, period).states(0.5 * period * strobe.period)[:2]
         symmetric = bool(np.all(np.abs(after + state) < 1e-9 * np.array(scale_of(strobe))))
     return PeriodicOrbit(
-        strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period,
+        strobe.body, strobe.motion, strobe.model, strobe.chattering, state, period,
         impacts_of(strobe, state, period, change), multipliers_at(strobe, change), symmetric, not np.any(change),
     )  # fmt: skip
 
@@ -235,7 +235,7 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
 def impacts_of(strobe: StroboscopicMap, state: Floats, period: int, change: Floats) -> float:
     """Count the impacts over a number of periods; infinity with complete chattering."""
     impacts = float(strobe.followed(state, period)[2])
-    chatters = impacts > 0.0 and strobe.treatment.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
+    chatters = impacts > 0.0 and strobe.chattering.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
     return math.inf if chatters and not np.any(change) else impacts
 
 
@@ -267,7 +267,7 @@ def periodic_orbits(
     *,
     period: int = 1,
     model: Model | None = None,
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
     starts: ArrayLike | int | None = None,
 ) -> list[PeriodicOrbit]:
     """Find stable and unstable periodic orbits of a body under periodic motion.

@@ -1,1 +1,1 @@
-"""Arrays for kernels, treatments of chattering, and parallel simulations."""
+"""Arrays for kernels, chattering schemes, and parallel simulations."""

@@ -14,7 +14,7 @@ from rocking.block.body import KINDS, Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, Model
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
 from rocking.kernels.ground import Ground
@@ -179,7 +179,7 @@ def never_rests(bodies: Bodies) -> bool:
 
 
 def settings_of(
-    bodies: Bodies, model: Model, treatment: Treatment, duration: float | None, *, record: bool
+    bodies: Bodies, model: Model, scheme: ChatteringScheme, duration: float | None, *, record: bool
 ) -> state.Record:
     """Check and return the settings of a simulation; a duration is required if nothing comes to rest."""
     checks.one_of(model, "model", InvalidOption, MODELS)
@@ -191,7 +191,7 @@ def settings_of(
     else:
         duration = checks.positive(duration, "duration", InvalidOption, "s")
     stop = math.inf if duration is None else duration
-    fields = (model == "nonlinear", treatment.code, treatment.bracket, stop, duration is None, record)
+    fields = (model == "nonlinear", scheme.code, scheme.bracket, stop, duration is None, record)
     return state.attributed(np.array([fields], dtype=state.SETTINGS))[0]
 
 

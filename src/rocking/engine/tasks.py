@@ -18,7 +18,7 @@ from rocking.core.constants import Model
 from rocking.core.tables import counted
 from rocking.core.threads import in_threads
 from rocking.engine.problem import ground_of, highest, set_start, settings_of, step_of
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidMotion, Unfinished
 from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, greatest_weight
@@ -65,7 +65,7 @@ class Setup:
 
     bodies: Bodies
     model: Model
-    treatment: Treatment
+    chattering: ChatteringScheme
     duration: float | None = None
     #: Coordinate of all bodies at time 0 and its rate; None means zero, or the stop if zero is behind the stop.
     start: tuple[float | None, float] = (None, 0.0)
@@ -82,8 +82,8 @@ class Setup:
         """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments."""
         bodies = self.bodies
         check_components(bodies, motion)
-        settings = settings_of(bodies, self.model, self.treatment, self.duration, record=record)
-        records = bodies.kernel_records(self.model, self.treatment.limits(bodies, motion, self.model, factor))
+        settings = settings_of(bodies, self.model, self.chattering, self.duration, record=record)
+        records = bodies.kernel_records(self.model, self.chattering.limits(bodies, motion, self.model, factor))
         if ground is None:
             ground = ground_of(motion, bodies.gravity, factor)
         states = state.new_states(len(bodies), 0)

@@ -172,7 +172,7 @@ def _stripes(assessment: Assessment, motion: Motion) -> Floats:
     case = assessment.case
     many = Blocks.of(case.block)
     table = simulate_levels(
-        many, [motion], assessment.measure, assessment.levels, model=case.model, chattering=case.treatment,
+        many, [motion], assessment.measure, assessment.levels, model=case.model, chattering=case.chattering,
         polarity="+" if many.is_symmetric else "both",
     )  # fmt: skip
     if "polarity" not in table.dims:
@@ -214,7 +214,7 @@ def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Floats]) 
 def _row(assessment: Assessment, motion: Motion) -> dict[str, Any]:
     """Return the outcome of an unscaled record and the friction that it requires."""
     case = assessment.case
-    response = simulate(case.block, motion, model=case.model, chattering=case.treatment)
+    response = simulate(case.block, motion, model=case.model, chattering=case.chattering)
     friction = assessment.friction
     return {
         **_rated(case, motion),
@@ -246,7 +246,7 @@ def _margin(case: Case) -> dict[str, Any] | None:
 
     def fall(factors: Floats) -> Flags:
         table = simulate_levels(
-            Blocks.of(case.block), [motion], FACTOR, factors, model=case.model, chattering=case.treatment,
+            Blocks.of(case.block), [motion], FACTOR, factors, model=case.model, chattering=case.chattering,
         )  # fmt: skip
         return np.asarray(table.overturned.values.ravel())
 

@@ -165,7 +165,7 @@ class Explorer:
                 with self._drawing:
                     from matplotlib import rc_context
 
-                    figure = response.plot(window=shown, longest_sequence=bool(len(response.chattering)))
+                    figure = response.plot(window=shown, longest_sequence=bool(len(response.sequences)))
                     with rc_context({"svg.hashsalt": "rocking"}):
                         figure.savefig(file, dpi=160)
                     if "matplotlib.pyplot" in sys.modules:

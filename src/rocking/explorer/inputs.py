@@ -11,9 +11,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from rocking.block import Block
+from rocking.block import Block, one_block
 from rocking.core.constants import STANDARD_GRAVITY, Model
-from rocking.engine.treatment import Treatment, treatment
+from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.explorer.meshes import Body, pivots_of
 from rocking.explorer.motions import motion_of, texts_of_motion
@@ -45,7 +45,7 @@ class Case:
     block: Block
     motion: Motion | None
     model: Model
-    treatment: Treatment
+    chattering: ChatteringScheme
     duration: float | None
     initial_rotation: float
     initial_velocity: float
@@ -63,7 +63,7 @@ class Case:
             self.block,
             self.motion,
             model=self.model,
-            chattering=self.treatment,
+            chattering=self.chattering,
             duration=self.duration,
             initial_rotation=self.initial_rotation,
             initial_velocity=self.initial_velocity,
@@ -98,7 +98,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
         block=block,
         motion=found.motion,
         model=values.get("model", "nonlinear"),
-        treatment=treatment(values.get("chattering", "certified")),
+        chattering=chattering_scheme(values.get("chattering", "certified")),
         duration=values.get("duration"),
         initial_rotation=values.get("initial_rotation", 0.0),
         initial_velocity=values.get("initial_velocity", 0.0),
@@ -130,13 +130,13 @@ def require_possible(peak: float) -> None:
 
 def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
     """Write a response as the texts of its case; the store keeps a motion that no text can name."""
-    block, motion = response.block, response.motion
+    block, motion = one_block(response.block), response.motion
     texts = _texts_of_block(block)
     texts |= {"motion": "none"} if motion is None else texts_of_motion(motion, uploads)
     if response.model != "nonlinear":
         texts["model"] = response.model
-    if str(response.treatment) != str(treatment("certified")):
-        texts["chattering"] = str(response.treatment)
+    if str(response.chattering) != str(chattering_scheme("certified")):
+        texts["chattering"] = str(response.chattering)
     rules = response.solution.trail.settings
     if not rules["no_end_time"]:
         texts["duration"] = repr(float(rules["stop"]))

@@ -18,8 +18,8 @@ from rocking.chattering.duration import critical_amplitude
 from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.engine.schemes import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
-from rocking.engine.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible, require_rest
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_of, pulse_text
@@ -226,7 +226,7 @@ def described(grid: MapGrid) -> dict[str, Any]:
     """Describe a map: its axes, the meaning of outcome and mode numbers, and the differences from the case."""
     case, notes = grid.case, []
     begins = case.initial_rotation or case.initial_velocity
-    if begins or case.duration is not None or str(case.treatment) != str(Certified()):
+    if begins or case.duration is not None or str(case.chattering) != str(Certified()):
         notes.append(phrase("map.begins"))
     if "alpha" not in (grid.x.name, grid.y.name) and len({side.alpha for side in case.block.sides}) > 1:
         notes.append(phrase("map.smaller_alpha"))

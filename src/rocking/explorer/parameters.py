@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 
 from rocking import records
 from rocking.core.constants import VERSION
-from rocking.engine.treatment import treatment
+from rocking.engine.schemes import chattering_scheme
 from rocking.errors import InvalidOption
 from rocking.explorer.payload import english
 from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
@@ -125,9 +125,9 @@ PULSES: Final[Mapping[str, dict[str, Any]]] = {
 
 
 def _limited(name: str, unit: str, default: str, text: str) -> dict[str, Any]:
-    """Return a treatment with the field of its limit, and its default limit."""
+    """Return a scheme with the field of its limit, and its default limit."""
     limit = Input("limit", "treatment", "number", "", unit, default, 1e-9, 0.1, True, text=text)
-    return {"name": name, "limit": limit.described(), "unnamed": str(treatment(name)).partition("=")[2]}
+    return {"name": name, "limit": limit.described(), "unnamed": str(chattering_scheme(name)).partition("=")[2]}
 
 
 _TREATMENTS: Final = (

@@ -111,7 +111,7 @@ def nearest_sine(case: Case) -> Sine:
 
 def map_of(case: Case, sine: Sine) -> StroboscopicMap:
     """Return the map of the case's block from period to period of a sine."""
-    return stroboscopic_map(case.block, sine.motion(), model=case.model, chattering=case.treatment)
+    return stroboscopic_map(case.block, sine.motion(), model=case.model, chattering=case.chattering)
 
 
 def settled(rock: StroboscopicMap, start: ArrayLike, periods: int, kept: int = KEPT) -> Settled:
@@ -176,7 +176,7 @@ def _followed(case: Case, sine: Sine, start: Floats, periods: int) -> Response:
         case.block,
         sine.motion(periods + 1.0),
         model=case.model,
-        chattering=case.treatment,
+        chattering=case.chattering,
         duration=periods / sine.frequency,
         initial_rotation=float(start[0]),
         initial_velocity=float(start[1]),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rocking.block import one_block
 from rocking.core.arrays import without_dust
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
@@ -68,7 +69,7 @@ def at(explorer: Explorer, texts: Texts, time: str, window: tuple[float, float] 
     response = shown.response if window is None else shown.resolved(*checked_window(window, duration))
     rotation, velocity, acceleration = response.states(seconds).tolist()
     kinetic, potential = float(response.kinetic_energy(seconds)), float(response.potential_energy(seconds))
-    sides = response.block.sides
+    sides = one_block(response.block).sides
     return {
         "time": seconds,
         "state": _state(response, seconds, rotation),
@@ -118,8 +119,8 @@ def thumbnail(explorer: Explorer, texts: Texts) -> Payload:
     start, end = active_span(response)
     times = np.linspace(start, end, 2_000)
     rotation = response.rotation(times)
-    plus, minus = (side.alpha for side in response.block.sides)
+    plus, minus = (side.alpha for side in one_block(response.block).sides)
     kept = extremes(rotation, 300)
     over = np.where(rotation >= 0.0, rotation / plus, rotation / minus)
-    words = verdict(response, response.block.uplift_thresholds(shown.case.model))
+    words = verdict(response, one_block(response.block).uplift_thresholds(shown.case.model))
     return Payload({"verdict": words, "from": start, "to": end}, {"time": times[kept], "rotation": over[kept]})

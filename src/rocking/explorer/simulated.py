@@ -13,7 +13,7 @@ from rocking.block import Block
 from rocking.chattering.maps import chattering_episodes
 from rocking.core.arrays import Floats, Integers, without_dust
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.engine.treatment import Certified
+from rocking.engine.schemes import Certified
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case
 from rocking.explorer.payload import phrase
@@ -51,9 +51,9 @@ class Simulated:
     @functools.cached_property
     def fine(self) -> Response:
         """Same response with more impacts resolved before each proven rest."""
-        if self.case.treatment.name != _FINEST.name:
+        if self.case.chattering.name != _FINEST.name:
             return self.response
-        fine = replace(self.case, treatment=_FINEST).simulate()
+        fine = replace(self.case, chattering=_FINEST).simulate()
         return fine if fine.stalled == self.response.stalled else self.response
 
     def resolved(self, start: float, end: float) -> Response:
@@ -76,7 +76,7 @@ class Simulated:
 
 def unresolved(response: Response, start: float, end: float) -> list[float]:
     """Return the times, s, from the last resolved impact to the rest, for sequences that end in a window."""
-    ends = np.asarray(response.chattering["end"], dtype=float)
+    ends = np.asarray(response.sequences["end"], dtype=float)
     impact_times = np.asarray(response.impacts["time"], dtype=float)
     last = impact_times[np.searchsorted(impact_times, ends, side="right") - 1]
     seen = (ends > start) & (last < end) & (ends - last > 1e-3 * (end - start))
@@ -105,12 +105,12 @@ def facts(shown: Simulated) -> dict[str, Any]:
         },
         "motion": None if motion is None else _motion_facts(motion),
         "model": case.model,
-        "treatment": str(case.treatment),
+        "treatment": str(case.chattering),
         **{name: getattr(response, name) for name in _ANSWERS},
         "peak_over_slenderness": known_ratio(response),
         "impacts": len(response.impacts),
         "rests": int(np.sum(response.events["kind"] == "rest")),
-        "proven": int(np.sum(~np.isnan(response.chattering["upper"]))),
+        "proven": int(np.sum(~np.isnan(response.sequences["upper"]))),
         "share_at_rest": chattering_episodes(response).share_at_rest,
         "eta_squared": math.prod(side.restitution for side in block.sides),
         "verdict": verdict(response, block.uplift_thresholds(case.model)),
@@ -141,7 +141,7 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> dict[str, An
         )
     if response.unfinished:
         return phrase("verdict.given_up", time=response.duration)
-    unproven = rests - int(np.sum(~np.isnan(response.chattering["upper"])))
+    unproven = rests - int(np.sum(~np.isnan(response.sequences["upper"])))
     resting = phrase("verdict.rests", count=rests) if rests else phrase("verdict.no_rest")
     if unproven:
         resting = phrase("verdict.unproven", rests=resting, unproven=unproven)
@@ -275,7 +275,7 @@ def ground_in(shown: Simulated, start: float, end: float) -> dict[str, Floats]:
 def lines_of(response: Response) -> dict[str, Floats]:
     """Return the lines common to all windows: impacts with intervals, rests, uplifts, chattering sequences."""
     intervals, ratios = _intervals(response)
-    sequences = response.chattering
+    sequences = response.sequences
     columns = [np.asarray(sequences[name], dtype=float) for name in ("start", "end", "lower", "upper", "impacts")]
     columns.append(_uncertain(response))
     return {
@@ -291,9 +291,9 @@ def lines_of(response: Response) -> dict[str, Floats]:
 
 def _uncertain(response: Response) -> Floats:
     """Return the spread of each sequence's rest in the repeated simulations, s; NaN if missing in one of them."""
-    if not len(response.chattering):
+    if not len(response.sequences):
         return np.empty(0)
-    rests = np.searchsorted(response.events["time"], response.chattering["end"])
+    rests = np.searchsorted(response.events["time"], response.sequences["end"])
     return response.perturbed().event_spreads[rests]
 
 

@@ -138,7 +138,7 @@ class StudyView:
         block = self._parameters(chosen["block"][0]) if "block" in chosen else chosen
         found = {name: ",".join(map(repr, values)) for name, values in block.items()}
         found |= texts_of_motion(motion, uploads, factor)
-        found |= {"model": product.model, "chattering": str(product.treatment)}
+        found |= {"model": product.model, "chattering": str(product.chattering)}
         if product.blocks.gravity != STANDARD_GRAVITY:
             found["gravity"] = repr(float(product.blocks.gravity))
         return found if product.duration is None else found | {"duration": repr(product.duration)}

@@ -227,7 +227,7 @@ def pass_impact(ground: Ground, block: Record, settings: Record, table: Records,
     write_impact(settings, table, state, time, speed)
     count_impact(state)
     proof = unproven()
-    if settings.treatment == RestRule.CERTIFIED and state.v <= state.certificate_speed:
+    if settings.rest_rule == RestRule.CERTIFIED and state.v <= state.certificate_speed:
         proof = proven_bounds(ground, block, settings, scratch, state)
         record_proof(ground, block, settings, state, proof)
     rest = rest_after_impact(ground, block, settings, state, proof)

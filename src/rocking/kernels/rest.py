@@ -111,7 +111,7 @@ def allowance(time: float, upper: float, state: Record) -> float:
 def rest_after_impact(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> Rest:
     """Decide whether the block comes to rest at an impact, given the proven bounds (NaN: none)."""
     time = time_of(ground, state)
-    if settings.treatment == RestRule.CERTIFIED:
+    if settings.rest_rule == RestRule.CERTIFIED:
         if state.v == 0.0:
             rounding = allowance(time, 0.0, state)
             return Rest(-rounding, rounding, 0.0, False)
@@ -119,15 +119,15 @@ def rest_after_impact(ground: Ground, block: Record, settings: Record, state: Re
         good = max(settings.tolerance, 4.0 * allowance(time, proof.upper, state))
         if proof.upper - proof.lower <= good and proof.height <= state.peak:
             return Rest(proof.lower, proof.upper, proof.time, False)
-    elif settings.treatment == RestRule.BYPASS:
+    elif settings.rest_rule == RestRule.BYPASS:
         left = geometric_time(ground, block, state)
         if state.v <= block.limit[state.side] and left >= 0.0:
             return Rest(np.nan, np.nan, left, False)
     else:
         limit = block.limit[state.side]
-        by_speed = settings.treatment == RestRule.VELOCITY and state.v <= limit
-        by_interval = settings.treatment == RestRule.INTERVAL and time - state.last_impact_time <= limit
-        by_time = settings.treatment == RestRule.TIME and time - state.last_uplift_time >= limit
+        by_speed = settings.rest_rule == RestRule.VELOCITY and state.v <= limit
+        by_interval = settings.rest_rule == RestRule.INTERVAL and time - state.last_impact_time <= limit
+        by_time = settings.rest_rule == RestRule.TIME and time - state.last_uplift_time >= limit
         if by_speed or by_interval or by_time:
             return Rest(np.nan, np.nan, 0.0, False)
     stalled = has_stalled(ground, block, state)

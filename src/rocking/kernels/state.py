@@ -139,7 +139,7 @@ BLOCK = _record(
 #: Settings of the computation.
 SETTINGS = _record(
     nonlinear="?",  # model
-    treatment="i8",  # `RestRule` that ends chattering
+    rest_rule="i8",  # `RestRule` that ends chattering
     tolerance="f8",  # largest accepted width of a bracket on the time of rest, s
     stop="f8",  # time at which to stop, s
     no_end_time="?",  # whether stop is infinite

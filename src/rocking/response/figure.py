@@ -42,7 +42,7 @@ _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle
 def titled(response: Simulated) -> str:
     """Return the title of a figure: the body and its motion."""
     shaken = "no motion" if response.motion is None else response.motion.label
-    return as_written(f"{response.body.description} under {shaken}")
+    return as_written(f"{response.block.description} under {shaken}")
 
 
 def active_span(response: Simulated) -> tuple[float, float]:
@@ -96,7 +96,7 @@ def histories(
     """
     checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
     shown = shown_span(response, window)
-    time, coordinate = drawing_times(response, *shown), response.body.coordinate
+    time, coordinate = drawing_times(response, *shown), response.block.coordinate
     is_rotation = coordinate.unit == "rad"
     plus, minus = balances = _balances(response)
     if not is_rotation or (units == "slenderness" and any(map(math.isinf, balances))):
@@ -140,7 +140,7 @@ def histories(
 
 def _balances(response: Simulated) -> tuple[float, float]:
     """Return the balance on each side, for a one-sided body the same value twice."""
-    (pair,), _ = thresholds_of(response.body.alone(), response.model)
+    (pair,), _ = thresholds_of(response.block.alone(), response.model)
     return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
 
 
@@ -158,7 +158,7 @@ def _ground_traces(response: Simulated, start: float, end: float) -> dict[str, t
 
 def _longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
     """Return the sequence with the most impacts in the interval, if its time of rest is bracketed."""
-    inside = response.chattering[(response.chattering["start"] >= start) & (response.chattering["end"] <= end)]
+    inside = response.sequences[(response.sequences["start"] >= start) & (response.sequences["end"] <= end)]
     longest: np.void | None = max(inside, key=lambda row: row["impacts"], default=None)
     if longest is None or not math.isfinite(longest["upper"] - longest["lower"]):
         return None
@@ -222,13 +222,13 @@ def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
 
 def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
     """Draw the uplift thresholds, which vary with the weight, and the motion beyond them."""
-    (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
+    (pair,), (own,) = thresholds_of(response.block.alone(), response.model)
     lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
     above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
     for sign, size, change in ((-1.0, pair[0], own[0]), (1.0, pair[1], own[1])):
         if math.isinf(size):
             continue  # no uplift to this side
-        threshold = sign * (size + lift / response.body.gravity * change) / STANDARD_GRAVITY
+        threshold = sign * (size + lift / response.block.gravity * change) / STANDARD_GRAVITY
         beyond = sign * acceleration > sign * threshold
         if np.any(beyond):
             axes.fill_between(time, acceleration, threshold, where=beyond, label="beyond a threshold", **above)
@@ -350,7 +350,7 @@ def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Un
     """Draw normalised velocity against normalised rotation in a window, in units of a `Course`."""
     span = shown_span(response, window)
     course = course_of(response, *span)
-    limit = response.body.coordinate.limit if response._energy.has_balances else "rad"
+    limit = response.block.coordinate.limit if response._energy.has_balances else "rad"
     with page_for((4.6, 4.2), **place) as page:
         (axes,) = page.panels()
         axes.axhline(0.0, color=INK, linewidth=0.4)

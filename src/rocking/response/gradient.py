@@ -164,7 +164,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     if reason and reason != _FROM_REST:
         change[:] = math.nan
         out[:] = math.nan
-    horizontal, vertical = _by_components(response.motion, trail, response.body.gravity, out)
+    horizontal, vertical = _by_components(response.motion, trail, response.block.gravity, out)
     sign = _sign(int(trail.nodes["side"][0]))
     return Gradient(
         value=target.value,

@@ -175,7 +175,7 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     if not len(closing):
         return trail
     body, rules, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
-    rules["treatment"], rules["no_end_time"], rules["record"] = state.RestRule.VELOCITY, False, True
+    rules["rest_rule"], rules["no_end_time"], rules["record"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
     parts, done, plastic = [], 0, plastic_elongations(trail)
     for row in closing:

@@ -40,7 +40,7 @@ class Response(Simulated):
 
     Attributes
     ----------
-    body, motion, model, treatment
+    block, motion, model, chattering
         Inputs of the simulation.
     overturned : bool
         Whether the rotation reached pi/2.
@@ -60,7 +60,7 @@ class Response(Simulated):
     impacts : structured array
         time (s), side entered, speed_before and speed_after (rad/s), in order of time. For a chattering sequence only
         the impacts that were resolved before its end was proven.
-    chattering : structured array
+    sequences : structured array
         One row for each sequence that ended at rest: start (time of the impact from which it was proven to be
         complete), end (time of rest), lower and upper bound on the end, number of impacts resolved since the start.
         The bounds contain the exact time of rest for the given body, motion and initial state, including the effect of
@@ -83,7 +83,7 @@ class Response(Simulated):
     rocking.gradient : Differentiate a result of a response.
     """
 
-    TABLES = ("histories", "events", "impacts", "chattering")
+    TABLES = ("histories", "events", "impacts", "sequences")
 
     def _headline(self) -> str:
         return summary.line(self)
@@ -94,7 +94,7 @@ class Response(Simulated):
 
     def facts(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
         """Return the entries of `to_dict` as rows of name, value and unit; arguments as of `summary`."""
-        body, motion, limit = self.body, self.motion, self.body.coordinate.limit
+        body, motion, limit = self.block, self.motion, self.block.coordinate.limit
         shaken = motion and {
             "name": motion.name,
             named("duration", "s"): motion.duration,
@@ -126,19 +126,19 @@ class Response(Simulated):
             Row("ambiguous", self.ambiguous),
             Row("ambiguities", self.ambiguities),
             Row("events", records_of(self._structured("events"))),
-            Row("chattering", records_of(self._structured("chattering"))),
+            Row("sequences", records_of(self._structured("sequences"))),
         ]
 
     def _parameters(self) -> dict[str, Any]:
-        of_body = self.body.alone().parameters().items()
-        gravity = {named("gravity", "m/s^2"): self.body.gravity}
+        of_body = self.block.alone().parameters().items()
+        gravity = {named("gravity", "m/s^2"): self.block.gravity}
         return {named(name, unit): values[0].tolist() for name, (values, unit) in of_body} | gravity
 
     def _outcome_rows(self) -> list[Row]:
-        name, unit = self.body.coordinate.name, self.body.coordinate.unit
+        name, unit = self.block.coordinate.name, self.block.coordinate.unit
         return [
             Row("model", self.model),
-            Row("chattering_treatment", repr(self.treatment)),
+            Row("chattering", repr(self.chattering)),
             *(Row(flag, getattr(self, flag)) for flag in ("overturned", "unfinished", "stopped", "leans")),
             Row("overturn_time", self.overturn_time, "s"),
             Row("tipping_time", self.tipping_time, "s"),
@@ -182,7 +182,7 @@ class Response(Simulated):
 
         time, *histories = self._columns("histories", dt)
         variables: dict[str, Any] = {each.name: ("time", each.values, {"units": each.unit}) for each in histories}
-        for table, dimension in (("events", "event"), ("impacts", "impact"), ("chattering", "sequence")):
+        for table, dimension in (("events", "event"), ("impacts", "impact"), ("sequences", "sequence")):
             for name, values, unit, _ in self._columns(table):
                 column = values.astype(object) if values.dtype.kind == "U" else values
                 variables[f"{dimension}_{name}"] = (dimension, column, {"units": unit})
@@ -190,7 +190,7 @@ class Response(Simulated):
         rows = [row for row in self._outcome_rows() if row.name != "tipping_time"]
         rows += [Row("peak_time", self.peak_time, "s"), Row("ambiguous", self.ambiguous)]
         attributes = {
-            "block": self.body.description,
+            "block": self.block.description,
             **self._parameters(),
             "motion": "none" if motion is None else motion.name,
             "vertical_motion": "none" if motion is None or motion.vertical is None else motion.vertical.name,
@@ -208,13 +208,13 @@ class Response(Simulated):
         return self._structured(table)
 
     def _structured(self, table: str) -> list[Column]:
-        rows, speed = getattr(self, table), f"{self.body.coordinate.unit}/s"
+        rows, speed = getattr(self, table), f"{self.block.coordinate.unit}/s"
         units = {"kind": "1", "side": "1", "impacts": "1", "speed_before": speed, "speed_after": speed}
         units |= {"elongation": "m", "force": "N", "plastic_elongation": "m"}
         return [Column(name, rows[name], units.get(name, "s")) for name in rows.dtype.names]
 
     def _histories(self, dt: float | None) -> list[Column]:
-        motion, (name, rate, _, unit, _) = self.motion, self.body.coordinate
+        motion, (name, rate, _, unit, _) = self.motion, self.block.coordinate
         if dt is None:
             step = motion and motion.step
             # A pulse of a few straight lines also has a step, but its resolution is too coarse.
@@ -237,7 +237,7 @@ class Response(Simulated):
         return columns
 
     def to_dataframe(self, table: str | None = None, *, dt: float | None = None) -> pd.DataFrame:
-        """Return a table as a data frame: "histories", "events", "impacts" or "chattering"; names contain units.
+        """Return a table as a data frame: "histories", "events", "impacts" or "sequences"; names contain units.
 
         Histories contain rotation, angular velocity and ground acceleration, indexed by ``time_s``, at steps `dt` as
         of `to_xarray`.

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.block import Block, RestrainedBlock
+from rocking.block import RestrainedBlock
 from rocking.block.body import Body
 from rocking.core.arrays import Floats, as_asked
 from rocking.core.constants import Model
 from rocking.core.result import Result
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.motion.motion import Motion
@@ -37,10 +37,10 @@ from rocking.response.sensitivity import Sensitivity, ambiguities, carried_error
 class Simulated(Result):
     """Data and computed results of a response. `Response` adds the output methods."""
 
-    body: Body
+    block: Body
     motion: Motion | None
     model: Model
-    treatment: Treatment
+    chattering: ChatteringScheme
     overturned: bool
     unfinished: bool
     leans: bool
@@ -58,39 +58,32 @@ class Simulated(Result):
         """Return only the data. Derived results are computed again."""
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
-    @property
-    def block(self) -> Block:
-        """The body; raises `InvalidOption` if it is not a block."""
-        if not isinstance(self.body, Block):
-            raise InvalidOption(f"this is known of blocks alone, not of a {type(self.body).__name__}")
-        return self.body
-
     @cached_property
     def _history(self) -> History:
         """Time history, including the impacts after the proof of a sequence."""
         trail, sequences = self.solution.trail, self.solution.sequences
-        if int(trail.settings["treatment"]) == state.RestRule.CERTIFIED:
+        if int(trail.settings["rest_rule"]) == state.RestRule.CERTIFIED:
             closed = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration)
             trail = with_all_impacts(trail, cut=closed and self.moves_at_end)
-        return History(trail, self.duration, self.body.stops)
+        return History(trail, self.duration, self.block.stops)
 
     @cached_property
     def _energy(self) -> Energy:
         trail = self.solution.trail
-        return energy_of(self.body, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
+        return energy_of(self.block, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
 
     @cached_property
     def _contact(self) -> Contact:
-        law = self.body.contact
+        law = self.block.contact
         if law is None:
-            raise InvalidOption(f"the forces of the ground are not known of this body: {self.body.description}")
+            raise InvalidOption(f"the forces of the ground are not known of this body: {self.block.description}")
         return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
 
     @cached_property
-    def chattering(self) -> NDArray[np.void]:
+    def sequences(self) -> NDArray[np.void]:
         """Sequences of impacts that ended at rest: see `Response`."""
         found = self.solution.sequences.copy()
-        error = carried_errors(self.solution.trail, np.isfinite(found["lower"]), max(map(abs, self.body.stops)))
+        error = carried_errors(self.solution.trail, np.isfinite(found["lower"]), max(map(abs, self.block.stops)))
         found["lower"] -= error
         found["upper"] += error
         return found
@@ -101,10 +94,10 @@ class Simulated(Result):
 
         For a free block it equals the slenderness in both models.
         """
-        if isinstance(self.body, RestrainedBlock) and self.model == "linear":
-            plus, minus = linear_balance(self.body).tolist()
+        if isinstance(self.block, RestrainedBlock) and self.model == "linear":
+            plus, minus = linear_balance(self.block).tolist()
             return plus, minus
-        return self.body.balance
+        return self.block.balance
 
     @cached_property
     def peak_over_slenderness(self) -> float:
@@ -126,18 +119,18 @@ class Simulated(Result):
     @property
     def _reaches_second_stop(self) -> bool:
         """Whether the peak is at the second of two stops."""
-        return bool(self.solution.trail.block["two_stops"]) and self.peak_rotation == self.body.stops[1]
+        return bool(self.solution.trail.block["two_stops"]) and self.peak_rotation == self.block.stops[1]
 
     @cached_property
     def tendons(self) -> NDArray[np.void]:
         """Largest elongation and force of each tendon: see `Response`."""
         rows = []
-        if isinstance(self.body, RestrainedBlock):
+        if isinstance(self.block, RestrainedBlock):
             plus, minus = self._history.largest()
             if self.overturned:  # the last step ends there
                 side = int(self.solution.trail.nodes["side"][-1])
                 plus, minus = (self.peak_rotation, minus) if side == 0 else (plus, self.peak_rotation)
-            rows = self.body.tendons_at((plus, minus), self.model)
+            rows = self.block.tendons_at((plus, minus), self.model)
         return np.array(rows, dtype=[("elongation", "f8"), ("force", "f8"), ("plastic_elongation", "f8")])
 
     @property
@@ -167,7 +160,7 @@ class Simulated(Result):
             return "leans"
         if not self.moved:
             return UNMOVED
-        return STANDS if self.body.coordinate.limit else "comes to rest"
+        return STANDS if self.block.coordinate.limit else "comes to rest"
 
     @property
     def residual_rotation(self) -> float:
@@ -208,7 +201,7 @@ class Simulated(Result):
         trail, history = self.solution.trail, self._history
         if int(trail.block["seed"]) >= 0 and trail.block["variable_restitution"]:
             # Random restitutions depend on the number of the impact, which excludes the impacts after a proof.
-            history = History(trail, self.duration, self.body.stops)
+            history = History(trail, self.duration, self.block.stops)
         sizes, is_fixed = (len(self.impacts), len(self.events)), self.overturned or self._reaches_second_stop
         return Sensitivity(trail, history, self.peak_time, sizes, is_fixed=is_fixed, is_known=not self.unfinished)
 
@@ -226,7 +219,7 @@ class Simulated(Result):
         """
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
-        height = abs(self.peak_rotation - self.body.stops[0])
+        height = abs(self.peak_rotation - self.block.stops[0])
         return ambiguities(self.sensitivity, self.solution.trail, height, self.near_ties + balanced)
 
     def perturbed(self, relative: float = RELATIVE, count: int = COUNT) -> Perturbed:
@@ -253,7 +246,7 @@ class Simulated(Result):
         if (relative, count) not in self._repeated:
             repeats = tuple(self._repeat(factor) for factor in checked_factors(relative, count))
             scaled = "initial states" if self.motion is None else "motions"
-            self._repeated[relative, count] = Perturbed(float(relative), repeats, self.body.coordinate, scaled)
+            self._repeated[relative, count] = Perturbed(float(relative), repeats, self.block.coordinate, scaled)
         return self._repeated[relative, count]
 
     @cached_property

@@ -41,7 +41,7 @@ _AFFECTED: Final = {
 
 def summary_rows(response: Simulated, friction: float | None, precision: float) -> list[Row]:
     """Return the rows of a summary, including the check of a coefficient of friction if given."""
-    body = response.body
+    body = response.block
     sliding = math.nan if friction is None else response.sliding_time(friction)
     rows = [
         Row("block" if isinstance(body, Block) else "body", body.description),
@@ -88,12 +88,12 @@ def summary_rows(response: Simulated, friction: float | None, precision: float) 
 
 def line(response: Simulated) -> str:
     """Return the response in one line."""
-    motion, limit = response.motion, response.body.coordinate.limit
+    motion, limit = response.motion, response.block.coordinate.limit
     peak = ""
     if limit and not response.overturned and math.isfinite(response._balance_at_peak):
         peak = f", peak {ratio_text(response)} of the {limit}"
     return (
-        f"{response.body.description} under {'no motion' if motion is None else motion.label}: "
+        f"{response.block.description} under {'no motion' if motion is None else motion.label}: "
         f"{in_words(response, f'{response.overturn_time:.4f} s')}{peak}; "
         f"{counted(len(response.events), 'event')}, {counted(len(response.impacts), 'impact')} resolved, "
         f"{response.duration:.5g} s"
@@ -111,11 +111,11 @@ def in_words(response: Simulated, overturn_time: str) -> str:
         goes_on = motion is not None and response.duration < motion.end
         to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
         return f"{_when_stopped(response)}, where the simulation was stopped{to_come}"
-    if response.leans and response.body.coordinate.limit:
+    if response.leans and response.block.coordinate.limit:
         return f"does not overturn: it stays leaning, at {_residual_text(response)}"
     if not response.moved:
         return "does not move"
-    return "rocks and does not overturn" if response.body.coordinate.limit else "moves, and comes to rest"
+    return "rocks and does not overturn" if response.block.coordinate.limit else "moves, and comes to rest"
 
 
 def in_brief(response: Simulated, precision: float) -> str:
@@ -142,7 +142,7 @@ def in_brief(response: Simulated, precision: float) -> str:
 
 def _residual_text(response: Simulated) -> str:
     """Return the residual rotation, which depends on the peak if a tendon has yielded."""
-    return f"{response.residual_rotation:.{_peak_digits(response)}g} {response.body.coordinate.unit}"
+    return f"{response.residual_rotation:.{_peak_digits(response)}g} {response.block.coordinate.unit}"
 
 
 def ratio_text(response: Simulated) -> str:
@@ -187,13 +187,13 @@ def _motion_text(response: Simulated) -> str:
 def _thresholds_text(response: Simulated) -> str:
     """Return the uplift thresholds, which vary with the weight under vertical motion."""
     motion = response.motion
-    (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
+    (pair,), (own,) = thresholds_of(response.block.alone(), response.model)
     plus, minus = (pair / STANDARD_GRAVITY).tolist()
     one = plus == minus or math.isinf(minus)
     text = f"{plus:.4f} g" if one else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"
     if motion is None or motion.vertical is None:
         return text
-    low, high = (1.0 + lift / response.body.gravity for lift in motion.vertical.extremes)
+    low, high = (1.0 + lift / response.block.gravity for lift in motion.vertical.extremes)
     if np.array_equal(pair, own):
         return f"{text}, times the weight over that at rest, {low:.4f} to {high:.4f}"
     least, most = ((pair[0] + (factor - 1.0) * own[0]) / STANDARD_GRAVITY for factor in (low, high))
@@ -201,7 +201,7 @@ def _thresholds_text(response: Simulated) -> str:
 
 
 def _event_rows(response: Simulated) -> list[Row]:
-    sequences = {float(row["end"]): row for row in response.chattering}
+    sequences = {float(row["end"]): row for row in response.sequences}
     near = response.perturbed()
     rows: list[Row] = []
     for event, (low, high) in zip(response.events[:_LISTED], near.event_ranges, strict=False):
@@ -224,7 +224,7 @@ def _rest_note(unknown: float, sequence: np.void) -> str:
     """Describe the proof of a time of rest, with the digits that the record supports."""
     width = sequence["upper"] - sequence["lower"]
     if not width >= 0.0:
-        return ", by the treatment, not proven"
+        return ", by the scheme, not proven"
     decimals = _decimals(unknown)
     # The bracket applies to the exact motion, so it would overstate the precision of a rounded time.
     bracket = f", bracket {width:.1e} s wide" if decimals >= _MOST_DECIMALS else ""
@@ -234,7 +234,7 @@ def _rest_note(unknown: float, sequence: np.void) -> str:
 
 def _peak_rows(response: Simulated) -> list[Row]:
     """Return rows of the peak and its time, each with the known digits."""
-    near, (name, _, _, unit, limit) = response.perturbed(), response.body.coordinate
+    near, (name, _, _, unit, limit) = response.perturbed(), response.block.coordinate
     (low, high), digits, balance = near.peak_range, _peak_digits(response), response._balance_at_peak
     value = f"{response.peak_rotation:.{digits}g}"
     if spread := digits < _FEWEST_DIGITS and math.isfinite(high):
@@ -255,7 +255,7 @@ def _peak_rows(response: Simulated) -> list[Row]:
 def _balance_text(response: Simulated) -> str:
     """Return the unstable balance of a restrained block."""
     plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
-    if plus != minus and not (isinstance(response.body, RestrainedBlock) and response.body.is_one_sided):
+    if plus != minus and not (isinstance(response.block, RestrainedBlock) and response.block.is_one_sided):
         return f"{plus} (side +), {minus} (side -)"
     return "none: restraints hold it at any rotation" if plus == "none" else plus
 
@@ -279,14 +279,14 @@ def _when_stopped(response: Simulated) -> str:
     if not math.isnan(response.tipping_time):
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
     if response.moves_at_end:
-        return f"still {'rocking' if response.body.coordinate.limit else 'moving'} at {end}"
+        return f"still {'rocking' if response.block.coordinate.limit else 'moving'} at {end}"
     return f"at rest at {end}" if response.moved else f"has not moved by {end}"
 
 
 def _peak_digits(response: Simulated) -> int:
     """Return the number of known digits of the peak."""
     unknown = _unknown(response.peak_rotation, *response.perturbed().peak_range)
-    value = abs(response.peak_rotation - response.body.stops[0])
+    value = abs(response.peak_rotation - response.block.stops[0])
     if not math.isfinite(unknown):
         return 1
     if not (unknown > 0.0 and value != 0.0):

@@ -18,8 +18,8 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.engine.problem import bodies_of, settings_of
+from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, parts_of, simulate_tasks
-from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST
@@ -131,7 +131,7 @@ class Product:
         Scales of the motions.
     polarity : {"+", "-", "both"}
         Original motions, reversed motions, or both.
-    model, treatment, duration
+    model, chattering, duration
         As for `rocking.simulate`.
 
     Raises
@@ -150,12 +150,12 @@ class Product:
     scales: Scales
     polarity: Polarity
     model: Model
-    treatment: Treatment
+    chattering: ChatteringScheme
     duration: float | None
 
     def __post_init__(self) -> None:
         checks.one_of(self.polarity, "polarity", InvalidOption, list(SIGNS))
-        settings_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # raises before the work
+        settings_of(self.bodies, self.model, self.chattering, self.duration, record=False)  # raises before the work
         for motion in self.motions:
             check_components(self.bodies, motion)
 
@@ -190,18 +190,20 @@ def product_of(
     measure: MeasureName | Measure,
     polarity: Polarity,
     model: Model,
-    chattering: str | Treatment,
+    chattering: str | ChatteringScheme,
     duration: float | None,
 ) -> Product:
     """Create a product from the arguments of `simulate_many`."""
     bodies, shaking = bodies_of(blocks), tuple(several_motions(motions))
-    return Product(bodies, shaking, Scales.of(levels, measure), polarity, model, treatment(chattering), duration)
+    return Product(
+        bodies, shaking, Scales.of(levels, measure), polarity, model, chattering_scheme(chattering), duration
+    )
 
 
 def setup_of(product: Product, bodies: slice | None = None) -> Setup:
     """Return the setup for all or some bodies of a product."""
     chosen = product.bodies if bodies is None else product.bodies.select(bodies)
-    return Setup(chosen, product.model, product.treatment, product.duration)
+    return Setup(chosen, product.model, product.chattering, product.duration)
 
 
 def _tasks(product: Product, near: float) -> Iterator[Task]:
@@ -237,7 +239,7 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     attributes = {
         "program": f"rocking {VERSION}",
         "model": product.model,
-        "chattering": repr(product.treatment),
+        "chattering": repr(product.chattering),
         "polarity": product.polarity,
         "gravity": product.bodies.gravity,
         "motions": [f"{motion.name}: {motion.description.text}" for motion in product.motions],
@@ -270,7 +272,7 @@ def simulate_many(
     motions: Motions,
     *,
     model: Model = "nonlinear",
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
     levels: ArrayLike | None = None,
     measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
@@ -286,7 +288,7 @@ def simulate_many(
         n blocks, or other bodies (`rocking.block.body.Bodies`).
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions. The keys of a mapping are the names of its motions.
-    model, chattering : str or Treatment
+    model, chattering : str or ChatteringScheme
         As for `simulate`.
     levels : array_like, optional
         Levels of `measure` to which every motion is scaled. Adds the dimension ``scale``.

@@ -12,8 +12,8 @@ from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.engine.problem import ground_of, highest, one_body, set_start
+from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import SLICE, Setup, slices
-from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
@@ -38,7 +38,7 @@ def simulate(
     motion: Motion | None,
     *,
     model: Model = "nonlinear",
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
     duration: float | None = None,
     initial_rotation: float = 0.0,
     initial_velocity: float = 0.0,
@@ -55,7 +55,7 @@ def simulate(
         Horizontal ground acceleration. None means free rocking.
     model : {"nonlinear", "linear"}
         Equation of motion, for finite rotations or linearised for slender blocks (paper, Eqs 2 and 3).
-    chattering : str or treatment
+    chattering : str or ChatteringScheme
         Method for the end of a sequence of impacts: "certified" (default), "velocity", "bypass", "interval" or "time",
         or an object with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`,
         `AsymptoticTime`).
@@ -102,14 +102,14 @@ def response_to(
     block: Body,
     motion: Motion | None,
     model: Model,
-    chattering: str | Treatment,
+    chattering: str | ChatteringScheme,
     duration: float | None,
     initial: tuple[float, float],
     name: str | None = None,
     factor: float = 1.0,
 ) -> Response:
     """Compute a response like `simulate`, with `name` for the initial coordinate in messages."""
-    how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
+    how, alone, motion = chattering_scheme(chattering), one_body(block).alone(), one_motion(motion)
     setup, ground = Setup(alone, model, how, duration, initial), None
     if factor != 1.0:  # repeated simulations leave the cache unchanged
         ground = ground_of.__wrapped__(motion, block.gravity, factor)
@@ -123,10 +123,10 @@ def response_to(
     events = table["event"][: start["events"]]
     overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
     return Response(
-        body=block,
+        block=block,
         motion=motion,
         model=model,
-        treatment=how,
+        chattering=how,
         overturned=overturned,
         unfinished=ending == state.Ending.UNFINISHED,
         leans=ending == state.Ending.LEANS,

@@ -15,7 +15,7 @@ from rocking.block.body import Bodies
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import counted, csv_rows
-from rocking.engine.treatment import treatment
+from rocking.engine.schemes import chattering_scheme
 from rocking.errors import InvalidMotion, InvalidOption, StudyError, UnreadableRecord
 from rocking.inputs import quantities
 from rocking.inputs.bodies import block_of, body_of, check_parameters, note_likely_mistakes, quantity_of, shape_of
@@ -117,7 +117,7 @@ def read_study(path: str | Path) -> StudyFile:
     motions, names, skipped = _motions(tables, scales)
     rules, polarity = tables.table("simulation"), tables.table("scales").get("polarity", "+")
     with tables.located("simulation", key="chattering"):
-        chattering = treatment(rules.get("chattering", "certified"))
+        chattering = chattering_scheme(rules.get("chattering", "certified"))
     with tables.located("simulation", "scales", "blocks"):
         model, duration = rules.get("model", "nonlinear"), rules.get("duration")
         product = Product(blocks, tuple(motions), scales, polarity, model, chattering, duration)

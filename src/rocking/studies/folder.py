@@ -21,7 +21,7 @@ from rocking.block.body import KINDS
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import counted, write_bytes
-from rocking.engine.treatment import treatment
+from rocking.engine.schemes import chattering_scheme
 from rocking.errors import DamagedStudy, OutputError, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
@@ -246,7 +246,7 @@ def _arrays(product: Product) -> dict[str, NDArray[Any]]:
         "scales/measure": measure,
         "rules/polarity": product.polarity,
         "rules/model": product.model,
-        "rules/treatment": str(product.treatment),
+        "rules/chattering": str(product.chattering),
         "rules/duration": product.duration,
     }
     words = {name: np.array(json.dumps(value)) for name, value in rules.items()}
@@ -268,7 +268,7 @@ def _product(arrays: Mapping[str, NDArray[Any]]) -> Product:
         Scales(None if measure is None else Measure(**measure), arrays["scales/values"]),
         words["rules/polarity"],
         words["rules/model"],
-        treatment(words["rules/treatment"]),
+        chattering_scheme(words["rules/chattering"]),
         words["rules/duration"],
     )
 

@@ -32,7 +32,7 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.tables import counted, write_netcdf
 from rocking.core.threads import cores, thread_count
-from rocking.engine.treatment import Treatment
+from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions
@@ -361,7 +361,7 @@ def study(
     motions: Motions | None = None,
     *,
     model: Model = "nonlinear",
-    chattering: str | Treatment = "certified",
+    chattering: str | ChatteringScheme = "certified",
     levels: ArrayLike | None = None,
     measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",

@@ -98,7 +98,7 @@ def unit_of(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
     motions, scales, polarities, count = product.shape
     some = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
     motion = max(product.motions, key=lambda one: len(one.coefficients))
-    setup = Setup(some, product.model, product.treatment, product.duration)
+    setup = Setup(some, product.model, product.chattering, product.duration)
     task = Task(slice(None), motion, float(product.scales.factors(motion).max()))
     simulate_task(setup, task)  # loads the kernels
     start = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Treatments of chattering: rest by proof, or by one of the common thresholds."""
+"""Chattering schemes: rest by proof, or by one of the common thresholds."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ FITTED_RESTITUTIONS: Final = (0.5, 0.97)
 #: Number of critical amplitudes per call of a kernel, which takes about a third of a second.
 _CRITICAL_TOGETHER: Final = 512
 
-_BY_NAME: dict[str, type[Treatment]] = {}
+_BY_NAME: dict[str, type[ChatteringScheme]] = {}
 
 
 @dataclass(frozen=True)
-class Treatment(ABC):
-    """Treatment of chattering: the rule by which a sequence of impacts ends.
+class ChatteringScheme(ABC):
+    """ChatteringScheme of chattering: the rule by which a sequence of impacts ends.
 
     A user-defined subclass is available by its `name` as soon as it is imported. At an impact, one of the measures of
     the kernels (`rocking.kernels.state`) is compared with its limits.
@@ -77,27 +77,27 @@ class Treatment(ABC):
         """Return the limits for the impacts of both sides of every body, shape (n, 2).
 
         The unit is the unit of the measure `code`. Without a motion the rocking is free; `factor` multiplies the
-        motion. Raise `InvalidOption` if the treatment does not support such bodies or motions.
+        motion. Raise `InvalidOption` if the scheme does not support such bodies or motions.
         """
 
     def __str__(self) -> str:
-        """Format the treatment as text that `treatment` accepts."""
+        """Format the scheme as text that `chattering_scheme` accepts."""
         values = [str(getattr(self, parameter.name)) for parameter in fields(self)]
         return "=".join([self.name, *values])
 
     @classmethod
-    def from_text(cls, value: str) -> Treatment:
-        """Create the treatment from the text after "NAME=", or raise `InvalidOption`."""
+    def from_text(cls, value: str) -> ChatteringScheme:
+        """Create the scheme from the text after "NAME=", or raise `InvalidOption`."""
         if not fields(cls):
-            raise InvalidOption(f"the chattering treatment {cls.name} takes no parameter, not {value!r}")
+            raise InvalidOption(f"the chattering scheme {cls.name} takes no parameter, not {value!r}")
         try:
             return cls(float(value))  # type: ignore[call-arg]
         except ValueError:
-            raise InvalidOption(f"the chattering treatment {cls.name} takes one number, not {value!r}") from None
+            raise InvalidOption(f"the chattering scheme {cls.name} takes one number, not {value!r}") from None
 
 
 @dataclass(frozen=True)
-class AsymptoticTime(Treatment):
+class AsymptoticTime(ChatteringScheme):
     """Rest once the asymptotic chattering time (paper, Eq. 65) has passed since uplift (paper, Fig. 8a).
 
     Only sinusoidal motions and symmetric blocks are supported. Above the critical amplitude the block never rests. If
@@ -144,8 +144,8 @@ class AsymptoticTime(Treatment):
         return f"time (Eq. 65, {'exact a_cr' if self.critical == 'exact' else f'Eq. {self.critical[2:]}'})"
 
     @classmethod
-    def from_text(cls, value: str) -> Treatment:
-        """Create the treatment from the name of a critical amplitude."""
+    def from_text(cls, value: str) -> ChatteringScheme:
+        """Create the scheme from the name of a critical amplitude."""
         return cls(value)  # type: ignore[arg-type]
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
@@ -174,7 +174,7 @@ class AsymptoticTime(Treatment):
 
 
 @dataclass(frozen=True)
-class Certified(Treatment):
+class Certified(ChatteringScheme):
     """Rest if and only if the certificate proves complete chattering (default).
 
     Parameters
@@ -209,7 +209,7 @@ class Certified(Treatment):
 
 
 @dataclass(frozen=True)
-class VelocityThreshold(Treatment):
+class VelocityThreshold(ChatteringScheme):
     """Rest as soon as the angular speed after an impact is below a threshold (paper, Fig. 8b).
 
     Parameters
@@ -264,7 +264,7 @@ class GeometricBypass(VelocityThreshold):
 
 
 @dataclass(frozen=True)
-class IntervalThreshold(Treatment):
+class IntervalThreshold(ChatteringScheme):
     """Rest as soon as the interval between two impacts is below a threshold.
 
     Parameters
@@ -288,19 +288,19 @@ class IntervalThreshold(Treatment):
         return np.full((len(bodies), 2), self.threshold)
 
 
-def treatment(chattering: str | Treatment) -> Treatment:
-    """Return the treatment with a name, or with a name and a parameter, or the given treatment itself.
+def chattering_scheme(chattering: str | ChatteringScheme) -> ChatteringScheme:
+    """Return the scheme with a name, or with a name and a parameter, or the given scheme itself.
 
     Examples
     --------
-    >>> treatment("certified"), treatment("velocity=1e-6"), str(treatment("interval"))
+    >>> chattering_scheme("certified"), chattering_scheme("velocity=1e-6"), str(chattering_scheme("interval"))
     (Certified(tolerance=1e-12), VelocityThreshold(threshold=1e-06), 'interval=1e-09')
     """
-    if isinstance(chattering, Treatment):
+    if isinstance(chattering, ChatteringScheme):
         return chattering
     name, given, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
     if name not in _BY_NAME:
-        kinds = "" if isinstance(chattering, str) else " or a treatment"
+        kinds = "" if isinstance(chattering, str) else " or a scheme"
         raise InvalidOption(
             f"{{}} must be one of {', '.join(_BY_NAME)}{kinds}, not {chattering!r}", "chattering", value=chattering
         )
