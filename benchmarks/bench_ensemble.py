@@ -56,7 +56,7 @@ def report(model: Model, motion: rocking.Motion, acceleration: np.ndarray, block
         own = shortest(lambda: rocking.simulate_many(blocks, motion, model=model)) / steps
     result = rocking.simulate_many(blocks, motion, model=model).isel(motion=0)
     nonlinear = model == "nonlinear"
-    arguments = (acceleration, motion.step, blocks.p[:, 0].copy(), blocks.alpha[:, 0].copy(), 0.9, nonlinear)
+    arguments = (acceleration, motion.dt, blocks.p[:, 0].copy(), blocks.alpha[:, 0].copy(), 0.9, nonlinear)
     plain = shortest(lambda: runge_kutta(*arguments)) / steps
     baseline = scipy_time(model, acceleration, motion, blocks) / (len(acceleration) - 1)
     print(
@@ -112,7 +112,7 @@ def shortest(work: Callable[[], object]) -> float:
 
 def scipy_time(model: str, acceleration: np.ndarray, motion: rocking.Motion, blocks: rocking.Blocks) -> float:
     """Mean processor time of SciPy's event loop per block, over a random sample of the blocks."""
-    assert motion.step is not None
+    assert motion.dt is not None
     chosen = np.random.default_rng(0).choice(len(blocks), SCIPY_SAMPLE, replace=False)
     total = 0.0
     for index in chosen:
@@ -122,7 +122,7 @@ def scipy_time(model: str, acceleration: np.ndarray, motion: rocking.Motion, blo
         problem = Problem(model, p, alpha, e, motion.breakpoints, motion.coefficients)
         start = time.process_time()
         integrate_as_practised(
-            acceleration, motion.step, problem, rtol=1e-8, atol=1e-12, max_step=0.05, rest_speed=1e-6 * p[0] * alpha[0]
+            acceleration, motion.dt, problem, rtol=1e-8, atol=1e-12, max_step=0.05, rest_speed=1e-6 * p[0] * alpha[0]
         )
         total += time.process_time() - start
     return total / len(chosen)

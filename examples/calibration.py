@@ -35,7 +35,7 @@ print(calibration.summary())
 # It predicts the tests that it has not seen:
 
 chances = calibration.predict(pulses[80:])
-scores = Scores.of(chances, np.array(overturned[80:]))
+scores = Scores.from_predictions(chances, np.array(overturned[80:]))
 accuracy, brier = scores.accuracy, scores.brier
 print(f"{100.0 * accuracy:.1f} % of 80 further tests predicted, Brier score {brier:.3f}")
 

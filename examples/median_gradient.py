@@ -18,7 +18,7 @@ motions = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(
 
 def capacities(body):
     """Peak accelerations, m/s^2, at which a body begins to overturn, and their relative derivatives."""
-    found = [rocking.critical_scale(body, motion, 1.0, 12.0) for motion in motions]
+    found = [rocking.critical_scale(body, motion, (1.0, 12.0)) for motion in motions]
     by = {
         name: np.array([getattr(each, name) / each.scale for each in found]) for name in ("p", "alpha", "restitution")
     }

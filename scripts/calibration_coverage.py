@@ -77,7 +77,7 @@ def data_sets(count: int, two_sided: bool) -> list[DataSet]:
 
 def drawn(count: int, two_sided: bool) -> Iterator[DataSet]:
     """Draw so many truths, and pass over those whose outcomes are all the same."""
-    space = Space.of(**BOUNDS, two_sided=two_sided)
+    space = Space.from_bounds(**BOUNDS, two_sided=two_sided)
     rng = np.random.default_rng(two_sided)
     truths = population.with_dispersions(space, space.quasi_random(count, rng), rng)
     for seed, truth in enumerate(truths[:, None]):
@@ -97,7 +97,7 @@ def ranks(given: DataSet) -> dict[str, float]:
             seed=given.seed,
             **BOUNDS,
             two_sided=given.space.two_sided,
-            lapse=LAPSE,
+            outlier_probability=LAPSE,
         )
     values = given.space.named(population.unpacked(given.truth)[0])
     return {name: float(np.mean(found.draws[name] < values[name][0])) for name in found.estimates}

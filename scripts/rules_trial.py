@@ -47,7 +47,7 @@ def main() -> None:
 
 def all_blocks():
     """Rectangular blocks of all heights and slendernesses."""
-    return rocking.Blocks.of(
+    return rocking.Blocks.from_bodies(
         [
             rocking.Block(width=height * float(np.tan(alpha)), height=height)
             for height in HEIGHTS
@@ -71,7 +71,7 @@ def all_motions():
 
 def strong_part(record):
     """Find the times between which 5 and 95 % of the Arias intensity arrive."""
-    times, samples = record.samples
+    times, samples = record.times, record.samples
     energy = np.cumsum(samples**2)
     return tuple(float(times[np.searchsorted(energy, share * energy[-1])]) for share in (0.05, 0.95))
 

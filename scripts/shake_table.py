@@ -50,14 +50,18 @@ def main() -> None:
         print(f"calibrated in {time.perf_counter() - start:.0f} s ({time.process_time() - worked:.0f} s of CPU time)")
         print(f"\n{'':<44}accuracy  log loss  Brier")
         report(
-            "distinct elements, tuned by their authors", Scores.of(as_sure_as_right(elements, overturned), overturned)
+            "distinct elements, tuned by their authors",
+            Scores.from_predictions(as_sure_as_right(elements, overturned), overturned),
         )
-        report("logistic regression, fitted", Scores.of(logistic(intensities, overturned)(intensities), overturned))
+        report(
+            "logistic regression, fitted",
+            Scores.from_predictions(logistic(intensities, overturned)(intensities), overturned),
+        )
         report("rocking blocks, fitted", calibration.scores)
         for name, labels in (("random folds", None), ("folds of source motions", groups)):
             if options.cross_validate:
                 chances = left_out(intensities, overturned, labels, options.cross_validate)
-                repeats = tuple(Scores.of(row, overturned) for row in chances)
+                repeats = tuple(Scores.from_predictions(row, overturned) for row in chances)
                 report(f"logistic regression, {name}", Validation(chances, repeats).scores)
                 validation = calibration.cross_validate(groups=labels, folds=FOLDS, repeats=options.cross_validate)
                 report(f"rocking blocks, {name}", validation.scores)

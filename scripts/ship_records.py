@@ -122,7 +122,7 @@ def entry(station: Station, channel: Channel) -> dict[str, object]:
         "station": station.station,
         "direction": channel.direction,
         "state": station.state,
-        "step": channel.step,
+        "dt": channel.step,
         "samples": len(channel.counts),
         "units": channel.units,
         "denominator": channel.denominator,

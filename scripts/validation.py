@@ -162,7 +162,7 @@ def shake_tables(folder):
     for specimen in ("1", "2"):
         overturned = np.array([test[f"overturned_specimen_{specimen}"] == "1" for test in tests])
         elements = np.array([test[f"dem_best_specimen_{specimen}"] == "1" for test in tests])
-        tuned = Scores.of(as_sure_as_right(elements, overturned), overturned)
+        tuned = Scores.from_predictions(as_sure_as_right(elements, overturned), overturned)
         rows.append(score_row(specimen, "distinct elements, tuned by their authors on all", tuned))
         blocks = {"rocking blocks": rocking.calibrate(motions, overturned, alpha=(0.02, 0.5), **LINEAR)}
         rows += left_out_rows(specimen, motions, overturned, groups, blocks)
@@ -250,7 +250,7 @@ def left_out_rows(specimen, motions, overturned, groups, calibrations):
     folds = min(FOLDS, len(set(groups)))
     intensities = np.log([(motion.pga, motion.pgv) for motion in motions])
     chances = left_out(intensities, overturned, groups, 1)
-    regression = Validation(chances, tuple(Scores.of(row, overturned) for row in chances)).scores
+    regression = Validation(chances, tuple(Scores.from_predictions(row, overturned) for row in chances)).scores
     scores = {name: one.cross_validate(groups=groups, folds=folds).scores for name, one in calibrations.items()}
     told = {"logistic regression on PGA and PGV": regression, **scores}
     return [score_row(specimen, name, one) for name, one in told.items()]

@@ -14,7 +14,9 @@ BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.
 def made(folder: Path, scales: int = 8) -> Study:
     """Make a study of six units for each scale, of a hundredth of a second, or open it."""
     motions = [rocking.records.load(name) for name in ("el-centro-meloland-270", "el-centro-meloland-360")]
-    return rocking.study(folder, BLOCKS, motions, levels=np.linspace(2.0, 9.0, scales), measure="pga", unit_blocks=512)
+    return rocking.create_study(
+        folder, BLOCKS, motions, levels=np.linspace(2.0, 9.0, scales), measure="pga", unit_blocks=512
+    )
 
 
 def digest(folder: Path) -> str:

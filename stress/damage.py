@@ -27,7 +27,7 @@ def damaged(data: bytes, rng: np.random.Generator) -> bytes:
 def seen(folder: Path, name: str, reference: xr.Dataset) -> str:
     """Whether the damage of a file is reported when it is read; if not, that what is read is the same."""
     try:
-        study = rocking.study(folder)
+        study = rocking.Study(folder)
         faults = study.verify()
     except rocking.StudyError as error:
         assert "damaged" in str(error)
@@ -52,7 +52,7 @@ def main() -> None:
         folder = Path(where)
         with rocking.set_options(threads=1):
             made(folder).run()
-        reference, expected = rocking.study(folder).results().load(), digest(folder)
+        reference, expected = rocking.Study(folder).results().load(), digest(folder)
         files = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != "lock"]
         for _ in range(given.trials):
             # The file that describes a study as often as a fifth of all.
@@ -64,7 +64,7 @@ def main() -> None:
             if what == "reported when the study is opened":
                 path.write_bytes(sound)
             else:
-                rocking.study(folder).verify(repair=True)
+                rocking.Study(folder).verify(repair=True)
             assert digest(folder) == expected
     for (file, what), count in sorted(found.items()):
         print(f"{count:5d}  {file}: {what}")

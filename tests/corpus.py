@@ -222,7 +222,7 @@ def steady(motion: rocking.Motion) -> rocking.Motion:
 def record(name: str = "el-centro-meloland-270", start: int = 350, end: int = 1100) -> rocking.Motion:
     """Part of a shipped record."""
     whole = rocking.records.load(name)
-    return rocking.Motion.from_samples(whole.samples[1][start:end], whole.step, name=name)
+    return rocking.Motion.from_samples(whole.samples[start:end], whole.dt, name=name)
 
 
 def shaking() -> list[rocking.Motion]:
@@ -558,7 +558,7 @@ def record_files() -> Iterator[Item]:
         for channel in (None, 1, 2):
             motion = attempt(rocking.read, path, channel=channel)
             yield "motion", str(motion).replace(str(path), path.name)
-            yield "samples", [motion.step, motion.samples] if isinstance(motion, rocking.Motion) else None
+            yield "samples", [motion.dt, motion.times, motion.samples] if isinstance(motion, rocking.Motion) else None
     for name in rocking.records.names():
         yield name, [rocking.records.load(name).samples, str(rocking.records.info(name))]
 
@@ -617,7 +617,7 @@ def critical_scales() -> Iterator[Item]:
 def fragilities() -> Iterator[Item]:
     for measure in ("pga", "pgv", rocking.Measure("sa", 1.0)):
         levels = np.array(LEVELS) * (1.0 if measure == "pga" else 0.2 if measure == "pgv" else 1.3)
-        found = rocking.fragility(SLENDER, suite(), measure=measure, levels=levels, limits=LIMITS, **QUIET)
+        found = rocking.fragility(SLENDER, suite(), measure=measure, levels=levels, limit_states=LIMITS, **QUIET)
         yield from of_result(found)
         yield "nrml", re.sub(r"rocking \d+\.\d+\.\d+", "", saved(found.to_nrml))
     clusters = [k // 2 for k in range(len(suite()))]
@@ -998,18 +998,19 @@ SHAKEN: Final = "motion,scale,overturned\n" + "".join(
 ON_FILES: Final = {
     "fragility": [
         "fragility --outcomes observed.csv --hazard rates.csv --years 50 --out fitted",
-        f"fragility {TWO} ridgecrest-tow2-090 --p 1 --alpha 0.25 --levels 0.5:30:12 --limits overturning,half=0.5",
+        f"fragility {TWO} ridgecrest-tow2-090 --p 1 --alpha 0.25 --levels 0.5:30:12 "
+        "--limit-states overturning,half=0.5",
         "fragility --outcomes observed.csv --confidence 0.8 --json",
     ],
     "tests": [
-        f"validate tests.csv {SIZES} --lapse 0.01 --out judged",
+        f"validate tests.csv {SIZES} --outlier-probability 0.01 --out judged",
         "calibrate shaken.csv --candidates 128 --p 3 --restitution housner --no-two-sided",
     ],
     "study": [
         "study new template.toml",
         "study run study.toml kept --quiet",
         "study status kept",
-        "study report kept report --quiet --limits overturning,half=0.5",
+        "study report kept report --quiet --limit-states overturning,half=0.5",
         "study verify kept --quiet",
     ],
 }
@@ -1051,13 +1052,13 @@ def studies() -> Iterator[Item]:
         product = read_study(folder / "study.toml").product
         yield "product", [product.shape, product.model, str(product.chattering)]
         motions = dict(list(suite().items())[:5])
-        study = rocking.study(folder / "study", SUITE_BLOCKS, motions, levels=LEVELS, measure="pga")
+        study = rocking.create_study(folder / "study", SUITE_BLOCKS, motions, levels=LEVELS, measure="pga")
         with rocking.set_options(threads=1):
             study.run()
         yield "complete", [study.status.complete, study.status.done, study.status.units, study.status.simulations]
         yield "results", of_dataset(study.results())
         yield "critical", of_dataset(study.critical_scales())
-        yield from of_result(study.fragility(limits=LIMITS))
+        yield from of_result(study.fragility(limit_states=LIMITS))
         yield from of_result(study.block_fragilities(**QUIET))
         yield from of_result(study.spectrum(**QUIET))
         yield "verified", study.verify(recompute=1)

@@ -81,9 +81,9 @@ def test_what_is_no_block_is_refused_and_told_how_to_become_one(take, block):
 
 
 def test_blocks_are_gathered_from_one_from_several_and_from_themselves():
-    blocks = Blocks.of([BLOCK, Block(half_width=0.2, half_height=1.0)])
-    assert Blocks.of(blocks) is blocks
-    assert Blocks.of(BLOCK)[0] == Block.from_parameters(BLOCK.p, BLOCK.alpha, BLOCK.restitution)
+    blocks = Blocks.from_bodies([BLOCK, Block(half_width=0.2, half_height=1.0)])
+    assert Blocks.from_bodies(blocks) is blocks
+    assert Blocks.from_bodies(BLOCK)[0] == Block.from_parameters(BLOCK.p, BLOCK.alpha, BLOCK.restitution)
     with pytest.raises(InvalidBlock, match="select"):
         blocks[0:1]
     with pytest.raises(IndexError):
@@ -140,7 +140,7 @@ TAKES_ONE_THING = {
     "response of episodes": rocking.chattering.chattering_episodes,
     "slenderness": rocking.block.housner_restitution,
     "label of a part": lambda value: a_map().select(frequency=value),
-    "limits": lambda value: rocking.fragility(BLOCK, [MOTION], limits=value),
+    "limits": lambda value: rocking.fragility(BLOCK, [MOTION], limit_states=value),
     "polarity": lambda value: rocking.fragility(BLOCK, [MOTION], polarity=value),
     "polarity of an ensemble": lambda value: rocking.simulate_many(BLOCK, MOTION, polarity=value),
     "confidence": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trials=3, confidence=value),
@@ -149,7 +149,7 @@ TAKES_ONE_THING = {
     "intensity of a probability": lambda value: fitted().curves[0].probability(value),
     "intensity of a band": lambda value: fitted().curves[0].band(value)[0],
     "intensity of a rate": SITE.rate_of,
-    "chosen blocks": Blocks.of(BLOCK).select,
+    "chosen blocks": Blocks.from_bodies(BLOCK).select,
     "file of a fragility": lambda value: fitted().to_csv(value),
     "NRML file": lambda value: fitted().to_nrml(value),
     "NRML taxonomy": lambda value: fitted().to_nrml("unwritten.xml", taxonomy=value),

@@ -166,7 +166,7 @@ def test_blocks_broadcast_and_index():
         (lambda: Blocks(p=[1.0], alpha=[1.2]), "restitution"),
         (lambda: Blocks(p=[1.0, 2.0], alpha=[0.1, 0.2, 0.3]), "shape"),
         (lambda: Blocks.grid(p=[], alpha=[0.1]), "grid"),
-        (lambda: Blocks.of([]), "at least one"),
+        (lambda: Blocks.from_bodies([]), "at least one"),
         (lambda: Blocks([1.0, 1e200], [0.1]), "block 1"),
         (lambda: Blocks([1.0], [0.1], gravity=np.inf), "gravity"),
     ],

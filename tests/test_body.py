@@ -94,7 +94,7 @@ def test_a_body_is_found_again_from_its_p_and_alpha(height, plus, minus, gyratio
     again = Block.from_parameters(both(body, "p"), both(body, "alpha"))
     for name in (*NAMES, "radius"):
         assert both(again, name) == pytest.approx(both(body, name), rel=1e-7), name
-    assert both(Blocks.of([body])[0], "radius") == pytest.approx(both(body, "radius"), rel=1e-7)
+    assert both(Blocks.from_bodies([body])[0], "radius") == pytest.approx(both(body, "radius"), rel=1e-7)
     assert again.description.startswith("body from its parameters, centre of mass ")
 
 

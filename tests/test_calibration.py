@@ -68,7 +68,7 @@ def unseen():
 
 
 def test_two_sides_by_housners_rule_are_those_of_one_rectangle():
-    space = Space.of((1.0, 8.0), (0.05, 0.5), "housner", two_sided=True)
+    space = Space.from_bounds((1.0, 8.0), (0.05, 0.5), "housner", two_sided=True)
     points = space.quasi_random(200, np.random.default_rng(3))
     blocks, named = space.blocks(points), space.named(points)
     compared = 0
@@ -85,14 +85,14 @@ def test_two_sides_by_housners_rule_are_those_of_one_rectangle():
         compared += 1
     assert compared > 150
     np.testing.assert_allclose(rocking.Blocks(blocks.p, blocks.alpha).restitution, blocks.restitution, rtol=1e-6)
-    symmetric = Space.of(2.0, (0.05, 0.5), "housner", two_sided=False)
+    symmetric = Space.from_bounds(2.0, (0.05, 0.5), "housner", two_sided=False)
     assert set(symmetric.blocks(symmetric.quasi_random(20, np.random.default_rng(3))).p.ravel()) == {2.0}
 
 
 def test_what_a_hidden_block_will_do_is_predicted(found, unseen):
     motions, overturned = unseen
-    scores = Scores.of(found.predict(motions), overturned)
-    guess = Scores.of(np.full(len(motions), overturned.mean()), overturned)
+    scores = Scores.from_predictions(found.predict(motions), overturned)
+    guess = Scores.from_predictions(np.full(len(motions), overturned.mean()), overturned)
     assert scores.accuracy > 0.93
     assert scores.log_loss < 0.35 * guess.log_loss
 
@@ -110,7 +110,7 @@ def test_the_ensemble_predicts_what_its_blocks_do(found, unseen):
     fallen = np.array([outcomes(motions, block) for block in found.blocks])
     count = found.diagnostics.effective
     share = (count * found.weights @ fallen + 0.5) / (count + 1.0)
-    expected = found.lapse + (1.0 - 2.0 * found.lapse) * share
+    expected = found.outlier_probability + (1.0 - 2.0 * found.outlier_probability) * share
     np.testing.assert_allclose(found.predict(motions), expected, rtol=1e-12)
     assert found.weights.sum() == pytest.approx(1.0, abs=1e-12)
 
@@ -127,8 +127,8 @@ def test_cross_validation_says_how_good_predictions_are(coarsely, shaken, unseen
     validation = found.cross_validate(folds=4, repeats=2)
     assert validation.probabilities.shape == (2, len(shaken[0]))
     for row, scores in zip(validation.probabilities, validation.repeats, strict=True):
-        assert scores == Scores.of(row, shaken[1])
-    honest = Scores.of(found.predict(unseen[0]), unseen[1])
+        assert scores == Scores.from_predictions(row, shaken[1])
+    honest = Scores.from_predictions(found.predict(unseen[0]), unseen[1])
     assert found.scores.log_loss < validation.scores.log_loss
     # Both are means over more than a hundred outcomes, with standard errors of about 0.02.
     assert abs(validation.scores.accuracy - honest.accuracy) < 0.06
@@ -243,7 +243,7 @@ def test_a_mistaken_argument_is_refused(change, word):
 
 
 def test_even_points_fill_the_space_evenly():
-    space = Space.of((1.0, 4.0), (0.1, 0.2), (0.5, 1.0), two_sided=True)
+    space = Space.from_bounds((1.0, 4.0), (0.1, 0.2), (0.5, 1.0), two_sided=True)
     rng = np.random.default_rng(0)
     points = space.quasi_random(4096, rng)
     low, high = space.box
@@ -255,7 +255,7 @@ def test_even_points_fill_the_space_evenly():
 
 
 def test_the_slenderness_of_a_side_is_the_mean_times_or_over_the_root_of_the_ratio():
-    space = Space.of((1.0, 9.0), (0.01, 1.0), (0.1, 1.0), two_sided=True)
+    space = Space.from_bounds((1.0, 9.0), (0.01, 1.0), (0.1, 1.0), two_sided=True)
     point = np.log([[3.0, 0.1, 0.5, 4.0]])
     for name, expected in (("p", [3.0, 3.0]), ("alpha", [0.2, 0.05]), ("restitution", [0.5, 0.5])):
         np.testing.assert_allclose(space.sides(point)[name][0], expected, rtol=1e-12)
@@ -263,7 +263,7 @@ def test_the_slenderness_of_a_side_is_the_mean_times_or_over_the_root_of_the_rat
 
 
 def test_a_known_slenderness_leaves_nothing_in_which_the_sides_differ():
-    space = Space.of((1.0, 9.0), 0.2, (0.1, 1.0), two_sided=True)
+    space = Space.from_bounds((1.0, 9.0), 0.2, (0.1, 1.0), two_sided=True)
     assert not space.two_sided
     assert list(space.named(np.log([[3.0, 0.5]]))) == ["p", "restitution"]
     for name, expected in (("p", 3.0), ("alpha", 0.2), ("restitution", 0.5)):
@@ -273,7 +273,7 @@ def test_a_known_slenderness_leaves_nothing_in_which_the_sides_differ():
 @pytest.fixture(scope="module")
 def threshold_evidence():
     """Symmetric blocks that overturn where alpha is below a threshold, one threshold for each of 40 tests."""
-    space = Space.of((1.0, 2.0), (0.05, 0.5), (0.5, 0.9), two_sided=False)
+    space = Space.from_bounds((1.0, 2.0), (0.05, 0.5), (0.5, 0.9), two_sided=False)
     rng = np.random.default_rng(3)
     points = space.quasi_random(4096, rng)
     thresholds = np.log(np.geomspace(0.08, 0.35, 40))
@@ -380,7 +380,9 @@ def test_a_motion_that_is_given_twice_is_simulated_once(coarse, monkeypatch):
 def test_tests_that_are_left_out_do_not_count(threshold_evidence):
     evidence, _ = threshold_evidence
     some = np.arange(40) < 30
-    flipped = Evidence(evidence.candidates, np.where(some, evidence.observed, ~evidence.observed), evidence.lapse)
+    flipped = Evidence(
+        evidence.candidates, np.where(some, evidence.observed, ~evidence.observed), evidence.outlier_probability
+    )
     first, second = (posterior(one.of_tests(some), 64, 2, np.random.default_rng(2)) for one in (evidence, flipped))
     np.testing.assert_array_equal(first, second)
 
@@ -424,17 +426,17 @@ def test_the_density_is_that_of_what_is_drawn():
 
 
 def test_scores_of_known_predictions():
-    scores = Scores.of([0.8, 0.4, 0.5], [1, 1, 0])
+    scores = Scores.from_predictions([0.8, 0.4, 0.5], [1, 1, 0])
     assert scores.accuracy == pytest.approx(2 / 3)
     assert scores.log_loss == pytest.approx(-(math.log(0.8) + math.log(0.4) + math.log(0.5)) / 3)
     assert scores.brier == pytest.approx((0.04 + 0.36 + 0.25) / 3)
-    assert Scores.of([1.0], [0]).log_loss == math.inf
+    assert Scores.from_predictions([1.0], [0]).log_loss == math.inf
 
 
 @pytest.mark.parametrize("probabilities", [[0.5], [1.2, 0.1], [math.nan, 0.1], []])
 def test_scores_refuse_what_is_no_probability(probabilities):
     with pytest.raises(rocking.InvalidOption):
-        Scores.of(probabilities, [True, False])
+        Scores.from_predictions(probabilities, [True, False])
 
 
 # Histories: release tests and forced rocking.
@@ -674,7 +676,7 @@ def test_rows_without_a_group_belong_to_none(tmp_path):
 
 
 def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(shaken):
-    space = Space.of((3.0, 3.0), (0.1, 0.2), (0.9, 0.9), two_sided=False)
+    space = Space.from_bounds((3.0, 3.0), (0.1, 0.2), (0.9, 0.9), two_sided=False)
     assert space.known == {"p": 3.0, "restitution": 0.9}
     with pytest.raises(rocking.InvalidOption, match=r"by simulate, .* by fragility"):
         rocking.calibrate(*shaken, p=(3.0, 3.0), alpha=0.2, restitution=(0.9, 0.9), model="linear")
@@ -684,7 +686,7 @@ def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(
 
 @pytest.mark.parametrize("share, told", [(0.08, True), (0.03, False)])
 def test_a_posterior_whose_interval_ends_at_a_bound_is_told(share, told):
-    space = Space.of((1.0, 10.0), 0.2, 0.9, two_sided=False)
+    space = Space.from_bounds((1.0, 10.0), 0.2, 0.9, two_sided=False)
     ends = np.log([9.9, 3.0])
     centres = np.repeat(ends, [round(1000 * share), 1000 - round(1000 * share)])[:, None]
     notes = [str(one) for one in bounds_reached(space, centres)]

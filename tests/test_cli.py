@@ -51,7 +51,7 @@ FILES = {
     ),
     "ida": ([RECORD, *BLOCK, "--levels", "1:6:6"], "bands.csv levels.csv ida.nc ida"),
     "fragility": (
-        [RECORD, "ridgecrest-clc-090", *BLOCK, "--levels", "1:6:9", "--limits", "half=0.5,overturning"],
+        [RECORD, "ridgecrest-clc-090", *BLOCK, "--levels", "1:6:9", "--limit-states", "half=0.5,overturning"],
         "fragility.xml fragility.csv outcomes.csv fragility",
     ),
     "chatter": (["1.03", "2", "0.92"], "impacts.csv cycles.csv chatter"),

@@ -116,7 +116,7 @@ LEVELS = ["--levels", "0.1g:1.2g:12"]
     ("arguments", "words"),
     [
         (["fragility", RECORD, OTHER, *SIZES, *LEVELS, "--taxonomy", "a block", "--out", "out"], "--taxonomy of NRML"),
-        (["fragility", RECORD, *SIZES, *LEVELS, "--limits", "a half=0.5", "--out", "out"], "limit state of NRML"),
+        (["fragility", RECORD, *SIZES, *LEVELS, "--limit-states", "a half=0.5", "--out", "out"], "limit state of NRML"),
         (["fragility", RECORD, OTHER, *SIZES, *STRIPES, "--hazard", "site.csv"], "fit the one against the other's"),
         (["fragility", RECORD, OTHER, *SIZES, "--levels", "0.5g"], "--levels that differ"),
         (["measures", RECORD, OTHER, *SIZES, "--damping", "1.5"], "--damping must be a fraction"),
@@ -274,7 +274,7 @@ def test_what_was_simulated_is_kept_where_no_curve_can_be_fitted(run, tmp_path):
     "arguments",
     ["", "--restitution 0.5", "--one-sided", "--lean 1deg", "--tendon stiffness=2e6", "--spring 100", "--scale 2",
      "--pga 0.5g", "--pgv 0.4", "--sa 0.4g@1", "--vertical nothing", "--keep-going", "--model linear",
-     "--chattering bypass", "--polarity both", "--limits half=0.5", "--clusters station", "--levels 1,2"],
+     "--chattering bypass", "--polarity both", "--limit-states half=0.5", "--clusters station", "--levels 1,2"],
 )  # fmt: skip
 def test_observed_outcomes_go_without_what_is_simulated(run, tmp_path, arguments):
     table = tmp_path / "seen.csv"
@@ -327,8 +327,8 @@ def test_standing_is_about_overturning_in_whatever_order_the_limits_come(run, mo
     about = f"fragility {RECORD} ridgecrest-clc-090 {' '.join(SIZES)} --levels 0.1g:1g:19 --standing 1000 --json"
     common = about.split()
     for limits in ("overturning,half=0.5", "half=0.5,overturning"):
-        code, out, _ = run(*common, "--limits", limits)
+        code, out, _ = run(*common, "--limit-states", limits)
         assert code == 0 and json.loads(out)["survival"]["limit_state"] == "overturning"
     monkeypatch.setattr("rocking.cli.fragility.run", None)  # it is refused before anything is simulated
-    code, _, err = run(*common, "--limits", "half=0.5,most=0.8")
+    code, _, err = run(*common, "--limit-states", "half=0.5,most=0.8")
     assert code == 2 and "--standing is about overturning, or about one limit, not half and most" in err

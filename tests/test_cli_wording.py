@@ -63,8 +63,8 @@ ida {R} {S} --measure pgv --levels 0.2g:1g:5 | --levels takes a velocity as 40cm
 ida {R} {S} --measure pga_ratio --levels 0.2g,1g | which counts in the block's own units, not '0.2g'
 fragility {R} --ensemble none.csv --restitution 0.5 | --ensemble has blocks of its own: leave --restitution out
 measures {R} --ensemble none.csv --one-sided --spring 2 | leave --one-sided and --spring out
-fragility {R} {S} --limits half=0.5,half=0.7 | has half twice
-fragility {R} {S} --limits overturning=0.5 | gives a rotation the name 'overturning'
+fragility {R} {S} --limit-states half=0.5,half=0.7 | has half twice
+fragility {R} {S} --limit-states overturning=0.5 | gives a rotation the name 'overturning'
 fragility {R} {S} --site 2 | --site is for a curve of --hazard
 chatter one 2 0.9 | Invalid value for A: unable to convert "one" into float; see rocking chatter --help
 chatter 1.5 2 | rocking chatter needs ETA; see rocking chatter --help

@@ -179,7 +179,9 @@ def test_the_entry_points_for_blocks_lead_to_those_for_bodies_between_stops(tmp_
     calls = {
         "simulate": lambda **model: rocking.simulate(body, pulses.sine(12.0, 5.0, cycles=2), **model),
         "simulate_many": lambda **model: rocking.simulate_many(body, pulses.sine(12.0, 5.0, cycles=2), **model),
-        "study": lambda **model: rocking.study(tmp_path, body, pulses.sine(12.0, 5.0, cycles=2), levels=[1.0], **model),
+        "study": lambda **model: rocking.create_study(
+            tmp_path, body, pulses.sine(12.0, 5.0, cycles=2), levels=[1.0], **model
+        ),
     }
     with pytest.raises(InvalidOption, match=r"call rocking.dynamics.simulate, or give model \"linear\""):
         calls[entry]()

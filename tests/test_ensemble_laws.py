@@ -92,7 +92,7 @@ def test_a_scale_that_makes_a_motion_too_strong_is_refused_before_anything_is_si
         with pytest.raises(rocking.InvalidMotion, match=r"must stay below 1e\+30 m/s\^2: check units and scale"):
             simulate_many(block, motion, levels=levels, measure=measure)
     assert not begun
-    assert Scales.of([1.0, 4e29], "factor").factors(motion).tolist() == [1.0, 4e29]
+    assert Scales.from_levels([1.0, 4e29], "factor").factors(motion).tolist() == [1.0, 4e29]
 
 
 # --- motions that are not samples -----------------------------------------------------------------------------

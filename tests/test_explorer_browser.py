@@ -533,7 +533,7 @@ def test_a_record_is_scaled(opened):
 
 
 def test_a_file_is_chosen_told_about_and_shown(opened, tmp_path):
-    samples = rocking.records.load("el-centro-meloland-270").samples[1]
+    samples = rocking.records.load("el-centro-meloland-270").samples
     file = tmp_path / "station 7.txt"
     file.write_text("\n".join(f"{value / 9.80665:.12g}" for value in samples), "utf-8")
     page = opened(STATUE, allowed=["422"])
@@ -604,7 +604,7 @@ def test_a_file_of_several_channels_is_dropped(opened):
 
 def test_a_link_whose_file_is_opened_again_is_the_same_case(opened, explorer):
     record = rocking.records.load("el-centro-meloland-270")
-    text = "\n".join(f"{value:.9g}" for value in record.samples[1])
+    text = "\n".join(f"{value:.9g}" for value in record.samples)
     key = hashlib.sha256(text.encode()).hexdigest()[:24]
     link = f"width=0.24&height=1.1&motion=file:{key}&vertical=ridgecrest-clc-up&dt=0.01&units=m/s2&pga=0.4g"
     page = opened(STATUE, allowed=["422"])
@@ -939,7 +939,7 @@ def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(
 def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
     folder = tmp_path_factory.mktemp("study") / "museum"
     blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 12), alpha=np.linspace(0.1, 0.3, 10), restitution=[0.9])
-    made = rocking.study(
+    made = rocking.create_study(
         folder,
         blocks,
         rocking.records.load("el-centro-meloland-270"),
@@ -993,7 +993,7 @@ def test_uneven_cells_of_a_study_lie_where_their_values_do(opened, tmp_path_fact
     folder = tmp_path_factory.mktemp("study") / "uneven"
     blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0, 8.0, 16.0], alpha=[0.2], restitution=[0.9])
     levels = np.array([0.8, 0.2, 0.4]) * 9.80665
-    made = rocking.study(folder, blocks, rocking.pulses.one_sine(1.0, 1.0), levels=levels, measure="pga")
+    made = rocking.create_study(folder, blocks, rocking.pulses.one_sine(1.0, 1.0), levels=levels, measure="pga")
     made.run()
     falls = made.results().overturned.transpose("scale", "motion", "block").values[[1, 2, 0], 0]
     running = served(Explorer(), {"view": "map"}, StudyView(folder))

@@ -80,8 +80,8 @@ def test_a_motion_is_scaled_to_what_the_text_says(scale, measure):
 @pytest.mark.parametrize("vertical", ["ridgecrest-clc-up", "file:{up}", "file:{both}#2"])
 def test_a_record_has_a_vertical_component(vertical, tmp_path, monkeypatch):
     horizontal, upwards = (rocking.records.load(f"ridgecrest-clc-{which}") for which in ("090", "up"))
-    times = np.arange(len(upwards.samples[1])) * upwards.step
-    table = np.column_stack([times, horizontal.acceleration(times), upwards.samples[1]])
+    times = np.arange(len(upwards.samples)) * upwards.dt
+    table = np.column_stack([times, horizontal.acceleration(times), upwards.samples])
     files = {"up.csv": table[:, [0, 2]], "both.csv": table}
     uploads, keys = UploadStore(), {}
     monkeypatch.chdir(tmp_path)
@@ -272,7 +272,7 @@ def test_the_case_as_a_command_runs_and_has_the_same_peak(texts, run):
 @pytest.mark.thorough
 def test_a_file_is_named_in_code_as_it_was_called(tmp_path, monkeypatch, run):
     record = rocking.records.load("el-centro-meloland-270")
-    text = "\n".join(f"{value:.10g}" for value in record.samples[1])
+    text = "\n".join(f"{value:.10g}" for value in record.samples)
     (tmp_path / "my record.txt").write_text(text, "utf-8")
     uploads = UploadStore()
     key = uploads.add_file("C:\\data\\my record.txt", text.encode())
@@ -857,7 +857,9 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("studies") / "museum"
     blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 7), alpha=np.linspace(0.1, 0.3, 5), restitution=[0.85, 0.9])
     motions = [rocking.pulses.one_sine(1.0, 1.0), rocking.records.load("el-centro-meloland-270")]
-    made = rocking.study(folder, blocks, motions, levels=[2.0, 4.0], measure="pga", polarity="both", unit_blocks=512)
+    made = rocking.create_study(
+        folder, blocks, motions, levels=[2.0, 4.0], measure="pga", polarity="both", unit_blocks=512
+    )
     made.run()
     return StudyView(folder)
 
@@ -889,7 +891,7 @@ def test_a_slice_of_a_study_is_its_results(study):
 def test_a_verdict_that_the_duration_left_open_is_not_drawn_as_standing(tmp_path):
     blocks = rocking.Blocks.grid(p=[1.5, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-    made = rocking.study(tmp_path / "cut", blocks, motion, levels=[0.01, 1.0], duration=0.9, unit_blocks=512)
+    made = rocking.create_study(tmp_path / "cut", blocks, motion, levels=[0.01, 1.0], duration=0.9, unit_blocks=512)
     made.run()
     results = made.results()
     assert results.stopped.values.any()
@@ -905,7 +907,9 @@ def test_points_of_a_study_have_its_gravity_and_keep_each_motion_once(tmp_path):
     blocks = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.2, 0.3], restitution=[0.9], gravity=1.62)
     samples = np.random.default_rng(1).normal(size=400)
     motion = rocking.Motion.from_samples(samples, 0.02, name="own")
-    made = rocking.study(tmp_path / "moon", blocks, motion, levels=[1.0, 2.0, 3.0], measure="pga", polarity="both")
+    made = rocking.create_study(
+        tmp_path / "moon", blocks, motion, levels=[1.0, 2.0, 3.0], measure="pga", polarity="both"
+    )
     made.run()
     view, uploads, results = StudyView(tmp_path / "moon"), UploadStore(), made.results()
     judged = 0
@@ -924,7 +928,7 @@ def test_points_of_a_study_have_its_gravity_and_keep_each_motion_once(tmp_path):
 
 def test_levels_of_a_study_are_an_axis_in_increasing_order(tmp_path):
     blocks, levels = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.2], restitution=[0.9]), [3.0, 1.0, 2.0]
-    made = rocking.study(tmp_path / "any", blocks, rocking.pulses.one_sine(2.2, 2.0), levels=levels)
+    made = rocking.create_study(tmp_path / "any", blocks, rocking.pulses.one_sine(2.2, 2.0), levels=levels)
     made.run()
     found = StudyView(tmp_path / "any").slice({"x": "p", "y": "scale", "quantity": "peak_rotation"})
     assert found.header["y"]["values"] == [1.0, 2.0, 3.0]
@@ -964,7 +968,7 @@ def test_a_point_of_a_study_has_the_polarity_that_is_chosen(study, motion):
 )
 def test_the_axis_of_scales_says_what_they_are(tmp_path, scales, label, unit):
     blocks = rocking.Blocks(p=[2.0, 3.0], alpha=0.2, restitution=0.9)
-    rocking.study(tmp_path / "scaled", blocks, rocking.pulses.one_sine(3.0, 1.0), **scales).run()
+    rocking.create_study(tmp_path / "scaled", blocks, rocking.pulses.one_sine(3.0, 1.0), **scales).run()
     axis = next(one for one in StudyView(tmp_path / "scaled").describe()["axes"] if one["name"] == "scale")
     assert (axis["label"], axis["unit"]) == (label, unit)
 
@@ -972,7 +976,7 @@ def test_the_axis_of_scales_says_what_they_are(tmp_path, scales, label, unit):
 def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
     blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=[[0.2, 0.25], [0.2, 0.2], [0.3, 0.3]], restitution=0.9)
     motions = [rocking.records.load(f"el-centro-meloland-{which}") for which in ("270", "360")]
-    made = rocking.study(tmp_path / "list", blocks, motions, levels=[2.0, 4.0, 5.0], measure="pga")
+    made = rocking.create_study(tmp_path / "list", blocks, motions, levels=[2.0, 4.0, 5.0], measure="pga")
     made.run()
     view = StudyView(tmp_path / "list")
     assert list(view.axes()) == ["block", "scale", "motion"]
@@ -993,7 +997,9 @@ def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
 
 def test_a_study_that_varies_too_little_is_refused_with_a_sentence(tmp_path):
     motion = rocking.pulses.one_sine(3.0, 1.0)
-    made = rocking.study(tmp_path / "few", rocking.Blocks(p=[2.0, 3.0], alpha=[0.2, 0.3], restitution=0.9), motion)
+    made = rocking.create_study(
+        tmp_path / "few", rocking.Blocks(p=[2.0, 3.0], alpha=[0.2, 0.3], restitution=0.9), motion
+    )
     made.run()
     with pytest.raises(StudyError, match="varies block; a map needs two of blocks, motions and scales"):
         StudyView(tmp_path / "few")

@@ -286,7 +286,7 @@ def test_what_went_wrong_inside_says_nothing_of_the_inside(page, explorer, monke
 
 
 def test_a_record_is_uploaded_told_about_and_simulated(page):
-    samples = rocking.records.load("el-centro-meloland-270").samples[1]
+    samples = rocking.records.load("el-centro-meloland-270").samples
     body = "\n".join(f"{value / 9.80665:.12g}" for value in samples)
     answer = page.post("/api/records", params={"name": "el centro.txt"}, content=body)
     found = answer.json()
@@ -607,7 +607,7 @@ def test_a_port_that_is_taken_is_said_so():
 
 def test_a_study_is_shown_and_a_point_of_it_opened(tmp_path, opened):
     blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 4), alpha=np.linspace(0.1, 0.3, 5), restitution=[0.9])
-    made = rocking.study(
+    made = rocking.create_study(
         tmp_path / "museum",
         blocks,
         rocking.pulses.one_sine(1.0, 1.0),

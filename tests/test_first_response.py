@@ -180,7 +180,7 @@ spectrum = rocking.rocking_spectrum(blocks, [motion])
 digest.update(repr(found.to_dict()).encode() + repr(spectrum.to_dict()).encode())
 sets = [rocking.simulate_many(blocks, motion)]
 with tempfile.TemporaryDirectory() as folder:
-    study = rocking.study(folder, blocks, [motion, motion.scaled(2.0)])
+    study = rocking.create_study(folder, blocks, [motion, motion.scaled(2.0)])
     study.run()
     sets.append(study.results().load())
 for data in sets:

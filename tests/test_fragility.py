@@ -278,7 +278,7 @@ def test_the_test_of_fit_accepts_lognormals_and_rejects_what_is_none():
 def test_a_cloud_has_every_motion_at_its_own_intensity(alpha):
     block = rocking.Block.from_parameters(p=2.0, alpha=alpha, restitution=0.9)
     motions = [pulse.scaled(factor) for factor in (2.1, 2.4, 2.6, 2.8, 3.0, 4.0, 6.0) for pulse in PULSES]
-    result = fragility(block, motions, measure="pga", limits={"part": 0.3, "overturning": math.inf})
+    result = fragility(block, motions, measure="pga", limit_states={"part": 0.3, "overturning": math.inf})
     verdicts = [rocking.simulate(block, motion) for motion in motions]
     for curve, limit in zip(result.curves, (0.3, math.inf), strict=True):
         np.testing.assert_allclose(curve.intensity, [motion.pga for motion in motions], rtol=1e-12)
@@ -289,7 +289,7 @@ def test_a_cloud_has_every_motion_at_its_own_intensity(alpha):
 
 def test_a_limit_of_the_peak_rotation_is_not_negative():
     with pytest.raises(rocking.InvalidOption, match=r"must be 0 or more, not -0\.5"):
-        fragility(BLOCK, PULSES, levels=[2.5, 3.5], limits={"half": -0.5})
+        fragility(BLOCK, PULSES, levels=[2.5, 3.5], limit_states={"half": -0.5})
 
 
 def test_stripes_scale_every_motion_to_every_level():
@@ -326,7 +326,7 @@ def test_similar_blocks_pool_in_their_own_units():
         for block, motions in zip(blocks, (PULSES, fast), strict=True)
     ]
     assert alone[0].median == pytest.approx(alone[1].median, rel=1e-9)
-    pooled = fragility(Blocks.of(blocks), PULSES, measure="pga_ratio", levels=levels).curves[0]
+    pooled = fragility(Blocks.from_bodies(blocks), PULSES, measure="pga_ratio", levels=levels).curves[0]
     assert pooled.trials.sum() == 2 * 13 * 9
 
 
@@ -339,7 +339,7 @@ def test_two_sided_blocks_count_in_the_units_of_the_side_that_lifts_first():
 
 
 def test_the_figure_shows_curves_bands_and_shares():
-    result = fragility(BLOCK, PULSES, levels=[2.5, 3.5, 5.0], limits={"half": 0.5, "overturning": math.inf})
+    result = fragility(BLOCK, PULSES, levels=[2.5, 3.5, 5.0], limit_states={"half": 0.5, "overturning": math.inf})
     axes = result.plot().axes[0]
     labels = [line.get_label() for line in axes.lines]
     assert sum(label.startswith(("half", "overturning")) for label in labels) == 2
@@ -513,7 +513,7 @@ def test_a_finite_limit_counts_in_the_smaller_slenderness_of_an_asymmetric_block
     motions = [
         rocking.pulses.one_sine(size, frequency) for size in np.linspace(2.5, 6.0, 12) for frequency in (1.0, 1.5)
     ]
-    result = fragility(block, motions, limits={"half": 0.5})
+    result = fragility(block, motions, limit_states={"half": 0.5})
     peaks = np.array([rocking.simulate(block, motion).peak_rotation for motion in motions])
     exceeded = result.outcomes.exceeded_half.values
     assert exceeded.tolist() == (peaks / 0.2 > 0.5).tolist()

@@ -143,7 +143,7 @@ def test_a_critical_scale_changes_as_differences_of_critical_scales_say(model: s
 
     def critical(changed: dict[str, Floats], low: float = 1.4, high: float = 1.6) -> rocking.CriticalScale:
         block = Block.from_parameters(**{name: tuple(changed[name]) for name in ("p", "alpha", "restitution")})
-        return rocking.critical_scale(block, Motion.from_samples(changed["samples"], 0.1), low, high, model=model)
+        return rocking.critical_scale(block, Motion.from_samples(changed["samples"], 0.1), (low, high), model=model)
 
     found = critical(given)
     changes = [("samples", np.eye(18)[k], found.gradient.samples[k]) for k in (3, 12)]
@@ -166,7 +166,7 @@ def test_a_critical_scale_changes_with_the_start_and_the_vertical_component() ->
     def critical(rotation: float, lift: float = 0.0, low: float = 0.2, high: float = 6.0) -> rocking.CriticalScale:
         vertical = Motion.from_samples(upright + lift * np.eye(5)[2], 0.3)
         record = Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3).with_vertical(vertical)
-        return rocking.critical_scale(BLOCK, record, low, high, initial_rotation=rotation, initial_velocity=0.01)
+        return rocking.critical_scale(BLOCK, record, (low, high), initial_rotation=rotation, initial_velocity=0.01)
 
     found, h = critical(0.02), 1e-6
     near = 0.9999 * found.scale, 1.0001 * found.scale
@@ -179,11 +179,11 @@ def test_a_critical_scale_changes_with_the_start_and_the_vertical_component() ->
 def test_scales_that_bracket_no_overturning_are_refused() -> None:
     record = Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
     with pytest.raises(rocking.InvalidOption, match=r"does not overturn at the scale high = 0.2"):
-        rocking.critical_scale(BLOCK, record, 0.1, 0.2)
+        rocking.critical_scale(BLOCK, record, (0.1, 0.2))
     with pytest.raises(rocking.InvalidOption, match=r"overturns at the scale low = 8"):
-        rocking.critical_scale(BLOCK, record, 8.0, 9.0)
+        rocking.critical_scale(BLOCK, record, (8.0, 9.0))
     with pytest.raises(rocking.InvalidOption, match="no motion to scale"):
-        rocking.critical_scale(BLOCK, None, 8.0, 9.0)
+        rocking.critical_scale(BLOCK, None, (8.0, 9.0))
 
 
 def test_a_law_of_restitution_is_carried_back_as_it_is_carried_forwards():
@@ -209,7 +209,7 @@ def test_scales_in_the_wrong_order_are_refused_where_a_stronger_motion_lets_the_
     assert rocking.simulate(block, pulse * 8.0).overturned
     assert not rocking.simulate(block, pulse * 14.0).overturned
     with pytest.raises(rocking.InvalidOption, match="low = 14 must be below high = 8"):
-        rocking.critical_scale(block, pulse, 14.0, 8.0)
+        rocking.critical_scale(block, pulse, (14.0, 8.0))
 
 
 def test_a_gradient_counts_the_pieces_that_its_value_depends_on():
@@ -226,7 +226,7 @@ def test_where_a_touch_decides_on_overturning_a_critical_scale_has_no_derivative
     lift = Motion([0.0, 2.6, 4.0], [[-2.0 * 9.80665], [0.0]])
     push = Motion([0.0, 0.01, 0.9, 1.1, 2.6, 3.2, 4.0], [[-1e-3], [0.0], [1.0], [0.0], [3.5], [0.0]])
     block, motion = Block.from_parameters(p=3.0, alpha=0.2, restitution=0.5), push.with_vertical(lift)
-    touch = rocking.critical_scale(block, motion, 0.99, 1.001)
+    touch = rocking.critical_scale(block, motion, (0.99, 1.001))
     assert touch.scale == pytest.approx(0.99996, abs=1e-5)
     assert "without the block coming to the balance point" in touch.gradient.reason
     assert np.all(np.isnan([touch.p, touch.alpha, touch.restitution, *touch.gradient.coefficients.ravel()]))

@@ -58,7 +58,7 @@ def test_a_block_is_the_same_from_a_command_a_page_a_file_and_a_table(tmp_path, 
     if {*without_mass} <= PARAMETERS.keys():
         case = read_case({**without_mass, "motion": "none", "duration": "1"}, UploadStore())
         assert sides(case.block) == sides(block) == sides(eval(case.block_call, {"Block": Block}))
-    whole = Blocks.of([block])
+    whole = Blocks.from_bodies([block])
     columns = {}
     for name, text in texts.items():
         pair = text.split(",") * (2 if name == "pivots" and "," not in text else 1)
@@ -78,10 +78,10 @@ def test_a_block_is_the_same_from_a_command_a_page_a_file_and_a_table(tmp_path, 
 def test_a_file_makes_a_block_of_every_combination(tmp_path):
     found = in_a_study(tmp_path, 'width = [0.3, "40cm"]\nheight = 1.1\noffset = [-0.03, 0.0]')
     truth = [Block(width=w, height=1.1, offset=s) for w in (0.3, 0.4) for s in (-0.03, 0.0)]
-    np.testing.assert_array_equal(found.alpha, Blocks.of(truth).alpha)
+    np.testing.assert_array_equal(found.alpha, Blocks.from_bodies(truth).alpha)
     pairs = "pivots = [[0.2, 0.15], [0.1, 0.1]]\nheight_of_mass = 0.6\ngyration = [0.4, 0.5]"
     truth = [Block.from_pivots(pair, 0.6, k) for pair in ((0.2, 0.15), (0.1, 0.1)) for k in (0.4, 0.5)]
-    np.testing.assert_array_equal(in_a_study(tmp_path, pairs).p, Blocks.of(truth).p)
+    np.testing.assert_array_equal(in_a_study(tmp_path, pairs).p, Blocks.from_bodies(truth).p)
 
 
 def test_every_input_of_a_body_is_an_option_and_a_key_and_every_other_has_an_option():

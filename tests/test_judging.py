@@ -153,7 +153,7 @@ def test_a_known_block_is_certain_and_a_lapse_is_not():
     assert [test.probability for test in found.tests] == [1.0, 0.0] and math.isinf(found.log_loss.value)
     assert any("a certainty failed" in note for note in found.notes)
     assert any("no test overturned" in note for note in found.notes) and math.isnan(found.brier.skill)
-    with_outliers = rocking.validate(tests, BLOCK, lapse=0.01)
+    with_outliers = rocking.validate(tests, BLOCK, outlier_probability=0.01)
     assert [test.probability for test in with_outliers.tests] == pytest.approx([0.99, 0.01])
     assert "all tests overturned" in rocking.validate([ShakeTest(STRONG, True)], BLOCK).summary()
 
@@ -233,8 +233,8 @@ def test_a_table_of_tests_is_read_with_its_units_and_labels(tmp_path):
     assert (first.name, first.group) == ("first", "G1")
     assert [test.overturned for test in tests] == [False, True, False, True]
     peak = float(f"{samples.max():.6f}")
-    assert first.motion.pga == pytest.approx(2.0 * 9.80665 * peak) and first.motion.step == pytest.approx(0.01)
-    assert second.motion.pga == pytest.approx(peak) and second.motion.step == pytest.approx(0.02)
+    assert first.motion.pga == pytest.approx(2.0 * 9.80665 * peak) and first.motion.dt == pytest.approx(0.01)
+    assert second.motion.pga == pytest.approx(peak) and second.motion.dt == pytest.approx(0.02)
     up = rocking.records.load("el-centro-meloland-up")
     assert third.motion.vertical.pga == pytest.approx(0.5 * up.pga)
     assert fourth.motion.pga == pytest.approx(0.2 * 9.80665)
@@ -265,12 +265,12 @@ def test_a_wrong_row_is_named_by_its_line(tmp_path, text, line, sentence):
 def test_the_command_writes_figure_tables_and_numbers(run, undrawn, tmp_path):
     rows = "motion,scale,overturned", "ridgecrest-clc-090,0.5,0", "ridgecrest-clc-090,0.6,0", "ridgecrest-clc-090,2,1"
     table, sizes = written(tmp_path / "tests.csv", "\n".join(rows)), ("--width", "0.24", "--height", "1.1")
-    code, out, err = run("validate", table, *sizes, "--lapse", "0.01", "--out", tmp_path / "out")
+    code, out, err = run("validate", table, *sizes, "--outlier-probability", "0.01", "--out", tmp_path / "out")
     assert (code, err) == (0, "") and "3 tests, 1 overturned" in out
     files = {"result.json", "tests.csv", "validation.png", "validation.pdf"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == files
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
-    direct = rocking.validate(rocking.read_tests(table), Block(width=0.24, height=1.1), lapse=0.01)
+    direct = rocking.validate(rocking.read_tests(table), Block(width=0.24, height=1.1), outlier_probability=0.01)
     assert result["brier"]["value"] == pytest.approx(direct.brier.value)
     lines = (tmp_path / "out" / "tests.csv").read_text("utf-8").splitlines()
     assert lines[0] == "name,motion,overturned,probability" and len(lines) == 4

@@ -76,7 +76,7 @@ def test_significant_duration_holds_its_share_of_the_energy(values, start, end):
 
 def exact_linear_response(motion, period, damping, per_step=1):
     """Displacement of the oscillator at the samples of a piecewise linear motion, by matrix exponentials."""
-    omega, h = 2 * math.pi / period, motion.step / per_step
+    omega, h = 2 * math.pi / period, motion.dt / per_step
     # State (u, v, a, slope of a): u' = v, v' = -omega^2 u - 2 z omega v - a, a' = slope.
     rates = np.zeros((4, 4))
     rates[0, 1] = rates[2, 3] = 1.0
@@ -102,7 +102,7 @@ def test_spectral_acceleration_of_a_record_is_the_exact_recurrence(period):
     assert coarse <= spectral * (1 + 1e-11)
     assert fine <= spectral * (1 + 1e-11)
     # Between points h apart a maximum stands out by (omega h)^2 / 8, relatively, where the motion is the restoring one.
-    assert spectral <= fine * (1 + (omega * motion.step / 64) ** 2 / 4 + 1e-11)
+    assert spectral <= fine * (1 + (omega * motion.dt / 64) ** 2 / 4 + 1e-11)
 
 
 def test_spectral_acceleration_of_a_pulse_agrees_with_an_ode_solver():

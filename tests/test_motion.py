@@ -59,7 +59,7 @@ def test_samples_are_joined_by_straight_lines(samples, dt):
     times = np.linspace(0.0, motion.duration, 101)
     expected = np.interp(times, dt * np.arange(len(samples)), samples)
     assert_allclose(motion.acceleration(times), expected, rtol=0, atol=1e-13 * (1 + np.abs(samples).max()))
-    assert motion.step == dt
+    assert motion.dt == dt
     assert motion.error == 0.0
 
 
@@ -122,7 +122,8 @@ def test_evaluation_keeps_the_shape_of_the_times():
 
 def test_samples_come_back():
     samples = np.array([0.1, -0.7, 0.3, 0.2])
-    times, back = Motion.from_samples(samples, 0.01).samples
+    motion = Motion.from_samples(samples, 0.01)
+    times, back = motion.times, motion.samples
     assert_array_equal(times, 0.01 * np.arange(4))
     assert_array_equal(back[:-1], samples[:-1])
     assert_allclose(back[-1], samples[-1], rtol=1e-14)
@@ -131,7 +132,7 @@ def test_samples_come_back():
 def test_points_may_be_uneven_and_time_counts_from_the_first():
     motion = Motion.from_points([2.0, 2.5, 4.0], [1.0, 3.0, 0.0])
     assert_array_equal(motion.breakpoints, [0.0, 0.5, 2.0])
-    assert motion.step is None
+    assert motion.dt is None
     assert_array_equal(motion.acceleration([0.0, 0.25, 0.5, 1.25]), [1.0, 2.0, 3.0, 1.5])
 
 
@@ -154,7 +155,7 @@ def test_a_motion_travels_between_processes():
     copy = pickle.loads(pickle.dumps(motion))
     assert_array_equal(copy.coefficients, motion.coefficients)
     assert not copy.coefficients.flags.writeable
-    assert (copy.name, copy.history, copy.error, copy.step) == ("sine", motion.history, motion.error, None)
+    assert (copy.name, copy.history, copy.error, copy.dt) == ("sine", motion.history, motion.error, None)
     assert copy.description == motion.description
     assert copy != motion  # identity: two motions are never compared by value
 
@@ -226,9 +227,9 @@ def test_a_sum_adds_accelerations(one, other):
 
 def test_a_sum_of_records_on_one_grid_stays_sampled_and_others_do_not():
     record = Motion.from_samples([1.0, 2.0, 3.0], 0.5, name="a")
-    assert (record + record).step == 0.5
+    assert (record + record).dt == 0.5
     # The shorter one ends in a jump, on the grid.
-    assert (record + Motion.from_samples([1.0, 1.0], 0.5)).step == 0.5
+    assert (record + Motion.from_samples([1.0, 1.0], 0.5)).dt == 0.5
     total = record + pulses.half_sine(1.0, 1.0)
     assert total.name == "a + half sine"
     assert total.description.family == "sum"
@@ -239,24 +240,24 @@ def test_a_sum_of_records_on_one_grid_stays_sampled_and_others_do_not():
 def test_the_step_follows_from_the_pieces():
     even = np.arange(6) * 0.1
     lines = np.arange(10.0).reshape(5, 2)
-    assert Motion(even, lines).step == 0.1
-    assert Motion(even, np.hstack([lines, np.zeros((5, 3))])).step == 0.1
-    assert Motion.from_points([0.0, 0.1, 0.2, 0.3], [0.0, 1.0, -1.0, 0.0]).step == 0.1
-    assert Motion(even, np.hstack([lines, lines])).step is None
-    assert Motion(even, lines[:, :1]).step is None
-    assert Motion(np.append(even[:-1], 0.51), lines).step is None
+    assert Motion(even, lines).dt == 0.1
+    assert Motion(even, np.hstack([lines, np.zeros((5, 3))])).dt == 0.1
+    assert Motion.from_points([0.0, 0.1, 0.2, 0.3], [0.0, 1.0, -1.0, 0.0]).dt == 0.1
+    assert Motion(even, np.hstack([lines, lines])).dt is None
+    assert Motion(even, lines[:, :1]).dt is None
+    assert Motion(np.append(even[:-1], 0.51), lines).dt is None
     with pytest.raises(TypeError):
-        Motion(even, lines, step=0.1)
+        Motion(even, lines, dt=0.1)
 
 
 def test_a_record_that_is_no_longer_linear_between_even_samples_has_no_step():
     record = Motion.from_samples(np.zeros(25), 0.125)
-    assert record.step == 0.125
+    assert record.dt == 0.125
     # The pulse has its breakpoints on the record's grid.
-    assert (record + pulses.sine(4.0, 1.0, cycles=3)).step is None
-    assert record.delayed(0.1).step is None
-    assert record.delayed(0.125).step == 0.125
-    assert pickle.loads(pickle.dumps(record.scaled(2.0))).step == 0.125
+    assert (record + pulses.sine(4.0, 1.0, cycles=3)).dt is None
+    assert record.delayed(0.1).dt is None
+    assert record.delayed(0.125).dt == 0.125
+    assert pickle.loads(pickle.dumps(record.scaled(2.0))).dt == 0.125
 
 
 def test_pieces_jump_where_their_ends_do_not_meet():

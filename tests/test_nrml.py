@@ -20,7 +20,9 @@ NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
 @pytest.fixture(scope="module")
 def result():
-    return fragility(BLOCK, PULSES, levels=[1.9, 2.1, 2.5, 3.5, 5.0], limits={"half": 0.5, "overturning": math.inf})
+    return fragility(
+        BLOCK, PULSES, levels=[1.9, 2.1, 2.5, 3.5, 5.0], limit_states={"half": 0.5, "overturning": math.inf}
+    )
 
 
 def written(fragility_model, path, **options):

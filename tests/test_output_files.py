@@ -89,7 +89,7 @@ def test_an_export_of_a_study_is_whole_or_not_there(tmp_path, suffix):
     if suffix == ".parquet":
         pytest.importorskip("pyarrow")
     blocks = rocking.Blocks.grid(p=[1.0, 2.0, 3.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-    study = rocking.study(tmp_path / "study", blocks, rocking.pulses.one_sine(4.0, 1.0), levels=[0.4, 1.0])
+    study = rocking.create_study(tmp_path / "study", blocks, rocking.pulses.one_sine(4.0, 1.0), levels=[0.4, 1.0])
     study.run()
     target, write = tmp_path / f"results{suffix}", FORMATS[suffix]
     with full_disk(700), pytest.raises(rocking.OutputError, match="cannot be written"):

@@ -111,7 +111,7 @@ def test_an_outcome_that_changes_within_three_millionths_is_undecided(level):
 
 @pytest.mark.parametrize("polarity", ["+", "both"])
 def test_a_robust_ensemble_counts_every_body_motion_level_and_polarity(polarity):
-    blocks, motions = rocking.Blocks.of([FREE, LEANING]), {"a": RECORD, "b": SHAKEN}
+    blocks, motions = rocking.Blocks.from_bodies([FREE, LEANING]), {"a": RECORD, "b": SHAKEN}
     options = {"levels": [1.0, 1.4], "polarity": polarity}
     found = rocking.simulate_many(blocks, motions, robust=True, **options)
     near = [rocking.simulate_many(blocks, motions, **options | {"levels": [f, 1.4 * f]}) for f in factors_near(1e-6, 5)]

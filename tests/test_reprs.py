@@ -54,7 +54,7 @@ RESULTS = {
     "response": lambda path: rocking.simulate(BLOCK, RECORD),
     "response of a wall": lambda path: rocking.simulate(WALL, RECORD),
     "gradient": lambda path: rocking.gradient(rocking.simulate(WALL, RECORD)),
-    "critical scale": lambda path: rocking.critical_scale(WALL, MOTIONS[0], 0.5, 20.0),
+    "critical scale": lambda path: rocking.critical_scale(WALL, MOTIONS[0], (0.5, 20.0)),
     "map": lambda path: rocking.dynamics.stroboscopic_map(BLOCK, MOTIONS[0]),
     "solid": lambda path: SOLID,
     "rose": lambda path: SOLID.rose(),

@@ -103,7 +103,7 @@ def test_histories_are_a_data_frame_over_time(shaken):
     assert list(frame.columns) == ["rotation_rad", "angular_velocity_rad_s", "ground_acceleration_m_s2"]
     assert np.array_equal(frame["rotation_rad"], shaken.rotation(frame.index.to_numpy()))
     assert np.diff(frame.index).max() == pytest.approx(0.02)
-    assert len(shaken.to_dataframe()) == round(shaken.duration / shaken.motion.step) + 1
+    assert len(shaken.to_dataframe()) == round(shaken.duration / shaken.motion.dt) + 1
 
 
 @pytest.mark.parametrize("table", TABLES)

@@ -264,7 +264,7 @@ def test_blocks_of_all_kinds_are_simulated_together_as_alone():
     found = rocking.simulate_many(blocks, motion).peak_rotation.values.ravel()
     assert found.tolist() == [rocking.simulate(each, motion).peak_rotation for each in blocks]
     assert len({*found.tolist()}) == 3
-    gathered = rocking.Blocks.of(blocks)
+    gathered = rocking.Blocks.from_bodies(blocks)
     assert [type(each) for each in gathered] == [Block, RestrainedBlock, RestrainedBlock, Block]
     again = rocking.Blocks(
         gravity=gathered.gravity, **{name: each for name, (each, _) in gathered.parameters().items()}

@@ -26,7 +26,7 @@ PULSES = [
 def test_fragility_in_both_polarities_is_that_of_simulations_one_by_one(body):
     levels = [1.7, 2.2, 2.8]
     found = rocking.fragility(
-        body, PULSES, levels=levels, polarity="both", limits={"part": 0.3, "overturning": math.inf}
+        body, PULSES, levels=levels, polarity="both", limit_states={"part": 0.3, "overturning": math.inf}
     )
     slenderness = min(side.alpha for side in body.sides)
     rows = found.outcomes.set_index(["pga_m_s2", "motion", "polarity"])
@@ -134,17 +134,17 @@ def test_columns_are_one_where_sides_are_equal_and_two_where_they_differ():
 @pytest.mark.parametrize("another", [False, pytest.param(True, marks=pytest.mark.thorough)])
 def test_what_a_study_of_walls_computes_another_process_resumes_and_reads(tmp_path, capsys, another):
     bodies, levels = [FACADE, LEANING, RestrainedBlock(FACADE.block, one_sided=True, restitution=0.4)], [1.0, 2.0, 4.0]
-    study = rocking.study(tmp_path / "walls", bodies, PULSES[:3], levels=levels, measure="pga", polarity="both",
+    study = rocking.create_study(tmp_path / "walls", bodies, PULSES[:3], levels=levels, measure="pga", polarity="both",
                           unit_blocks=512)  # fmt: skip
     study.run()
     whole = rocking.simulate_many(bodies, PULSES[:3], levels=levels, measure="pga", polarity="both")
-    script = f"import rocking; s = rocking.study({str(tmp_path / 'walls')!r}); s.run(); print(s.status)"
+    script = f"import rocking; s = rocking.Study({str(tmp_path / 'walls')!r}); s.run(); print(s.status)"
     if another:
         print(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout)
     else:
         exec(script)
     assert "complete" in (again := capsys.readouterr().out) or "done" in again
-    read = rocking.study(tmp_path / "walls")
+    read = rocking.Study(tmp_path / "walls")
     results = read.results()
     for name in ("overturned", "peak_rotation", "impacts"):
         np.testing.assert_array_equal(results[name].values, whole[name].values)

@@ -102,7 +102,7 @@ def test_a_rose_leaves_out_what_was_given_up():
 def test_a_study_leaves_out_what_was_given_up(tmp_path):
     pulses = [PULSE, rocking.pulses.one_sine(6.0, 1.8)]
     levels = np.linspace(1.5, 6.0, 10)
-    study = rocking.study(tmp_path / "study", TWO, pulses, levels=levels, measure="pga")
+    study = rocking.create_study(tmp_path / "study", TWO, pulses, levels=levels, measure="pga")
     study.run()
     direct = rocking.fragility(TWO, pulses, levels=levels)
     missing = int(direct.outcomes.unfinished.sum())
@@ -121,7 +121,7 @@ def test_a_study_leaves_out_what_was_given_up(tmp_path):
 @pytest.mark.usefixtures("small_budget")
 def test_a_calibration_takes_what_was_given_up_for_half_overturned():
     outcomes = overturned_under(
-        rocking.Blocks.of(TWO), [PULSE.scaled(0.4), PULSE.scaled(2.0)], "nonlinear", None, False
+        rocking.Blocks.from_bodies(TWO), [PULSE.scaled(0.4), PULSE.scaled(2.0)], "nonlinear", None, False
     )
     assert outcomes.tolist() == [[0.0, 1.0], [0.5, 1.0]]
 
@@ -158,7 +158,9 @@ def spectrum(bars):
 def study(bars, tmp_path_factory):
     motions = [rocking.pulses.one_sine(6.0, frequency) for frequency in (0.5, 0.8, 1.2, 2.0)]
     levels = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
-    found = rocking.study(tmp_path_factory.mktemp("study") / "one", [BLOCK], motions, levels=levels, measure="pga")
+    found = rocking.create_study(
+        tmp_path_factory.mktemp("study") / "one", [BLOCK], motions, levels=levels, measure="pga"
+    )
     found.run()
     return found
 

@@ -89,7 +89,7 @@ def test_a_block_that_still_rocks_when_the_motion_ends_is_stopped_there_and_not_
     many = simulate_many([block, still], motion, **options)
     assert many.stopped.values[0].tolist() == [[False, False], [True, False]]
     assert not many.overturned.values.any()
-    study = rocking.study(tmp_path, Blocks(p=2.0, alpha=[0.2, 0.4], restitution=0.9), motion, **options)
+    study = rocking.create_study(tmp_path, Blocks(p=2.0, alpha=[0.2, 0.4], restitution=0.9), motion, **options)
     with rocking.set_options(threads=1):
         study.run()
     with pytest.raises(rocking.StudyError, match="their verdicts are not known: make the study without a duration"):

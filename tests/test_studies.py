@@ -31,7 +31,7 @@ import numpy as np, rocking
 blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.7)
 motions = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2.0)]
 scales = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both"}
-study = rocking.study(sys.argv[1], blocks, motions, **scales, model="linear", unit_blocks=512)
+study = rocking.create_study(sys.argv[1], blocks, motions, **scales, model="linear", unit_blocks=512)
 print("ready", flush=True)
 with rocking.set_options(threads=int(sys.argv[2])):
     report = study.run(part=sys.argv[3] if sys.argv[3:] else None)
@@ -40,7 +40,7 @@ print(report.stopped)
 
 
 def made(folder, *, blocks=BLOCKS, **changes):
-    return rocking.study(folder, blocks, MOTIONS, **(OPTIONS | changes))
+    return rocking.create_study(folder, blocks, MOTIONS, **(OPTIONS | changes))
 
 
 @pytest.fixture(scope="module")
@@ -58,11 +58,11 @@ def reference():
 
 
 def test_a_study_is_what_simulate_many_computes(complete, reference):
-    xr.testing.assert_identical(rocking.study(complete).results().load(), reference)
+    xr.testing.assert_identical(rocking.Study(complete).results().load(), reference)
 
 
 def test_any_selection_of_the_results_is_that_of_the_whole(complete, reference):
-    lazy = rocking.study(complete).results()
+    lazy = rocking.Study(complete).results()
     for part in (
         {"motion": 1, "block": slice(500, 530)},
         {"scale": [1], "block": [3, 600, 1299]},
@@ -81,12 +81,12 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
     assert sum(map(store_of(study).grid.simulations, keys)) == reference.overturned.size
     with rocking.set_options(threads=2):
         study.run()
-    xr.testing.assert_identical(rocking.study(tmp_path).results().load(), reference)
-    lazy = rocking.study(tmp_path).results()
+    xr.testing.assert_identical(rocking.Study(tmp_path).results().load(), reference)
+    lazy = rocking.Study(tmp_path).results()
     for part in ({"motion": [2, 0], "block": [1299, 5]}, {"polarity": 1, "scale": 0}, {"motion": -1, "block": -1}):
         xr.testing.assert_identical(lazy.isel(part).load(), reference.isel(part))
     (tmp_path / "units" / name_of(keys[3])).unlink()
-    found = rocking.study(tmp_path).results().load()
+    found = rocking.Study(tmp_path).results().load()
     np.testing.assert_array_equal(np.isnan(found.impacts.values), ~found.done.values)
     assert (~found.done.values).sum() == store_of(study).grid.simulations(keys[3])
 
@@ -101,7 +101,7 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
 def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_path, blocks, motions, scales):
     pulses = [rocking.pulses.one_sine(4.0, frequency) for frequency in np.linspace(0.5, 2.0, motions)]
     many = rocking.Blocks(p=np.linspace(1.0, 6.0, blocks), alpha=0.2, restitution=0.7)
-    study = rocking.study(tmp_path, many, pulses, levels=np.linspace(0.5, 2.0, scales), model="linear")
+    study = rocking.create_study(tmp_path, many, pulses, levels=np.linspace(0.5, 2.0, scales), model="linear")
     assert 20 <= len(store_of(study).grid) <= 120
     sizes = list(map(store_of(study).grid.simulations, store_of(study).grid))
     assert sum(sizes) == blocks * motions * scales
@@ -297,7 +297,7 @@ class Failing:
 
 def small(folder):
     """Study of three units."""
-    return rocking.study(folder, BLOCKS, MOTIONS[:1], model="linear", unit_blocks=512)
+    return rocking.create_study(folder, BLOCKS, MOTIONS[:1], model="linear", unit_blocks=512)
 
 
 @pytest.fixture(scope="module")
@@ -371,12 +371,12 @@ def test_a_study_that_may_not_be_written_to_can_be_opened(tmp_path, monkeypatch)
         raise AssertionError("nothing is written when a study is opened")
 
     monkeypatch.setattr(folders, "put", refuse)
-    assert rocking.study(tmp_path).results().peak_rotation.load().size
+    assert rocking.Study(tmp_path).results().peak_rotation.load().size
 
 
 def test_a_unit_that_is_another_s_is_found_by_computing_it_again(small_complete, tmp_path):
     shutil.copytree(small_complete, tmp_path, dirs_exist_ok=True)
-    study = rocking.study(tmp_path)
+    study = rocking.Study(tmp_path)
     names = [name_of(key) for key in store_of(study).grid]
     assert study.verify(recompute=len(names)) == []
     (tmp_path / "units" / names[0]).write_bytes((tmp_path / "units" / names[1]).read_bytes())
@@ -394,10 +394,10 @@ def test_damage_to_what_describes_a_study_is_seen(tmp_path):
         changed[rng.integers(len(data))] ^= 1 << rng.integers(8)
         (tmp_path / name).write_bytes(changed)
         with pytest.raises(rocking.StudyError, match="damaged"):
-            rocking.study(tmp_path)
+            rocking.Study(tmp_path)
     (tmp_path / name).write_bytes(data[:-3])
     with pytest.raises(rocking.StudyError, match="damaged"):
-        rocking.study(tmp_path)
+        rocking.Study(tmp_path)
 
 
 def test_what_is_missing_is_never_read_as_a_result(complete, tmp_path):
@@ -441,17 +441,17 @@ def test_other_inputs_are_refused_by_name(tmp_path, changes, part):
 def test_other_blocks_and_motions_are_refused_by_name(tmp_path):
     made(tmp_path)
     with pytest.raises(rocking.StudyError, match="blocks/p"):
-        rocking.study(tmp_path, BLOCKS.select(slice(0, 1299)), MOTIONS, **OPTIONS)
+        rocking.create_study(tmp_path, BLOCKS.select(slice(0, 1299)), MOTIONS, **OPTIONS)
     with pytest.raises(rocking.StudyError, match="motions/1 changed"):
-        rocking.study(tmp_path, BLOCKS, [MOTIONS[0], MOTIONS[1].scaled(1.1), MOTIONS[2]], **OPTIONS)
+        rocking.create_study(tmp_path, BLOCKS, [MOTIONS[0], MOTIONS[1].scaled(1.1), MOTIONS[2]], **OPTIONS)
     with pytest.raises(rocking.StudyError, match="motions/2 changed"):
-        rocking.study(tmp_path, BLOCKS, MOTIONS[:2], **OPTIONS)
+        rocking.create_study(tmp_path, BLOCKS, MOTIONS[:2], **OPTIONS)
 
 
 def test_another_version_may_read_a_study_but_not_go_on_with_it(tmp_path, monkeypatch):
     study = made(tmp_path)
     monkeypatch.setattr("rocking.studies.folder.program", lambda: "rocking 9.9.9 (kernels 0)")
-    assert rocking.study(tmp_path).results().sizes["block"] == 1300
+    assert rocking.Study(tmp_path).results().sizes["block"] == 1300
     for compute in (study.run, lambda: study.verify(recompute=1), lambda: study.verify(repair=True)):
         with pytest.raises(rocking.StudyError, match=r"9\.9\.9"):
             compute()
@@ -503,7 +503,7 @@ def test_a_study_is_exported(tmp_path, reference):
 def test_a_study_is_exported_to_parquet_or_says_what_is_missing(complete, tmp_path, reference, monkeypatch):
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
-    study = rocking.study(complete)
+    study = rocking.Study(complete)
     study.to_parquet(tmp_path / "all.parquet")
     found = pandas.read_parquet(tmp_path / "all.parquet")
     assert [*found.columns] == COLUMNS
@@ -532,35 +532,35 @@ def test_units_are_whole_groups_of_blocks(tmp_path, width):
 def test_a_vertical_component_is_part_of_a_study(tmp_path):
     """It is kept, computed with, and noticed when it is another one."""
     both = MOTIONS[0].with_vertical(MOTIONS[1])
-    one = rocking.study(tmp_path / "study", BLOCKS, both)
+    one = rocking.create_study(tmp_path / "study", BLOCKS, both)
     with rocking.set_options(threads=1):
         one.run()
-    again = rocking.study(tmp_path / "study").results().load()
+    again = rocking.Study(tmp_path / "study").results().load()
     assert np.array_equal(again.peak_rotation, rocking.simulate_many(BLOCKS, both).peak_rotation)
     assert not np.array_equal(again.peak_rotation, rocking.simulate_many(BLOCKS, MOTIONS[0]).peak_rotation)
     for other in (MOTIONS[0], MOTIONS[0].with_vertical(-MOTIONS[1])):
         with pytest.raises(rocking.StudyError, match="motions/0"):
-            rocking.study(tmp_path / "study", BLOCKS, other)
+            rocking.create_study(tmp_path / "study", BLOCKS, other)
 
 
 def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
-    rocking.study(tmp_path / "one", BLOCKS, MOTIONS, levels=[0.5, 1.0], unit_blocks=512)
+    rocking.create_study(tmp_path / "one", BLOCKS, MOTIONS, levels=[0.5, 1.0], unit_blocks=512)
     others = ({"model": "linear"}, {"chattering": "velocity"}, {"measure": "pga"}, {"polarity": "both"})
     for given in (*others, {"levels": [1.0, 2.0]}, {"duration": 3.0}, {"unit_blocks": 512}):
         with pytest.raises(rocking.errors.InvalidOption, match="has rules of its own: give its folder alone"):
-            rocking.study(tmp_path / "one", **given)
+            rocking.create_study(tmp_path / "one", **given)
 
 
 def test_bodies_of_another_kind_with_the_same_numbers_are_another_study(tmp_path):
     motion = rocking.pulses.one_sine(4.0, 1.0)
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     pendulum = rocking.dynamics.InvertedPendulum(p=2.0, gap=0.2, restitution=0.9)
-    rocking.study(tmp_path / "one", block, motion, model="linear", unit_blocks=512).run()
-    rocking.study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512).run()
+    rocking.create_study(tmp_path / "one", block, motion, model="linear", unit_blocks=512).run()
+    rocking.create_study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512).run()
     for folder, bodies in (("one", pendulum), ("other", block)):
         with pytest.raises(rocking.StudyError, match="of other inputs"):
-            rocking.study(tmp_path / folder, bodies, motion, model="linear", unit_blocks=512)
-    again = rocking.study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512)
+            rocking.create_study(tmp_path / folder, bodies, motion, model="linear", unit_blocks=512)
+    again = rocking.create_study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512)
     assert float(again.results().peak_rotation.max()) == pytest.approx(0.2)
 
 
@@ -570,11 +570,11 @@ def test_a_study_that_another_process_creates_meanwhile_is_opened(tmp_path, monk
 
     def slow(product, unit_blocks):
         monkeypatch.setattr(RUNS, "unit_of", pilot)
-        rocking.study(tmp_path, blocks, motion, unit_blocks=512).run()
+        rocking.create_study(tmp_path, blocks, motion, unit_blocks=512).run()
         return (1, 1, 1, 1024)
 
     monkeypatch.setattr(RUNS, "unit_of", slow)
-    study = rocking.study(tmp_path, blocks, motion)
+    study = rocking.create_study(tmp_path, blocks, motion)
     assert study.results().sizes["block"] == 1300
     assert not study.verify()
 
@@ -587,7 +587,7 @@ def test_a_symmetric_block_counts_once_beside_others(tmp_path):
     levels = np.array([0.15, 0.25, 0.35, 0.5, 0.8]) * 9.80665
 
     def made(name, blocks):
-        study = rocking.study(
+        study = rocking.create_study(
             tmp_path / name, blocks, motions, levels=levels, measure="pga", polarity="both", unit_blocks=512
         )
         study.run()
@@ -604,7 +604,7 @@ def test_a_symmetric_block_counts_once_beside_others(tmp_path):
 def test_sums_of_weights_in_another_order_make_no_outcome(tmp_path):
     blocks = rocking.Blocks(2.0, np.linspace(0.199, 0.201, 37), 0.9)
     pulses = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.45, 0.55, 5)]
-    study = rocking.study(tmp_path, blocks, pulses, levels=[1.0, 1.5, 4.0, 5.0], measure="pga", unit_blocks=512)
+    study = rocking.create_study(tmp_path, blocks, pulses, levels=[1.0, 1.5, 4.0, 5.0], measure="pga", unit_blocks=512)
     study.run()
     rng = np.random.default_rng(0)
     for _ in range(10):

@@ -35,7 +35,9 @@ def connected(address, timeout=5.0):
 def made(folder):
     """Make a study of 20 units of a few hundredths of a second."""
     motion = rocking.records.load("el-centro-meloland-270")
-    return rocking.study(folder, BLOCKS, motion, levels=np.linspace(2.0, 8.0, UNITS), measure="pga", unit_blocks=2048)
+    return rocking.create_study(
+        folder, BLOCKS, motion, levels=np.linspace(2.0, 8.0, UNITS), measure="pga", unit_blocks=2048
+    )
 
 
 def wait_until(true, seconds=300.0):  # far beyond what a busy machine takes: what is waited for comes
@@ -95,7 +97,7 @@ def test_a_client_is_run_as_its_executor_is(tmp_path):
             "its executor": client.get_executor(pure=False),
             "threads": None,
         }.items():
-            study = rocking.study(tmp_path / name, BLOCKS, pulse, levels=[0.5, 1.0], unit_blocks=1024)
+            study = rocking.create_study(tmp_path / name, BLOCKS, pulse, levels=[0.5, 1.0], unit_blocks=1024)
             report = study.run(executor=executor)
             assert (report.units, report.failed) == (4, {})
     assert digest(tmp_path / "client") == digest(tmp_path / "its executor") == digest(tmp_path / "threads")

@@ -16,7 +16,7 @@ OPTIONS = {"levels": SCALES, "measure": "pga", "polarity": "both", "model": "lin
 
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory):
-    study = rocking.study(tmp_path_factory.mktemp("complete"), BLOCKS, MOTIONS, **OPTIONS, unit_blocks=512)
+    study = rocking.create_study(tmp_path_factory.mktemp("complete"), BLOCKS, MOTIONS, **OPTIONS, unit_blocks=512)
     study.run()
     return study
 
@@ -46,7 +46,7 @@ def as_rows(found, above, results):
 def test_changes_lie_between_neighbouring_scales_whose_verdicts_are_known(complete, tmp_path, verdict, above, duration):
     study = complete
     if duration is not None:
-        study = rocking.study(tmp_path, BLOCKS, MOTIONS, **OPTIONS, duration=duration, unit_blocks=512)
+        study = rocking.create_study(tmp_path, BLOCKS, MOTIONS, **OPTIONS, duration=duration, unit_blocks=512)
         study.run()
     found, results = study.critical_scales(verdict), study.results()
     known = ~(results.unfinished | results.stopped).values
@@ -72,7 +72,7 @@ def test_a_verdict_that_goes_back_has_a_bracket_for_each_change(complete):
 def test_a_change_with_unknown_verdicts_inside_lies_between_the_known_ones(tmp_path):
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.97)
     options = {"levels": [0.5, 1.0, 2.2, 2.5, 6.0, 6.5], "measure": "pga", "duration": 4.0}
-    study = rocking.study(tmp_path, block, rocking.pulses.one_sine(1.0, 1.0), **options)
+    study = rocking.create_study(tmp_path, block, rocking.pulses.one_sine(1.0, 1.0), **options)
     with rocking.set_options(threads=1):
         study.run()
     results, found = study.results(), study.critical_scales()
@@ -84,13 +84,13 @@ def test_a_change_with_unknown_verdicts_inside_lies_between_the_known_ones(tmp_p
 
 def test_what_has_no_critical_scales_is_refused(complete, tmp_path):
     for name, levels in (("one", [2.0]), ("falling", [3.0, 2.0])):
-        study = rocking.study(tmp_path / name, BLOCKS, MOTIONS, **(OPTIONS | {"levels": levels}))
+        study = rocking.create_study(tmp_path / name, BLOCKS, MOTIONS, **(OPTIONS | {"levels": levels}))
         with pytest.raises(rocking.InvalidOption, match="two scales or more, in increasing order"):
             study.critical_scales()
     with pytest.raises(rocking.InvalidOption, match="verdict must be one of overturning, complete_chattering"):
         complete.critical_scales("falling")
     with pytest.raises(rocking.StudyError, match="units are missing"):
-        rocking.study(tmp_path / "new", BLOCKS, MOTIONS, **OPTIONS).critical_scales()
+        rocking.create_study(tmp_path / "new", BLOCKS, MOTIONS, **OPTIONS).critical_scales()
 
 
 @pytest.mark.parametrize(("verdict", "column"), [("overturning", "overturns"), ("complete_chattering", "completes")])

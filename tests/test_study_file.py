@@ -231,7 +231,7 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
     reference = rocking.simulate_many(
         product.blocks, product.motions, levels=[0.5, 1.0], polarity="both", model="linear", chattering="certified=1e-9"
     )
-    np.testing.assert_array_equal(rocking.study(folder).results().peak_rotation.values, reference.peak_rotation.values)
+    np.testing.assert_array_equal(rocking.Study(folder).results().peak_rotation.values, reference.peak_rotation.values)
     unit = folder / "units" / "unit.0.0.0.0"
     unit.write_bytes(unit.read_bytes()[:-1])
     code, out, err = run("study", "verify", folder)
@@ -380,7 +380,7 @@ def test_the_fragility_of_a_study_of_walls_is_that_of_the_function(walls, run, t
     assert code == 0, err
     motions = [rocking.records.load(name) for name in ("el-centro-meloland-360", "el-centro-meloland-270")]
     truth = rocking.fragility(bodies, motions, levels=[1.0, 2.0, 3.0, 4.0], polarity="both").curves[0]
-    study = rocking.study(folder)
+    study = rocking.Study(folder)
     assert study.fragility().curves[0].median == pytest.approx(truth.median, rel=1e-9)
     assert study.fragility().curves[0].dispersion == pytest.approx(truth.dispersion, rel=1e-9)
     written = json.loads((tmp_path / "report" / "result.json").read_text())["fragility"]["curves"][0]

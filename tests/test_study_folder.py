@@ -87,7 +87,7 @@ def test_where_there_is_no_study_none_is_opened(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="there is no study here: create it first"):
         Store(tmp_path)
     with pytest.raises(StudyError, match="this is a URL, and a study is kept in a folder"):
-        rocking.study("s3://bucket/museum")
+        rocking.Study("s3://bucket/museum")
 
 
 @pytest.mark.parametrize(
@@ -104,6 +104,6 @@ def test_a_folder_of_other_files_is_no_place_for_a_study(tmp_path: Path, names: 
 @pytest.mark.parametrize("part", ["0/3", "4/3", "1", "1/", "/3", "a/b", "-1/3", "1/0", "1.5/3", 3])
 def test_a_part_that_is_none_is_refused(tmp_path: Path, part: str) -> None:
     motion, blocks = rocking.pulses.one_sine(4.0, 1.0), rocking.Blocks([1.0, 2.0], 0.2, 0.9)
-    study = rocking.study(tmp_path, blocks, motion, unit_blocks=512)
+    study = rocking.create_study(tmp_path, blocks, motion, unit_blocks=512)
     with pytest.raises(InvalidOption, match="part must be the number of a share"):
         study.run(part=part)

@@ -34,7 +34,7 @@ pga = "1:9:8"
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    made = rocking.study(
+    made = rocking.create_study(
         tmp_path_factory.mktemp("study"), BLOCKS, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512
     )
     made.run()
@@ -43,7 +43,7 @@ def study(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def curves(study):
-    return study.block_fragilities(limits=LIMITS)
+    return study.block_fragilities(limit_states=LIMITS)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def simulated():
 
 
 def test_a_study_that_stops_its_simulations_early_gives_no_verdicts(tmp_path):
-    short = rocking.study(tmp_path / "short", BLOCKS, MOTIONS, levels=LEVELS, measure="pga", duration=0.5)
+    short = rocking.create_study(tmp_path / "short", BLOCKS, MOTIONS, levels=LEVELS, measure="pga", duration=0.5)
     short.run()
     for report in (short.block_fragilities, short.spectrum):
         with pytest.raises(rocking.StudyError, match="without a duration"):
@@ -66,7 +66,7 @@ def test_the_curve_of_each_block_is_that_of_its_simulations(curves, blocks):
         one = curves.data.sel(limit_state=name).isel(block=j)
         limits = {name: LIMITS[name]}
         try:
-            curve = rocking.fragility(BLOCKS[j], MOTIONS, levels=LEVELS, limits=limits).curve(name)
+            curve = rocking.fragility(BLOCKS[j], MOTIONS, levels=LEVELS, limit_states=limits).curve(name)
         except rocking.InvalidOption as error:
             assert str(one.fault.values) == str(error)
             continue
@@ -132,7 +132,7 @@ def test_a_study_of_one_block_says_what_a_fragility_at_once_does(tmp_path, alpha
     block = rocking.Block.from_parameters(p=2.0, alpha=alpha, restitution=0.9)
     motions = [motion.with_vertical(lift) for motion in MOTIONS[:6]]
     levels = np.linspace(1.0, 9.0, 9)
-    of_study = rocking.study(tmp_path / "s", block, motions, levels=levels, polarity="both", unit_blocks=512)
+    of_study = rocking.create_study(tmp_path / "s", block, motions, levels=levels, polarity="both", unit_blocks=512)
     of_study.run()
     found, reference = of_study.fragility(), rocking.fragility(block, motions, levels=levels, polarity="both")
     assert found.description.partition(" model, ")[2] == reference.description.partition(" model, ")[2] != ""
@@ -152,7 +152,9 @@ def test_a_spectrum_is_the_fractiles_of_the_simulations(study, simulated):
 
 def test_what_is_written_of_spectral_accelerations_says_their_period_and_damping(tmp_path):
     measure, about = rocking.Measure("sa", 0.7, 0.02), {"measure": "sa", "period": 0.7, "damping": 0.02}
-    made = rocking.study(tmp_path / "study", BLOCKS, MOTIONS[:2], levels=[1.0, 2.0], measure=measure, unit_blocks=512)
+    made = rocking.create_study(
+        tmp_path / "study", BLOCKS, MOTIONS[:2], levels=[1.0, 2.0], measure=measure, unit_blocks=512
+    )
     with rocking.set_options(threads=1):
         made.run()
     for found in (made.results().scale.attrs, made.critical_scales().attrs, made.spectrum().to_dict()):
@@ -162,7 +164,7 @@ def test_what_is_written_of_spectral_accelerations_says_their_period_and_damping
 def test_what_is_read_in_small_parts_is_the_same(study, curves, monkeypatch):
     whole = curves, study.spectrum(), study.fragility(measure="pga_ratio")
     monkeypatch.setattr(reading, "_HELD", 5 * len(MOTIONS) * len(LEVELS))
-    parts = study.block_fragilities(limits=LIMITS), study.spectrum(), study.fragility(measure="pga_ratio")
+    parts = study.block_fragilities(limit_states=LIMITS), study.spectrum(), study.fragility(measure="pga_ratio")
     assert whole[0].data.identical(parts[0].data)
     assert whole[1].data.identical(parts[1].data)
     assert whole[2].to_dict() == parts[2].to_dict()
@@ -170,18 +172,22 @@ def test_what_is_read_in_small_parts_is_the_same(study, curves, monkeypatch):
 
 @pytest.mark.thorough
 def test_both_polarities_of_symmetric_blocks_are_one_outcome(curves, tmp_path):
-    both = rocking.study(tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
+    both = rocking.create_study(
+        tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512
+    )
     both.run()
-    assert both.block_fragilities(limits=LIMITS).data.identical(curves.data)
+    assert both.block_fragilities(limit_states=LIMITS).data.identical(curves.data)
 
 
 def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
     blocks = rocking.Blocks(p=[1.5, 2.0, 3.0], alpha=[[0.1, 0.15], [0.2, 0.15], [0.2, 0.3]], restitution=0.9)
     motions = MOTIONS[::2]
-    study = rocking.study(tmp_path, blocks, motions, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
+    study = rocking.create_study(
+        tmp_path, blocks, motions, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512
+    )
     study.run()
-    of_study = study.fragility(limits=LIMITS)
-    at_once = rocking.fragility(blocks, motions, levels=LEVELS, polarity="both", limits=LIMITS)
+    of_study = study.fragility(limit_states=LIMITS)
+    at_once = rocking.fragility(blocks, motions, levels=LEVELS, polarity="both", limit_states=LIMITS)
     for name in LIMITS:
         found, reference = of_study.curve(name), at_once.curve(name)
         assert found.trials.sum() == reference.trials.sum() == 2 * 3 * len(motions) * len(LEVELS)
@@ -193,7 +199,9 @@ def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
 @pytest.mark.parametrize("order", [[0, 1], [1, 0]])
 def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, order):
     blocks = rocking.Blocks(p=2.0, alpha=[[0.2, 0.2], [0.2, 0.15]], restitution=0.9).select(np.array(order))
-    study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
+    study = rocking.create_study(
+        tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512
+    )
     study.run()
     found, once = study.block_fragilities(), len(MOTIONS) * len(LEVELS)
     assert found.data.outcomes.values.tolist() == [[once * (1 + k) for k in order]]
@@ -201,7 +209,7 @@ def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, ord
 
 def test_a_block_that_no_curve_fits_says_why(tmp_path):
     blocks = rocking.Blocks(p=[2.0, 2.0], alpha=[0.2, 1.2], restitution=[0.9, 0.9])
-    study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
+    study = rocking.create_study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
     study.run()
     found = study.block_fragilities()
     assert found.data.fault.values[0, 0] == ""
@@ -215,17 +223,17 @@ def test_wrong_options_of_a_report_are_refused(study, run, tmp_path):
         with pytest.raises(rocking.InvalidOption, match="confidence must be a number between 0 and 1, not 2"):
             curves(confidence=2)
         with pytest.raises(rocking.InvalidOption, match="must be 0 or more"):
-            curves(limits={"half": -0.5})
+            curves(limit_states={"half": -0.5})
     with pytest.raises(rocking.InvalidOption, match="fractiles must hold a share of the motions or more"):
         study.spectrum([])
-    for options in ("--limits foo", "--measure sa", "--fractiles 2", "--confidence 2", "--limits half=-1"):
+    for options in ("--limit-states foo", "--measure sa", "--fractiles 2", "--confidence 2", "--limit-states half=-1"):
         code, _, err = run("study", "report", study.place, tmp_path / "out", *options.split())
         said = "the limit 'half'" if "half" in options else options.split()[0]
         assert code == 2 and said in err and not (tmp_path / "out").exists()
 
 
 def test_a_study_that_is_not_complete_has_no_report(tmp_path):
-    study = rocking.study(tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
+    study = rocking.create_study(tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
     with pytest.raises(rocking.StudyError, match="units are missing, 72 of 72"):
         study.fragility()
 
@@ -237,7 +245,7 @@ def test_two_commands_go_from_a_file_to_fragility_curves(run, tmp_path):
     code, out, _ = run("study", "run", file)
     assert code == 0
     assert re.search(r"(\d+) of \1 units done", out)
-    code, out, err = run("study", "report", tmp_path / "museum", "--limits", "overturning,half=0.5")
+    code, out, err = run("study", "report", tmp_path / "museum", "--limit-states", "overturning,half=0.5")
     assert (code, err) == (0, "")
     assert "fragility of 6 blocks; intensity: peak ground acceleration" in out
     made = {path.name for path in (tmp_path / "museum" / "report").iterdir()}

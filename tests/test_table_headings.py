@@ -173,14 +173,14 @@ def test_channels_without_times_take_the_step_that_is_given(tmp_path: Path) -> N
     first, second = channels(path, dt=0.02)
     assert (first.name, first.dt, second.name) == ("NS", 0.02, "EW")
     path.write_text("Sample,a (g)\n" + wide(COUNT, SAMPLES))
-    assert read(path, dt=0.02).step == 0.02
+    assert read(path, dt=0.02).dt == 0.02
 
 
 def test_units_overrule_what_a_heading_says_and_lines_before_the_rows_may_hold_numbers(tmp_path: Path) -> None:
     path = tmp_path / "table.txt"
     for title in ("1940 El Centro", "Magnitude 6.5", "180 deg", "Test 3, 12 March", "4 points", "# 0.00 0.1x"):
         path.write_text(f"{title}\n" + rows(sign=" ", start=1))
-        assert read(path, units="g").samples[1] == pytest.approx(G * np.array(SAMPLES))
+        assert read(path, units="g").samples == pytest.approx(G * np.array(SAMPLES))
     path.write_text("Time,0,90,UP\n" + wide(TIMES, SAMPLES, OTHER, OTHER))
     assert [each.name for each in channels(path, units="g")] == ["0", "90", "UP"]
     path.write_text("Time (s),v (cm/s)\n" + rows())
@@ -193,7 +193,7 @@ def test_the_first_row_of_a_table_is_among_its_first_1000_lines(tmp_path: Path) 
     path = tmp_path / "table.txt"
     for count, line in itertools.product((62, 63, 64, 200, 999), ("words of a laboratory", "# words", "", "KEY : 3 m")):
         path.write_text(f"{line}\n" * count + rows())
-        assert read(path, units="g").samples[1] == pytest.approx(G * np.array(SAMPLES))
+        assert read(path, units="g").samples == pytest.approx(G * np.array(SAMPLES))
     path.write_text("words of a laboratory\n" * 1000 + rows())
     with pytest.raises(UnreadableRecord, match="none of its first 1000 lines holds numbers alone"):
         read(path, units="g")
@@ -206,7 +206,7 @@ def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) 
     assert channel.dt is None
     assert channel.times is not None and channel.times.tolist() == [0.0, 0.005, 0.02]
     path.write_text("t (ms),a (g)\n0,0.1\n5,0.2\n10,0.3\n")
-    assert read(path, dt=0.005).step == 0.005
+    assert read(path, dt=0.005).dt == 0.005
     with pytest.raises(UnreadableRecord, match=r"the sampling step is 0\.005 s, not dt 5 s"):
         read(path, dt=5.0)
 
@@ -270,7 +270,7 @@ def test_of_a_folder_those_that_say_something_else_keep_it_or_are_refused(tmp_pa
         with pytest.raises(UnreadableRecord, match=what):
             named_motion(str(path), units="g", several=True)
     path.write_text("t (s),a (g)\n0,0\n0.01,1\n0.05,0.5\n0.06,0\n")
-    assert named_motion(str(path), dt=0.01, several=True).step is None
+    assert named_motion(str(path), dt=0.01, several=True).dt is None
     with pytest.raises(UnreadableRecord, match="not evenly"):
         named_motion(str(path), dt=0.01)
 
@@ -377,7 +377,7 @@ def test_a_step_that_a_heading_states_is_not_contradicted(stated: str, columns: 
     names = "N-S (gal)  E-W (gal)  U-D (gal)\n" if columns == 3 else ""
     path.write_text(f"A STATION\n{stated}\n{names}" + wide(*[SAMPLES] * columns, sign="  "))
     channel = 1 if columns == 3 else None
-    assert read(path, dt=0.01, units="gal", channel=channel).step == 0.01
+    assert read(path, dt=0.01, units="gal", channel=channel).dt == 0.01
     with pytest.raises(UnreadableRecord, match=r"line 2: the heading says .*, not dt 0.02 s; correct one of them"):
         read(path, dt=0.02, units="gal", channel=channel)
     if columns == 1:
@@ -394,4 +394,4 @@ def test_a_step_that_a_heading_states_may_be_rounded(dt: float, tmp_path: Path) 
             with pytest.raises(UnreadableRecord, match="correct one of them"):
                 read(path, dt=dt, units="g")
         else:
-            assert read(path, dt=dt, units="g").step == dt
+            assert read(path, dt=dt, units="g").dt == dt

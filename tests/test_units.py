@@ -119,7 +119,7 @@ def test_every_measure_is_labelled_in_the_unit_in_which_it_is_shown(name, column
 def test_a_spectral_acceleration_is_labelled_with_its_oscillator(period, damping):
     measure = Measure("sa", period, damping)
     assert measure.options() == {"period": period, "damping": damping}
-    assert measure.alone == Measure.of(measure) == measure
+    assert measure.alone == Measure.parse(measure) == measure
     assert (
         (f"damping {damping:g}" in measure.label) == (f"damping {damping:g}" in measure.short_name) == (damping != 0.05)
     )

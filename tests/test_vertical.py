@@ -224,10 +224,10 @@ def test_a_duration_within_the_vertical_component_leaves_the_verdict_open(second
     response = rocking.simulate(block, motion, duration=seconds)
     assert response.stopped
     assert "has not moved by" in response.summary()
-    assert bool(rocking.simulate_many(rocking.Blocks.of([block]), motion, duration=seconds).stopped.item())
+    assert bool(rocking.simulate_many(rocking.Blocks.from_bodies([block]), motion, duration=seconds).stopped.item())
     over = rocking.simulate(block, motion, duration=3.0)
     assert not over.stopped
-    assert not bool(rocking.simulate_many(rocking.Blocks.of([block]), motion, duration=3.0).stopped.item())
+    assert not bool(rocking.simulate_many(rocking.Blocks.from_bodies([block]), motion, duration=3.0).stopped.item())
 
 
 @pytest.mark.parametrize("push", [1e-15, -1e-15])
@@ -262,7 +262,7 @@ def test_a_touch_without_speed_is_no_impact_and_calls_itself_ambiguous() -> None
         assert len(response.impacts) == 0
         assert response.peak_rotation == pytest.approx(0.4, abs=1e-12)
         assert response.ambiguities == ("touch",)
-        together = rocking.simulate_many(rocking.Blocks.of([block]), motion, duration=seconds)
+        together = rocking.simulate_many(rocking.Blocks.from_bodies([block]), motion, duration=seconds)
         assert int(together.impacts.item()) == 0
         assert together.peak_rotation.item() == pytest.approx(0.4, abs=1e-12)
 

@@ -61,7 +61,7 @@ from .response import Gradient, Perturbed, Repeat, Response, Sensitivity, gradie
 from .simulation.ensemble import Product, Scales, simulate_many
 from .simulation.simulate import simulate
 from .solid.solid import Solid
-from .studies import Study, study
+from .studies import Study, create_study
 
 __version__: str
 
@@ -129,6 +129,7 @@ __all__ = [
     "calibration",
     "chattering",
     "compare_measures",
+    "create_study",
     "critical_scale",
     "dynamics",
     "explore",
@@ -151,7 +152,6 @@ __all__ = [
     "simulate_many",
     "solid",
     "studies",
-    "study",
     "survey",
     "validate",
 ]

@@ -134,7 +134,7 @@ class InvalidBlock(RockingError):
     """Sizes or parameters do not describe a block that stands and rocks."""
 
 
-class UnequalSides(InvalidBlock, AttributeError):
+class UnequalSides(InvalidBlock):
     """A property of one value was requested for a block with unequal sides (see `Block.sides`)."""
 
 

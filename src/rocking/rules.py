@@ -137,7 +137,7 @@ def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
 
 def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
     """Combine blocks, or raise an error if they have restraints."""
-    many = Blocks.of(blocks)
+    many = Blocks.from_bodies(blocks)
     for each in many if many.terms else ():
         one_block(each)
     return many
@@ -471,7 +471,7 @@ def check(
 
 def _margin(response: Response, block: Block, motion: Motion, model: Model) -> float:
     """Reciprocal of the lowest factor on the motion that overturns the block, consistent with the response."""
-    scaled = incremental_dynamic_analysis(block, motion, model=model, tolerance=_TOLERANCE)
+    scaled = incremental_dynamic_analysis(block, motion, model=model, rtol=_TOLERANCE)
     margin = motion.pga / float(scaled.data.overturning_level[0, 0])
     if response.overturned:
         return float(np.fmax(margin, 1.0))  # the factor may be beyond all simulated levels

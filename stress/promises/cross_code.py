@@ -67,7 +67,7 @@ def _recorded(rng: np.random.Generator) -> Shaking:
     station = _STATIONS[int(rng.integers(len(_STATIONS)))]
     names = [name for name in rocking.records.names() if name.startswith(station)]
     across, up = (rocking.records.load(name) for name in (names[int(rng.integers(2))], names[-1]))
-    return _scaled(rng, "record", across.samples[0], across.samples[1], up.samples[1])
+    return _scaled(rng, "record", across.times, across.samples, up.samples)
 
 
 def _made(rng: np.random.Generator) -> Shaking:

@@ -95,7 +95,7 @@ def as_study(part: int, unit_blocks: int, processes: int = 0) -> str:
     """Digest of the ensemble as a study, in units of so many blocks, by a thread or by processes."""
     blocks, motion, model = drawn(part)
     with tempfile.TemporaryDirectory() as folder:
-        made = rocking.study(folder, blocks, motion, model=model, unit_blocks=unit_blocks)  # type: ignore[arg-type]
+        made = rocking.create_study(folder, blocks, motion, model=model, unit_blocks=unit_blocks)  # type: ignore[arg-type]
         if processes:
             with ProcessPoolExecutor(processes, get_context("spawn")) as executor:
                 made.run(executor=executor)

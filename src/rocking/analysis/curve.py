@@ -151,7 +151,7 @@ class FragilityCurve:
         with np.errstate(over="ignore", under="ignore"):
             return float(np.exp((score - self.fitted.intercept[0]) / self.fitted.slope[0]))
 
-    def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
+    def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.9) -> Floats:
         """Compute the largest annual rates of exceeding an intensity that are consistent with survival.
 
         The rates are -ln(1 - confidence)/(years P(intensity)), with the shape of the intensities (SI units, 0 or more),

@@ -107,7 +107,7 @@ def response_rose(
         raise InvalidBlock(f"a Solid is needed, not a {type(solid).__name__}: make one with rocking.Solid.from_mesh")
     named = _named_pairs(pairs)
     at = np.arange(0.0, 180.0, 15.0) if azimuths is None else checked_azimuths(azimuths)
-    scales = Scales.of(levels, measure)
+    scales = Scales.from_levels(levels, measure)
     blocks = [solid.block(azimuth, restitution=restitution) for azimuth in at]
     factors = np.array([_factors(scales, pair) for pair in named.values()])
     shape = (len(named), scales.count, len(at))

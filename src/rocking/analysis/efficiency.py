@@ -48,7 +48,7 @@ def compare_measures(
     model: Model = "nonlinear",
     weights: ArrayLike | None = None,
     clusters: object = None,
-    tolerance: float = 1e-4,
+    rtol: float = 1e-6,
 ) -> MeasureComparison:
     """Compare the dispersion of overturning motions for several intensity measures.
 
@@ -64,7 +64,7 @@ def compare_measures(
         Equation of motion.
     weights, clusters : optional
         As for `fragility`. A cluster counts as one motion in the intervals.
-    tolerance : float
+    rtol : float
         Relative width of the brackets of the overturning intensities.
 
     Returns
@@ -114,7 +114,7 @@ def compare_measures(
     measures = [Measure("pga"), Measure("pgv"), *of_periods, Measure("pga_ratio"), Measure("pgv_ratio")]
     together = clusters_of(shaken, clusters)
     _check_enough(len(np.unique(together)), clusters)
-    scaled = incremental_dynamic_analysis(many, shaken, measure="pga_ratio", model=model, tolerance=tolerance)
+    scaled = incremental_dynamic_analysis(many, shaken, measure="pga_ratio", model=model, rtol=rtol)
     level = scaled.data.overturning_level.transpose("motion", "block").values
     factors = level * units_of(many, measures[-2], model) / values_of(shaken, measures[0])[:, None]
     intensity = [factors * values_of(shaken, each)[:, None] / units_of(many, each, model) for each in measures]

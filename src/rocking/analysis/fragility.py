@@ -25,10 +25,10 @@ from rocking.analysis.curve import (
 )
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
-    OVERTURNING,
+    by_limit_state,
+    checked_limit_states,
     clusters_of,
     groups_of,
-    limit_states,
     motions_in_words,
     of_polarities,
     outcomes_of,
@@ -211,7 +211,7 @@ class Fragility(Result):
         years: float,
         hazard: HazardCurve | None = None,
         *,
-        confidence: float = 0.95,
+        confidence: float = 0.9,
         limit_state: str = "overturning",
     ) -> Survival:
         """Constrain past ground motions by a limit state that was not exceeded, as by a rock that still stands.
@@ -331,7 +331,7 @@ def fragility(
     *,
     measure: IntensityName | Measure = "pga",
     levels: ArrayLike | None = None,
-    limits: Mapping[str, float] = OVERTURNING,
+    limit_states: Mapping[str, float] | None = None,
     model: Model = "nonlinear",
     chattering: str | ChatteringScheme = "certified",
     polarity: Polarity = "+",
@@ -352,7 +352,7 @@ def fragility(
         Intensity measure, as for `incremental_dynamic_analysis`.
     levels : array_like, optional
         Levels to which every motion is scaled (stripes). By default the motions are not scaled (cloud).
-    limits : mapping of str to float
+    limit_states : mapping of str to float, optional
         Limit states: ratio of peak rotation to slenderness (the smaller one of two sides), ``math.inf`` for
         overturning.
     model, chattering : optional
@@ -394,12 +394,12 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    many, how = bodies_of(blocks), Measure.of(measure)
+    many, how = bodies_of(blocks), Measure.parse(measure)
     slenderness = slenderness_of(many)
     shares = weights_of(weights, len(many))
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
     checks.share(confidence, "confidence", InvalidOption)
-    states = limit_states(limits, "limits")
+    states = checked_limit_states(limit_states)
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
         raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
@@ -514,12 +514,12 @@ def fit_fragility(
     >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
     median 3.1509 m/s^2, dispersion 0.3042
     """
-    how = Measure.of(measure)
+    how = Measure.parse(measure)
     x = checks.positive_numbers(intensity, "intensity", InvalidOption)
     for end in (x.min(), x.max()):
         checks.within(float(end), "intensity", InvalidOption, 1e-50, 1e50)
     count = whole_numbers(trials, "trials", x.size, 1.0, 2.0**53)
-    outcomes = limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
+    outcomes = by_limit_state(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
     groups = None if clusters is None else groups_of(clusters, "clusters", x.size)
     checks.share(confidence, "confidence", InvalidOption)
     curves = [

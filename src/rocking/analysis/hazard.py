@@ -98,7 +98,7 @@ class HazardCurve(Result):
         _check_order("intensities", intensity, 1.0)
         _check_order("rates", rate, -1.0)
         given: Any = self.measure
-        measure = Measure.of(given)
+        measure = Measure.parse(given)
         if measure.units == "1":
             raise InvalidOption("a hazard curve is of pga, pgv or sa, which are of the site, not of a block")
         for name, value in (("intensity", intensity), ("rate", rate), ("measure", measure)):

@@ -55,7 +55,7 @@ def incremental_dynamic_analysis(
     measure: IntensityName | Measure = "pga",
     levels: ArrayLike | None = None,
     model: Model = "nonlinear",
-    tolerance: float = 1e-6,
+    rtol: float = 1e-6,
 ) -> IncrementalDynamicAnalysis:
     """Scale motions beyond overturning of every block, and find the bands of levels that overturn.
 
@@ -75,7 +75,7 @@ def incremental_dynamic_analysis(
         the level by which every motion has overturned every block, at most 490 times the first.
     model : {"nonlinear", "linear"}
         Equation of motion.
-    tolerance : float
+    rtol : float
         Width of refined ends of bands, relative to the level.
 
     Returns
@@ -116,12 +116,12 @@ def incremental_dynamic_analysis(
     >>> incremental_dynamic_analysis(block, pulse, measure="pga_ratio").data.band_start.values.round(4).tolist()
     [2.9855, 7.2759]
     """
-    many, how, shaken = bodies_of(blocks), Measure.of(measure), several_motions(motions)
+    many, how, shaken = bodies_of(blocks), Measure.parse(measure), several_motions(motions)
     slenderness = slenderness_of(many)
     values = values_of(shaken, how)
     if never_rests(many):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
-    width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
+    width = checks.within(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model}
     first = _lowest_uplift(many, shaken, values, how, model)
     if levels is None:
@@ -145,7 +145,7 @@ def incremental_dynamic_analysis(
 
     grid = table.overturned.transpose("level", "motion", "block").values
     flat = grid.reshape(len(grid), -1).astype(np.int64)
-    edges = boundaries(table.level.values, flat, overturned, tolerance=width)
+    edges = boundaries(table.level.values, flat, overturned, rtol=width)
     found = _dataset(table, flat, edges, slenderness, how)
     about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
     scales = (table.level.values[:, None, None] * factors)[..., None]
@@ -418,8 +418,7 @@ class CriticalScale:
 def critical_scale(
     block: Body,
     motion: Motion,
-    low: float,
-    high: float,
+    bounds: tuple[float, float],
     *,
     model: Model = "nonlinear",
     initial_rotation: float = 0.0,
@@ -433,9 +432,9 @@ def critical_scale(
         Block, or another body that can overturn.
     motion : Motion
         Motion, both components of which are scaled.
-    low, high : float
-        Positive scales that bracket the critical scale: the block stands at `low` and overturns at `high`. If the
-        outcome changes several times between them, one of the changes is found.
+    bounds : (float, float)
+        Positive scales that bracket the critical scale: the block stands at the lower one and overturns at the higher
+        one. If the outcome changes several times between them, one of the changes is found.
     model, initial_rotation, initial_velocity : optional
         As for `simulate`.
 
@@ -449,8 +448,8 @@ def critical_scale(
     InvalidMotion
         If `motion` is not a `Motion`.
     InvalidOption
-        If there is no motion, the block overturns at `low` or stands at `high`, or the scales are not positive and
-        increasing.
+        If there is no motion, the block overturns at the lower scale or stands at the higher one, or the scales are not
+        positive and increasing.
 
     See Also
     --------
@@ -467,25 +466,24 @@ def critical_scale(
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    >>> f"{rocking.critical_scale(block, record, 2.0, 6.0).scale:.6f}"
+    >>> f"{rocking.critical_scale(block, record, (2.0, 6.0)).scale:.6f}"
     '3.256134'
     """
     if one_motion(motion) is None:
         raise InvalidOption("there is no {} to scale: give one", "motion")
-    least, most = (checks.positive(value, name, InvalidOption) for value, name in ((low, "low"), (high, "high")))
-    if least >= most:
-        raise InvalidOption(f"{{}} = {least:g} must be below {{}} = {most:g}", "low", "high", value=low)
+    low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
+    checks.positive(low, "bounds", InvalidOption)
 
     def response(scale: float) -> Response:
         return simulate(
             block, motion * scale, model=model, initial_rotation=initial_rotation, initial_velocity=initial_velocity
         )
 
-    for value, name, expected in ((least, "low", False), (most, "high", True)):
-        if response(value).overturned is not expected:
-            does, wanted = ("does not overturn", "raise") if expected else ("overturns", "lower")
-            raise InvalidOption(f"the block {does} at the scale {{}} = {value:g}: {wanted} it", name, value=value)
-    _, scale = bisected(least, most, lambda scale: response(scale).overturned)
+    for bound, expected in ((low, False), (high, True)):
+        if response(bound).overturned is not expected:
+            does, change = ("does not overturn", "raise") if expected else ("overturns", "lower")
+            raise InvalidOption(f"the block {does} at the scale {bound:g}: {change} it in {{}}", "bounds", value=bounds)
+    _, scale = bisected(low, high, lambda scale: response(scale).overturned)
     last = response(scale)
     by_scale = {name: float(last.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")}
     turned, share = gradient(last, "event", -1), -scale / by_scale["motion"]

@@ -230,19 +230,20 @@ def checked_limit(limit: float, name: str) -> float:
     return least
 
 
-#: Limit states: limits of the ratio of peak rotation to slenderness (infinite: overturning).
-OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
-
-
-def limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+def by_limit_state(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """Return values by limit state, at least one."""
-    for state in checks.mapping(given, name, InvalidOption, "{'overturning': inf}"):
+    for state in checks.mapping(values, name, InvalidOption, "{'overturning': inf}"):
         checks.text(state, f"name of a limit state in {name}", InvalidOption)
-    return given
+    return values
+
+
+def checked_limit_states(limit_states: Mapping[str, float] | None) -> Mapping[str, float]:
+    """Return limits of the ratio of peak rotation to slenderness by limit state; by default overturning (infinite)."""
+    return {"overturning": math.inf} if limit_states is None else by_limit_state(limit_states, "limit_states")
 
 
 def outcomes_of(
-    table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
+    table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limit_states: Mapping[str, float]
 ) -> pd.DataFrame:
     """Table of all simulations (level, motion, block, polarity) with the limits that they exceed."""
     import pandas as pd
@@ -262,7 +263,10 @@ def outcomes_of(
             "peak_over_alpha": ratio.ravel(),
             "overturned": table.overturned.values.ravel(),
             "unfinished": table.unfinished.values.ravel(),
-            **{f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()},
+            **{
+                f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool)
+                for name, limit in limit_states.items()
+            },
         }
     )
 
@@ -327,7 +331,7 @@ def boundaries(
     outcome: Integers,
     outcome_of: Callable[[Integers, Floats], Integers],
     *,
-    tolerance: float,
+    rtol: float,
 ) -> Boundaries:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
@@ -337,22 +341,22 @@ def boundaries(
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
     here = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
     origin = np.arange(len(here.level))
-    left = _halvings(here, tolerance)
+    left = _halvings(here, rtol)
     with Progress("refining", left) as bar:
-        while (wide := bisection.is_wide(here.low, here.high, tolerance)).any():
+        while (wide := bisection.is_wide(here.low, here.high, rtol)).any():
             found = here.below.copy()
             found[wide] = outcome_of(here.column[wide], here.level[wide])
             here, origin = _halved(here, wide, found, origin)
             # A third outcome adds brackets, which the bar waits for.
-            before, left = left, min(left, _halvings(here, tolerance))
+            before, left = left, min(left, _halvings(here, rtol))
             bar.advance(before - left)
     order = np.lexsort((here.low, here.column))
     return Boundaries(*(values[order] for values in vars(here).values()))
 
 
-def _halvings(here: Boundaries, tolerance: float) -> int:
+def _halvings(here: Boundaries, rtol: float) -> int:
     """Count the remaining bisections of the present brackets."""
-    return int(np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (tolerance * here.high)))).sum())
+    return int(np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (rtol * here.high)))).sum())
 
 
 def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:

@@ -85,7 +85,7 @@ def overturning_map(
     amplitudes: ArrayLike,
     frequencies: ArrayLike,
     model: Model = "nonlinear",
-    tolerance: float = 1e-9,
+    rtol: float = 1e-6,
     **parameters: Any,
 ) -> OverturningMap:
     """Map the outcomes of a block under a pulse over amplitude and frequency, with their boundaries.
@@ -106,7 +106,7 @@ def overturning_map(
         Increasing values of 2 pi f/p, with the pulse's frequency f and the block's p (the smaller one of two sides).
     model : {"nonlinear", "linear"}
         Equation of motion.
-    tolerance : float
+    rtol : float
         Width of refined boundaries, relative to the amplitude.
     **parameters : object
         Further parameters of a named pulse, as for the function of that name in `rocking.pulses`.
@@ -153,7 +153,7 @@ def overturning_map(
     levels = checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption)
     ratios = checks.increasing_numbers(frequencies, "frequencies", InvalidOption)
     checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
-    width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
+    width = checks.within(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     one_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption(
@@ -195,7 +195,7 @@ def overturning_map(
     with Progress("mapping", row.size) as bar:
         modes, peaks = followed(column, levels[row], bar.advance)
     modes, peaks = modes.reshape(levels.size, -1), peaks.reshape(levels.size, -1)
-    edges = boundaries(levels, modes, lambda *at: followed(*at)[0], tolerance=width)
+    edges = boundaries(levels, modes, lambda *at: followed(*at)[0], rtol=width)
     attributes = {
         "program": f"rocking {VERSION}",
         "model": model,
@@ -204,7 +204,7 @@ def overturning_map(
         "restitution": [side.restitution for side in block.sides],
         "pulse": f"{unit.name}: {unit.description.text}",
         "pulse_name": unit.name,
-        "tolerance": width,
+        "rtol": width,
     }
     return OverturningMap(_dataset(levels, ratios, modes, peaks, edges, attributes))
 
@@ -309,7 +309,7 @@ class OverturningMap(DatasetResult):
             "block": self.data.block,
             **{name: self.data.attrs[name] for name in (named("alpha", "rad"), "restitution")},
             "model": self.data.model,
-            "tolerance": self.data.tolerance,
+            "rtol": self.data.rtol,
             "modes": {str(mode): mode_name(int(mode)) for mode in np.unique(self.data.mode)},
             "frequency": self.data.frequency.values,
             "amplitude": self.data.amplitude.values,

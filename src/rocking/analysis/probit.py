@@ -47,7 +47,7 @@ class Outcomes(NamedTuple):
         """Return one data set with an additional dimension of length 1."""
         return Outcomes(self.z, self.exceeded[None, :], self.trials[None, :])
 
-    def of(self, sets: Flags) -> Outcomes:
+    def select(self, sets: Flags) -> Outcomes:
         """Return selected data sets."""
         return Outcomes(self.z, self.exceeded[sets], self.trials[sets])
 
@@ -187,7 +187,7 @@ def fit_or_limits(data: Outcomes) -> Probit:
     fits = Probit(ndtri(exceeded.sum(axis=1) / trials.sum(axis=1)), np.where(step, STEEP, 0.0))
     fits.intercept[step] = -0.5 * STEEP * (highest_no + lowest_yes)[step]
     if (regular := ~step & _rises(data)).any():
-        fits.intercept[regular], fits.slope[regular] = fit(data.of(regular))
+        fits.intercept[regular], fits.slope[regular] = fit(data.select(regular))
     return fits
 
 
@@ -297,7 +297,7 @@ def _uphill(data: Outcomes, beta: Floats, step: Floats, now: Floats) -> tuple[Fl
         if not falling.any():
             break
         step[falling] *= 0.5
-        then[falling] = likelihood(data.of(falling), (beta + step)[falling])
+        then[falling] = likelihood(data.select(falling), (beta + step)[falling])
     return step, then
 
 

@@ -167,7 +167,7 @@ class Blocks:
         return blocks._fill(blocks.gravity, blocks._arrays(), axes)
 
     @classmethod
-    def of(cls, blocks: Blocks | Block | RestrainedBlock | Iterable[Block | RestrainedBlock]) -> Blocks:
+    def from_bodies(cls, blocks: Blocks | Block | RestrainedBlock | Iterable[Block | RestrainedBlock]) -> Blocks:
         """Gather single blocks with the same gravity. `Blocks` are returned unchanged.
 
         The arrays determine the motion, but do not contain sizes. Therefore an extracted block has the sizes and
@@ -217,11 +217,11 @@ class Blocks:
         """Return p, alpha, restitution and the terms of restrained blocks, with units, by name."""
         return {name: (values, _UNITS.get(name, "1")) for name, values in self._arrays().items()}
 
-    def speed_limits(self, share: float) -> Floats:
+    def speed_thresholds(self, share: float) -> Floats:
         """Return a share of p alpha on every side, rad/s, shape (n, 2)."""
         return share * self.p * self.alpha
 
-    def kernel_records(self, model: Model, limits: Floats) -> state.Records:
+    def kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
         """Return records for kernels (`kernels.state.BLOCK`), shape (n,)."""
         p, alpha = self.p, self.alpha
         made = state.records(len(self), state.BLOCK)
@@ -231,7 +231,7 @@ class Blocks:
         made["threshold"] = alpha if model == "linear" else np.tan(alpha)
         made["threshold_slope"] = stiffness if model == "linear" else stiffness * cosine
         made["restitution"] = self.restitution
-        made["limit"] = limits
+        made["limit"] = thresholds
         made["next_side"] = (1, 0)
         made["overturn_angle"] = 0.5 * math.pi
         if self.terms:

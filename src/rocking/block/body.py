@@ -120,11 +120,11 @@ class Bodies(Protocol):
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         """Return the parameters by name: arrays of shape (n, 2), and units."""
 
-    def speed_limits(self, share: float) -> Floats:
+    def speed_thresholds(self, share: float) -> Floats:
         """Return a share of the characteristic speed of each side, shape (n, 2): p alpha for a block, rad/s."""
 
-    def kernel_records(self, model: Model, limits: Floats) -> Records:
-        """Return records for kernels (`kernels.state.BLOCK`), with speed limits of a scheme, shape (n, 2)."""
+    def kernel_records(self, model: Model, thresholds: Floats) -> Records:
+        """Return records for kernels (`kernels.state.BLOCK`), with thresholds of a chattering scheme, shape (n, 2)."""
 
 
 class Kind(Protocol):
@@ -133,7 +133,7 @@ class Kind(Protocol):
     def __call__(self, *nothing: Any, **parameters: Any) -> Bodies:
         """Create bodies from their `parameters`, by name, and gravity."""
 
-    def of(self, bodies: Any, /) -> Bodies:
+    def from_bodies(self, bodies: Any, /) -> Bodies:
         """Gather single bodies."""
 
 

@@ -58,7 +58,7 @@ class Rocking:
 
     def alone(self) -> Bodies:
         """Return `Blocks` that contain only this block."""
-        return KINDS["blocks"].of([self])
+        return KINDS["blocks"].from_bodies([self])
 
 
 @dataclass(frozen=True, repr=False)
@@ -129,9 +129,15 @@ class Block(Rocking):
         restitution: float | Sequence[float] | None = None,
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
+        **unknown: Never,
     ) -> None:
         if unnamed:
             raise InvalidBlock("give the sizes of a block by name, in m: Block({}=0.4, {}=2.0)", "width", "height")
+        for name in unknown:
+            makers = {"p": "from_parameters", "alpha": "from_parameters", "distances": "from_pivots"}
+            makers |= {"radius_of_gyration": "from_pivots", "mass_ratio": "from_frame"}
+            hint = f"use Block.{makers[name]}" if name in makers else "see help(rocking.Block)"
+            raise TypeError(f"Block has no argument {name}; {hint}")
         b, h = _half_sizes((half_width, half_height), (width, height))
         g = checked_gravity(gravity)
         text = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
@@ -404,6 +410,16 @@ class Block(Rocking):
         # A wall may be too stocky for the default of a block.
         block = cls(restitution=None if restitution is None else 1.0, **sizes)
         return SINGLE["restrained"](block, *restraints, one_sided=True, lean=lean, restitution=restitution)
+
+    @property
+    def width(self) -> float | None:
+        """Width, m, of a rectangular block, otherwise None."""
+        return None if self.half_width is None else 2.0 * self.half_width
+
+    @property
+    def height(self) -> float | None:
+        """Height, m, of a rectangular block, otherwise None."""
+        return None if self.half_height is None else 2.0 * self.half_height
 
     @property
     def p(self) -> float:

@@ -40,7 +40,7 @@ class Scores:
 
     Examples
     --------
-    >>> Scores.of([0.9, 0.2, 0.6], [True, False, False])
+    >>> Scores.from_predictions([0.9, 0.2, 0.6], [True, False, False])
     <Scores: accuracy 66.7 %, log loss 0.415, Brier score 0.137>
     """
 
@@ -55,7 +55,7 @@ class Scores:
         return f"<Scores: {self}>"
 
     @classmethod
-    def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
+    def from_predictions(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
         """Compute the scores of predicted probabilities of m outcomes (bool)."""
         given, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if given.shape != seen.shape or not given.size:

@@ -117,7 +117,7 @@ class Calibration(Result):
         Posterior draws of the population's centre, by the same names.
     probabilities, observed : ndarray, shape (m,)
         Fitted probability of overturning under each motion, and observed outcome (bool).
-    model, lapse, seed : str, float, int
+    model, outlier_probability, seed : str, float, int
         As for `calibrate`.
     diagnostics : Diagnostics
         Effective candidates, agreement of runs, and bounds reached. Its `notes` are part of the summary.
@@ -137,7 +137,7 @@ class Calibration(Result):
     probabilities: Floats
     observed: Flags
     model: Model
-    lapse: float
+    outlier_probability: float
     seed: int
     diagnostics: Diagnostics
     _evidence: Evidence = field(init=False)
@@ -145,17 +145,17 @@ class Calibration(Result):
     @property
     def scores(self) -> Scores:
         """Scores on the calibration's own motions, which are optimistic (see `cross_validate`)."""
-        return Scores.of(self.probabilities, self.observed)
+        return Scores.from_predictions(self.probabilities, self.observed)
 
     def predict(self, motions: Motions) -> Floats:
         """Compute the probability of overturning under m motions, shape (m,).
 
-        The weighted share of the ensemble that overturns is bounded away from 0 and 1 by the lapse.
+        The weighted share of the ensemble that overturns is bounded away from 0 and 1 by the outlier_probability.
         """
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
         fell = overturned_under(self.blocks, motions, self.model)
-        return chances_of(self.weights @ fell, self.diagnostics.effective, self.lapse)
+        return chances_of(self.weights @ fell, self.diagnostics.effective, self.outlier_probability)
 
     def cross_validate(
         self,
@@ -198,13 +198,13 @@ class Calibration(Result):
                 kept, wanted = evidence.of_tests(~left_out), evidence.of_tests(left_out)
                 drawn = posterior(kept, _DRAWS, ROUNDS, rng)
                 row[left_out] = wanted.probabilities(drawn).mean(axis=0)
-        return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
+        return Validation(probabilities, tuple(Scores.from_predictions(row, self.observed) for row in probabilities))
 
     def fragility(self, motions: Motions, *, model: Model | None = None, **options: Any) -> Fragility:
         """Compute the specimen's fragility with `rocking.fragility`, for the ensemble and by default in its model.
 
         The uncertainty of the block and its dispersion between tests widen the curve. The band represents the motions.
-        The lapse of `predict` is ignored, because a motion too weak for uplift does not overturn the block.
+        The outlier probability of `predict` is ignored, because a motion too weak for uplift does not overturn it.
         """
         return fragility(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
@@ -287,10 +287,12 @@ def overturned_under(blocks: Bodies, motions: Motions, model: Model) -> NDArray[
     return np.asarray(known.transpose("block", "motion").values, dtype=np.float32)
 
 
-def chances_of(share: Floats, effective: float, lapse: float) -> Floats:
+def chances_of(share: Floats, effective: float, outlier_probability: float) -> Floats:
     """Compute probabilities of recorded outcomes from a share of effective blocks, certain for a known block."""
     expected = share if math.isinf(effective) else expected_share(share, effective)
-    return np.clip(with_outliers(expected, lapse), 0.0, 1.0)  # rounding can make a sum of weights exceed 1
+    return np.clip(
+        with_outliers(expected, outlier_probability), 0.0, 1.0
+    )  # rounding can make a sum of weights exceed 1
 
 
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
@@ -309,9 +311,9 @@ def calibrate(
     alpha: Knowledge = (0.02, 0.6),
     restitution: Knowledge = (0.3, 0.999),
     two_sided: bool = True,
-    lapse: float = 0.005,
+    outlier_probability: float = 0.005,
     candidates: int = 8192,
-    ensemble: int = 1000,
+    max_blocks: int = 1000,
     seed: int = 0,
 ) -> Calibration:
     """Fit blocks to the outcomes (overturned or not) of a specimen under several motions.
@@ -333,12 +335,12 @@ def calibrate(
     two_sided : bool
         Whether the slendernesses of the two sides may differ, by a factor of at most 3. By default they may, unlike in
         `calibrate_history`, because few specimens are symmetric and outcomes alone would not reveal this.
-    lapse : float
+    outlier_probability : float
         Probability that an outcome does not come from a rocking block.
     candidates : int
         Approximate number of blocks simulated under every distinct motion, up to twice as many if runs disagree or few
         represent a typical population.
-    ensemble : int
+    max_blocks : int
         Largest number of blocks for predictions.
     seed : int
         Seed of the random draws.
@@ -381,30 +383,30 @@ def calibrate(
     """
     tested = several_motions(motions)
     observed = checked_outcomes(overturned, len(tested))
-    space = Space.of(p, alpha, restitution, two_sided=checks.flag(two_sided, "two_sided", InvalidOption))
-    checks.share(lapse, "lapse", InvalidOption, below=0.5)
+    space = Space.from_bounds(p, alpha, restitution, two_sided=checks.flag(two_sided, "two_sided", InvalidOption))
+    checks.share(outlier_probability, "outlier_probability", InvalidOption, below=0.5)
     checks.whole(candidates, "candidates", InvalidOption, 128)
-    checks.whole(ensemble, "ensemble", InvalidOption, 1)
+    checks.whole(max_blocks, "max_blocks", InvalidOption, 1)
     rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
     distinct, which = distinct_motions(tested)
 
     def tried(points: Floats) -> NDArray[np.float32]:
         return np.take(overturned_under(space.blocks(points), distinct, model), which, axis=1)
 
-    found = search(Problem(space, observed, lapse, tried), candidates, rng)
+    found = search(Problem(space, observed, outlier_probability, tried), candidates, rng)
     evidence = found.evidence
     final = posterior(evidence, 2 * _DRAWS, ROUNDS, rng)
     weights = evidence.mean_weights(final)
-    kept, times = np.unique(systematic(weights, ensemble, rng), return_counts=True)
+    kept, times = np.unique(systematic(weights, max_blocks, rng), return_counts=True)
     calibration = Calibration(
         blocks=space.blocks(evidence.candidates.points[kept]),
-        weights=times / ensemble,
+        weights=times / max_blocks,
         estimates=_estimates(space, final),
         draws=space.named(unpacked(final)[0]),
         probabilities=evidence.probabilities(final).mean(axis=0),
         observed=observed,
         model=model,
-        lapse=lapse,
+        outlier_probability=outlier_probability,
         seed=seed,
         diagnostics=diagnosed(found, final),
     )

@@ -117,11 +117,11 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Observed outcomes of m motions (m,), outcomes of n candidates under them, and the lapse."""
+    """Observed outcomes of m motions (m,), outcomes of n candidates under them, and the outlier_probability."""
 
     candidates: Candidates
     observed: Flags
-    lapse: float
+    outlier_probability: float
 
     def of_tests(self, tests: Flags) -> Evidence:
         """Return the evidence of some of the tests."""
@@ -144,7 +144,7 @@ class Evidence:
     def probabilities(self, populations: Floats) -> Floats:
         """Compute the probability of overturning for each population and motion, shape (c, m)."""
         found, effective = self._shares(populations)
-        return with_outliers(expected_share(found, effective[:, None]), self.lapse)
+        return with_outliers(expected_share(found, effective[:, None]), self.outlier_probability)
 
     def effective(self, populations: Floats) -> Floats:
         """Compute the effective number of candidates that represent each population, shape (c,)."""
@@ -154,7 +154,7 @@ class Evidence:
         """Compute the log-likelihood of each population, shape (c,)."""
         if not len(populations):
             return np.zeros(0)
-        chances = with_outliers(self._shares(populations)[0], self.lapse)
+        chances = with_outliers(self._shares(populations)[0], self.outlier_probability)
         return np.asarray(np.log(np.where(self.observed, chances, 1.0 - chances)).sum(axis=1))
 
     def _shares(self, populations: Floats) -> tuple[Floats, Floats]:
@@ -199,9 +199,9 @@ def expected_share(share: Floats, effective: ArrayLike) -> Floats:
     return np.asarray((count * share + _JEFFREYS) / (count + 2.0 * _JEFFREYS))
 
 
-def with_outliers(probabilities: Floats, lapse: float) -> Floats:
+def with_outliers(probabilities: Floats, outlier_probability: float) -> Floats:
     """Compute probabilities of recorded outcomes from those of the rocking block."""
-    return lapse + (1.0 - 2.0 * lapse) * probabilities
+    return outlier_probability + (1.0 - 2.0 * outlier_probability) * probabilities
 
 
 #: Number of independent runs.
@@ -227,12 +227,12 @@ class Problem:
 
     space: Space
     observed: Flags
-    lapse: float
+    outlier_probability: float
     tried: Callable[[Floats], NDArray[np.float32]]
 
     def evidence(self, candidates: Candidates) -> Evidence:
         """Combine candidates with the observed outcomes."""
-        return Evidence(candidates, self.observed, self.lapse)
+        return Evidence(candidates, self.observed, self.outlier_probability)
 
     def filling(self, count: int, rng: np.random.Generator) -> Candidates:
         """Simulate blocks that fill the space evenly."""

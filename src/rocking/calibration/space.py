@@ -63,7 +63,7 @@ class Space:
     ratio: float
 
     @classmethod
-    def of(cls, p: Knowledge, alpha: Knowledge, restitution: Knowledge, *, two_sided: bool) -> Space:
+    def from_bounds(cls, p: Knowledge, alpha: Knowledge, restitution: Knowledge, *, two_sided: bool) -> Space:
         """Create the space of the unknown parameters."""
         bounds, known = {}, {}
         for name, given in zip(PARAMETERS, (p, alpha, restitution), strict=True):

@@ -186,7 +186,9 @@ class ModelValidation(Result):
     @property
     def scores(self) -> Scores:
         """Accuracy, log loss and Brier score, as for a calibration."""
-        return Scores.of([test.probability for test in self.tests], [test.overturned for test in self.tests])
+        return Scores.from_predictions(
+            [test.probability for test in self.tests], [test.overturned for test in self.tests]
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -247,7 +249,7 @@ def validate(
     *,
     weights: ArrayLike | None = None,
     model: Model | None = None,
-    lapse: float | None = None,
+    outlier_probability: float | None = None,
     bins: int = 10,
     simulations: int = 2000,
     seed: int = 0,
@@ -265,7 +267,7 @@ def validate(
         Weights of several blocks, equal by default.
     model : {"nonlinear", "linear"}, optional
         Equation of motion, by default the model of a calibration, otherwise nonlinear.
-    lapse : float, optional
+    outlier_probability : float, optional
         Probability that an outcome does not come from a rocking block, by default from a calibration, otherwise 0.
     bins : int
         Number of bins of the reliability diagram, of equal width.
@@ -320,8 +322,8 @@ def validate(
     checks.whole(bins, "bins", InvalidOption, 1, 1000)
     checks.whole(simulations, "simulations", InvalidOption, 100)
     rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
-    if lapse is not None:
-        checks.within(lapse, "lapse", InvalidOption, 0.0, 0.5)
+    if outlier_probability is not None:
+        checks.within(outlier_probability, "outlier_probability", InvalidOption, 0.0, 0.5)
     distinct, which = distinct_motions([test.motion for test in given])
     observed = np.array([test.overturned for test in given], dtype=bool)
     clusters = levels.numbered(
@@ -329,7 +331,7 @@ def validate(
     )
     description, how = "predictions of tests that were left out", ""
     if isinstance(blocks, Validation):
-        probabilities = _left_out(blocks, len(given), weights, lapse)
+        probabilities = _left_out(blocks, len(given), weights, outlier_probability)
     else:
         if isinstance(blocks, Calibration):
             if weights is not None:
@@ -337,7 +339,7 @@ def validate(
             description, how = f"calibration, {counted(len(blocks.blocks), 'block')}", model or blocks.model
             bodies: Bodies = blocks.blocks
             shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
-            lapse = blocks.lapse if lapse is None else lapse
+            outlier_probability = blocks.outlier_probability if outlier_probability is None else outlier_probability
         else:
             description, how = pooled(blocks, weights), model or "nonlinear"
             bodies = bodies_of(blocks)
@@ -345,7 +347,7 @@ def validate(
             shares = normalised_weights(weights, len(bodies)) / len(bodies)
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
         fell = overturned_under(bodies, distinct, how)
-        probabilities = chances_of(shares @ fell, effective, lapse or 0.0)[which]
+        probabilities = chances_of(shares @ fell, effective, outlier_probability or 0.0)[which]
     outcomes = rng.random((simulations, len(given))) < probabilities
     places = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
     term = miscalibration(probabilities, np.vstack([observed, outcomes]), places)
@@ -363,10 +365,10 @@ def validate(
     )
 
 
-def _left_out(source: Validation, count: int, weights: object, lapse: float | None) -> Floats:
+def _left_out(source: Validation, count: int, weights: object, outlier_probability: float | None) -> Floats:
     """Return the predicted probabilities of left-out tests of a calibration."""
-    if weights is not None or lapse is not None:
-        name = "lapse" if weights is None else "weights"
+    if weights is not None or outlier_probability is not None:
+        name = "outlier_probability" if weights is None else "weights"
         raise InvalidOption("predictions of tests that were left out take no {}: leave it out", name)
     known = source.probabilities.shape[1]
     if known != count:

@@ -121,7 +121,7 @@ def map(
     phase: str | None = None,
     gamma: float | None = None,
     kind: str | None = None,
-    tolerance: float = 1e-9,
+    rtol: float = 1e-6,
     block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -148,7 +148,7 @@ def map(
         Length of a Mavroeidis-Papageorgiou pulse in cycles.
     kind
         Kind of a Ricker pulse: symmetric or antisymmetric.
-    tolerance
+    rtol
         Width of the refined boundaries, relative to the amplitude.
     """
     given: dict[str, Any] = {
@@ -164,7 +164,7 @@ def map(
             amplitudes=values(amplitudes, "amplitudes"),
             frequencies=values(frequencies, "frequencies"),
             model=model.model,
-            tolerance=tolerance,
+            rtol=rtol,
             **{name: value for name, value in given.items() if value is not None},
         )
         _deliver(found, "map", None, folder=folder, as_json=output.as_json)
@@ -172,7 +172,7 @@ def map(
 
 def ida(
     *names: Names,
-    tolerance: float = 1e-6,
+    rtol: float = 1e-6,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[HeldOptions, BLOCK] = HeldOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
@@ -188,14 +188,14 @@ def ida(
 
     Parameters
     ----------
-    tolerance
+    rtol
         Width of the refined ends of bands, relative to the level.
     """
     body = block.body()
     with output.folder() as folder:
         read = motion.read_all(names)
         motions = [*read.motions.values()]
-        found = incremental_dynamic_analysis(body, motions, **measure.chosen(), model=model.model, tolerance=tolerance)
+        found = incremental_dynamic_analysis(body, motions, **measure.chosen(), model=model.model, rtol=rtol)
         _deliver(found, "ida", read, folder=folder, as_json=output.as_json)
 
 

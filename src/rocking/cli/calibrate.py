@@ -157,7 +157,7 @@ def _of_outcomes(
 def validate(
     tests: Path,
     *,
-    lapse: float | None = None,
+    outlier_probability: float | None = None,
     bins: Annotated[int, WHOLE] = 10,
     seed: Annotated[int, WHOLE] = 0,
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
@@ -175,7 +175,7 @@ def validate(
     ----------
     tests
         CSV table of tests.
-    lapse
+    outlier_probability
         Probability that an outcome is unrelated to the rocking of the block, by default 0.
     bins
         Number of bins of the reliability diagram.
@@ -184,7 +184,7 @@ def validate(
     """
     with output.folder() as folder:
         rows = read_tests(tests, **file.about())
-        found = judged(rows, **block.blocks(model), lapse=lapse, bins=bins, seed=seed)
+        found = judged(rows, **block.blocks(model), outlier_probability=outlier_probability, bins=bins, seed=seed)
         result = found.to_dict()
         if folder is not None:
             write_tables(folder, found)

@@ -28,7 +28,7 @@ from rocking.cli.options import (
     Names,
     SchemeOptions,
     labels_of,
-    limits_of,
+    parse_limit_states,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
 from rocking.core import checks
@@ -49,7 +49,7 @@ _YEARS: Final = 50.0
 def fragility(
     *names: Names,
     outcomes: Path | None = None,
-    limits: str = "overturning",
+    limit_states: str = "overturning",
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "+",
     clusters: str | None = None,
     confidence: float = 0.9,
@@ -78,7 +78,7 @@ def fragility(
         CSV table of observations: a column overturned (1 or 0; with a column trials, their number), the intensity
         (pga_g, pgv_m_s, sa_g with --period) or the motion (a record file, a shipped record, or a pulse, for which
         --measure is computed), and optionally group: outcomes that belong together.
-    limits
+    limit_states
         Limit states, separated by commas: overturning, or NAME=ROTATION divided by the slenderness, as half=0.5.
     polarity
         Motions as they are (+), reversed (-), or both. A symmetric block responds equally to both, which count once.
@@ -103,7 +103,7 @@ def fragility(
     if outcomes is not None:
         beside = {
             "records": names, "levels": measure.levels, "ensemble": block.ensemble, "clusters": clusters,
-            "limits": limits != "overturning", "polarity": polarity != "+", "model": model.equation,
+            "limit_states": limit_states != "overturning", "polarity": polarity != "+", "model": model.equation,
             "chattering": model.chattering != "certified", **block.given(),
             **motion.given("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
         }  # fmt: skip
@@ -111,7 +111,7 @@ def fragility(
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", InvalidOption)
     curve = _hazard(hazard, site, years, measure.period)
-    states = limits_of(limits)
+    states = parse_limit_states(limit_states)
     if output.out is not None:
         check_names([taxonomy], "taxonomy")
         check_names(states, "a limit state")
@@ -133,7 +133,7 @@ def fragility(
                     motions=list(read.motions.values()),
                     **measure.chosen(),
                     **model.chosen() | bodies,
-                    limits=states,
+                    limit_states=states,
                     polarity=polarity,
                     clusters=labels_of(clusters),
                     confidence=confidence,
@@ -173,7 +173,7 @@ def _limit_of_standing(names: list[str]) -> str:
     """Return the limit that a standing block has not exceeded: overturning, or the only one."""
     if len(names) > 1 and "overturning" not in names:
         sentence = f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}"
-        raise InvalidOption(sentence, "standing", "limits", value=names)
+        raise InvalidOption(sentence, "standing", "limit_states", value=names)
     return "overturning" if "overturning" in names else names[0]
 
 

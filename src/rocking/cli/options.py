@@ -418,20 +418,24 @@ def _ratio(text: str, name: str) -> float:
         raise InvalidOption(sentence + repr(text.strip()), name, "measure") from None
 
 
-def limits_of(text: str) -> dict[str, float]:
+def parse_limit_states(text: str) -> dict[str, float]:
     """Return limit states by name: overturning, or rotations divided by the slenderness, as half=0.5."""
     limits = {}
     for part in text.split(","):
         name, given, value = part.strip().partition("=")
         if not given and name != "overturning":
             raise InvalidOption(
-                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits", value=text
+                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}",
+                "limit_states",
+                value=text,
             )
         if name in limits or (given and name in ("", "overturning")):
             why = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
-            raise InvalidOption(f"{{}} {why}; name each limit state once, as half=0.5", "limits")
+            raise InvalidOption(f"{{}} {why}; name each limit state once, as half=0.5", "limit_states")
         try:
-            limits[name] = number(value, "limits") if given else math.inf
+            limits[name] = number(value, "limit_states") if given else math.inf
         except InvalidOption:
-            raise InvalidOption(f"{{}} {name} takes a number, not {value.strip()!r}", "limits", value=text) from None
+            raise InvalidOption(
+                f"{{}} {name} takes a number, not {value.strip()!r}", "limit_states", value=text
+            ) from None
     return limits

@@ -10,7 +10,7 @@ from typing import Annotated, Final
 
 from cyclopts import App, Parameter
 
-from rocking.cli.options import MEASURE, WHOLE, IntensityOptions, limits_of
+from rocking.cli.options import MEASURE, WHOLE, IntensityOptions, parse_limit_states
 from rocking.cli.output import (
     OUTPUT,
     PrintOptions,
@@ -28,7 +28,7 @@ from rocking.core.threads import set_options
 from rocking.errors import InvalidOption, OutputError, StudyError, Unfitted
 from rocking.inputs.quantities import values
 from rocking.studies.file import TEMPLATE, read_study
-from rocking.studies.results import StudyVerdict, checked_fractiles
+from rocking.studies.results import StudyOutcome, checked_fractiles
 from rocking.studies.study import Study, study_of
 
 study = App(name="study")
@@ -106,7 +106,7 @@ def run(
     found = _created(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
     with set_options(threads=threads):
         report = found.run(part=part)
-    print(f"{report}\n{found.place}: {found.status}")
+    print(f"{report}\n{found.folder}: {found.status}")
     for unit, why in [*report.failed.items()][:_SHOWN]:
         note(f"{unit} failed: {why}")
     if report.failed:
@@ -162,7 +162,7 @@ def export(
     folder: str,
     file: Path,
     *,
-    critical: StudyVerdict | None = None,
+    critical: StudyOutcome | None = None,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
     """Write the results to one file.
@@ -188,7 +188,7 @@ def report(
     folder: str,
     out: Path | None = None,
     *,
-    limits: str = "overturning",
+    limit_states: str = "overturning",
     together: Annotated[bool, Parameter(negative="")] = False,
     confidence: float = 0.9,
     fractiles: str = "0.16,0.5,0.84",
@@ -203,7 +203,7 @@ def report(
         Folder of the study.
     out
         Folder for the results. By default the folder report in the folder of the study.
-    limits
+    limit_states
         Limit states, separated by commas: overturning, or NAME=ROTATION divided by the slenderness, as half=0.5.
     together
         Fit one curve to the outcomes of all blocks together.
@@ -212,14 +212,14 @@ def report(
     fractiles
         Fractions of the motions that stay below the fractiles of the spectrum.
     """
-    how, states = measure.wanted, limits_of(limits)
+    how, states = measure.wanted, parse_limit_states(limit_states)
     shares = checked_fractiles(values(fractiles, "fractiles").tolist())
     checks.share(confidence, "confidence", InvalidOption)
     found, made = Study(folder), dict[str, Result]()
     fit = found.fragility if together else found.block_fragilities
     with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
         with left_out("fragility", Unfitted):
-            made["fragility"] = fit(measure=how, limits=states, confidence=confidence)
+            made["fragility"] = fit(measure=how, limit_states=states, confidence=confidence)
         made["spectrum"] = found.spectrum(shares.tolist())
         for name, one in made.items():
             one.to_csv(target / f"{name}.csv")

@@ -85,6 +85,17 @@ def flag(value: object, name: str, error: Error) -> bool:
     return bool(value)
 
 
+def increasing_pair(value: object, name: str, error: Error) -> tuple[float, float]:
+    """Return two finite numbers, the lower one first, or raise `error`."""
+    ends = several(value, name, error)
+    if len(ends) != 2:
+        raise error("{} must be two numbers (lower, higher)", name, value=value)
+    low, high = (finite(end, name, error) for end in ends)
+    if not (low < high and math.isfinite(high - low)):
+        raise error(f"{{}} must be (lower, higher); got ({low:g}, {high:g})", name, value=value)
+    return low, high
+
+
 def whole(value: object, name: str, error: Error, least: int, most: int | None = None) -> int:
     """Return `value` as an int, or raise `error` unless it has an integer type and is within its bounds."""
     single = _single(value)

@@ -128,7 +128,7 @@ def basins(
     motion: Motion,
     positions: ArrayLike,
     velocities: ArrayLike,
-    periods: int = 200,
+    n_periods: int = 200,
     *,
     model: Model | None = None,
     chattering: str | ChatteringScheme = "certified",
@@ -143,7 +143,7 @@ def basins(
         Increasing rotations of a block (rad) or positions of other bodies (m) at the start of a period.
     velocities : array_like, shape (m,)
         Increasing velocities, rad/s or m/s.
-    periods : int
+    n_periods : int
         Maximum number of periods per state.
     model, chattering : str, optional
         As in `stroboscopic_map`.
@@ -187,7 +187,7 @@ def basins(
     sensible(x, "positions")
     sensible(v, "velocities")
     checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
-    most = checks.whole(periods, "periods", InvalidOption, least=1)
+    most = checks.whole(n_periods, "n_periods", InvalidOption, least=1)
     work = _Grid(strobe, x, v, most)
     work.run()
     return Basins(work.dataset())
@@ -279,7 +279,7 @@ class _Grid:
                 "motion": described(self.strobe.motion),
                 "model": self.strobe.model,
                 "most_periods": self.periods,
-                "period_s": self.strobe.period,
+                "period_s": self.strobe.forcing_period,
             },
         )
 

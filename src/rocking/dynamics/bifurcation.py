@@ -47,15 +47,15 @@ _CHUNK: Final = 10
 class BifurcationDiagram(DatasetResult):
     """Long-term states of orbits against a parameter, created by `bifurcation_diagram`.
 
-    The figure shows every kept state, with one colour per direction.
+    The figure shows every recorded state, with one colour per direction.
 
     Attributes
     ----------
     data : xarray.Dataset
         With dimensions (direction, value, start, iterate): coordinate and velocity at the starts of periods after the
         transient, NaN after overturning or too many steps. With dimensions (direction, value, start): period, in
-        periods of the motion (0 if the kept states do not repeat, -1 after overturning, -2 after too many steps), and
-        impacts in this period (infinity with complete chattering, -1 without a period).
+        periods of the motion (0 if the recorded states do not repeat, -1 after overturning, -2 after too many steps),
+        and impacts in this period (infinity with complete chattering, -1 without a period).
 
     See Also
     --------
@@ -146,7 +146,7 @@ def bifurcation_diagram(
     *,
     direction: Direction = "up",
     transient: int = 200,
-    kept: int = 64,
+    recorded: int = 64,
     parameter: str = "parameter",
     model: Model | None = None,
     chattering: str | ChatteringScheme = "certified",
@@ -164,9 +164,9 @@ def bifurcation_diagram(
     direction : {"up", "down", "both", "afresh"}
         Order of the values. Up or down: orbits continue from the last state at the previous value, or from the initial
         state if this is unknown (for example after overturning). Afresh: every value starts from the initial states.
-    transient, kept : int
-        Numbers of discarded and of kept periods at each value. Near a bifurcation orbits settle slowly. After a short
-        transient, no period may be found, or the previous one.
+    transient, recorded : int
+        Numbers of discarded and of recorded periods at each value. Near a bifurcation orbits settle slowly. After a
+        short transient, no period may be found, or the previous one.
     parameter : str
         Name of the parameter with its unit, for tables and figures.
     model, chattering : str, optional
@@ -207,9 +207,9 @@ def bifurcation_diagram(
         raise InvalidOption("{} must be one pair (coordinate, velocity) or several", "starts")
     first = first.reshape(-1, 2)
     before = checks.whole(transient, "transient", InvalidOption, least=0)
-    count = checks.whole(kept, "kept", InvalidOption, least=2)
+    count = checks.whole(recorded, "recorded", InvalidOption, least=2)
     name = checks.text(parameter, "parameter", InvalidOption)
-    checks.grid_size({"values": levels.size, "starts": len(first), "kept": count}, InvalidOption)
+    checks.grid_size({"values": levels.size, "starts": len(first), "recorded": count}, InvalidOption)
 
     afresh, ways = way == "afresh", ("up", "down") if way == "both" else (way,)
     order = {w: range(levels.size)[:: -1 if each == "down" else 1] for w, each in enumerate(ways)}
@@ -285,22 +285,22 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
     return np.stack([inside, np.where(held, 0.0, states[:, 1])], axis=-1)
 
 
-def states_after(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> tuple[Floats, Integers]:
-    """Return states at the starts of periods after a transient, shape (n, kept, 2), and the `Fate` of each orbit."""
-    states, now, fates = np.full((len(at), kept, 2), np.nan), at, np.full(len(at), Fate.MOVES.value)
+def states_after(strobe: StroboscopicMap, at: Floats, transient: int, recorded: int) -> tuple[Floats, Integers]:
+    """Return states at the starts of periods after a transient, shape (n, recorded, 2), and the `Fate` of each."""
+    states, now, fates = np.full((len(at), recorded, 2), np.nan), at, np.full(len(at), Fate.MOVES.value)
     if transient:
         now, fates, _ = strobe.followed(at, transient)
     moves = ~np.isnan(now[:, 0])
     if moves.any():
-        states[moves] = strobe.orbit(now[moves], kept)[:, 1:]
+        states[moves] = strobe.orbit(now[moves], recorded)[:, 1:]
     lost = moves & np.isnan(states[:, -1, 0])
     if lost.any():
-        fates[lost] = strobe.followed(now[lost], kept)[1]
+        fates[lost] = strobe.followed(now[lost], recorded)[1]
     return states, fates
 
 
 def period_of(states: Floats, scale: Scale | None = None) -> int:
-    """Return the period of an orbit from its kept states.
+    """Return the period of an orbit from its recorded states.
 
     The period is 0 if the orbit does not repeat within half of the states, or is still settling.
 
@@ -353,7 +353,7 @@ class LyapunovExponents(Result):
         zero, because neighbouring states never rest.
     standard_error : float
         Standard error of both, from the means of 20 consecutive parts of the orbit.
-    period, periods : float, int
+    forcing_period, n_periods : float, int
         Period of the motion, s, and number of averaged periods.
     impacts : float
         Number of impacts per period.
@@ -361,7 +361,7 @@ class LyapunovExponents(Result):
         Fraction of the known periods in which the body comes to rest or is at rest; NaN if no period is known.
     fate : Fate
         Final condition of the body.
-    stretches : ndarray, shape (periods, 2)
+    stretches : ndarray, shape (n_periods, 2)
         Logarithms of the stretches in each period.
 
     See Also
@@ -372,15 +372,15 @@ class LyapunovExponents(Result):
     largest: float
     smallest: float
     standard_error: float
-    period: float
-    periods: int
+    forcing_period: float
+    n_periods: int
     impacts: float
     resting: float
     fate: Fate
     stretches: Floats
 
     def summary(self) -> str:
-        over = f"over {counted(self.periods, 'period')}"
+        over = f"over {counted(self.n_periods, 'period')}"
         if np.isnan(self.largest):
             return f"no Lyapunov exponents: the body overturns or cannot be followed {over}"
         if np.isneginf(self.largest):
@@ -396,8 +396,8 @@ class LyapunovExponents(Result):
             "largest_per_period": self.largest,
             "smallest_per_period": self.smallest,
             "standard_error": self.standard_error,
-            "period_s": self.period,
-            "periods": self.periods,
+            "period_s": self.forcing_period,
+            "periods": self.n_periods,
             "impacts_per_period": self.impacts,
             "share_of_periods_with_rest": self.resting,
             "fate": self.fate.name,
@@ -408,7 +408,7 @@ def lyapunov_exponents(
     body: Body,
     motion: Motion,
     state: ArrayLike,
-    periods: int = 1000,
+    n_periods: int = 1000,
     *,
     transient: int = 200,
     model: Model | None = None,
@@ -422,7 +422,7 @@ def lyapunov_exponents(
         As in `stroboscopic_map`.
     state : array_like, shape (2,)
         Coordinate and velocity at the start of a period.
-    periods : int
+    n_periods : int
         Number of averaged periods.
     transient : int
         Number of preceding periods, in which the direction aligns with the fastest growth.
@@ -466,7 +466,7 @@ def lyapunov_exponents(
     if given.shape != (2,):
         raise InvalidOption(f"{{}} must be one pair (coordinate, velocity), not of shape {given.shape}", "state")
     strobe.checked_starts(given, "state")
-    count = checks.whole(periods, "periods", InvalidOption, least=_BATCHES)
+    count = checks.whole(n_periods, "n_periods", InvalidOption, least=_BATCHES)
     before = checks.whole(transient, "transient", InvalidOption, least=0)
     made, marching = strobe._states(given[None])[1][0], strobe._marching()
     frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((before + count, 2), np.nan), 0
@@ -496,8 +496,8 @@ def lyapunov_exponents(
         largest=float(mean[0]),
         smallest=float(mean[1]),
         standard_error=error * float(np.sqrt(count * np.sum(weights**2))),
-        period=strobe.period,
-        periods=count,
+        forcing_period=strobe.forcing_period,
+        n_periods=count,
         impacts=impacts / count,
         resting=float(np.mean(rests[known])) if known.any() else float("nan"),
         fate=fate,

@@ -173,10 +173,10 @@ class LinearBodies:
         names = [entry.name for entry in fields(self.members[0]) if entry.name != "gravity"]
         return {name: (self._pairs(name), self.members[0].units[name] or "1") for name in names}
 
-    def speed_limits(self, share: float) -> Floats:
+    def speed_thresholds(self, share: float) -> Floats:
         return np.full((len(self), 2), share)  # these bodies have no natural speed
 
-    def kernel_records(self, model: Model, limits: Floats) -> state.Records:
+    def kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
         _check_model(model)
         made = state.records(len(self), state.BLOCK)
         laws = np.array([each.law for each in self.members])
@@ -190,7 +190,7 @@ class LinearBodies:
         made["two_stops"] = facing
         made["next_side"][:, 1] = facing
         made["overturn_angle"] = laws[:, 4] - laws[:, 3]
-        made["limit"] = limits
+        made["limit"] = thresholds
         return made
 
     def _pairs(self, name: str) -> Floats:
@@ -387,7 +387,7 @@ class _MakerOfKind(NamedTuple):
         given = ({k: None if math.isnan(v) else v for k, v in zip(parameters, row, strict=True)} for row in rows)
         return LinearBodies([self.made(**each, **own) for each in given])
 
-    def of(self, bodies: Iterable[LinearBody], /) -> LinearBodies:
+    def from_bodies(self, bodies: Iterable[LinearBody], /) -> LinearBodies:
         return LinearBodies([*bodies])
 
 

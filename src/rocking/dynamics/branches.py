@@ -81,7 +81,7 @@ class Branch(Result):
         Function of the parameter that returns body and motion.
     name, unit : str
         Name and unit of the parameter.
-    limits : (float, float)
+    bounds : (float, float)
         Range of the parameter.
     period : int
         Period of the orbits, in periods of the motion.
@@ -113,7 +113,7 @@ class Branch(Result):
     unit: str
     model: Model
     chattering: ChatteringScheme
-    limits: tuple[float, float]
+    bounds: tuple[float, float]
     period: int
     values: Floats
     states: Floats

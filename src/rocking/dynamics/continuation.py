@@ -40,12 +40,12 @@ def continue_orbit(
     orbit: PeriodicOrbit,
     family: Callable[[float], tuple[Body, Motion]],
     value: float,
-    limits: tuple[float, float],
+    bounds: tuple[float, float],
     *,
     name: str = "parameter",
     unit: str = "1",
     step: float = 0.05,
-    most: int = 1000,
+    max_points: int = 1000,
 ) -> Branch:
     """Follow a periodic orbit as a parameter changes, through folds, and locate its bifurcations.
 
@@ -57,25 +57,25 @@ def continue_orbit(
         Function of the parameter that returns (body, motion).
     value : float
         Value of the parameter at the orbit.
-    limits : (float, float)
+    bounds : (float, float)
         Range of the parameter; beyond it the family may raise a `RockingError`.
     name, unit : str
         Name and unit of the parameter, for tables and figures.
     step : float
         Longest step, relative to the range of the parameter and the natural size of states.
-    most : int
+    max_points : int
         Maximum number of points in either direction.
 
     Returns
     -------
     Branch
-        Branch in both directions, up to the limits or the end of orbits of this kind: at a grazing impact, where
+        Branch in both directions, up to the bounds or the end of orbits of this kind: at a grazing impact, where
         chattering becomes incomplete, or where a body at rest lifts off.
 
     Raises
     ------
     InvalidOption
-        If the value is beyond the limits, the orbit does not belong to the family there, or a number is out of range.
+        If the value is beyond the bounds, the orbit does not belong to the family there, or a number is out of range.
 
     See Also
     --------
@@ -113,16 +113,11 @@ def continue_orbit(
     """
     if not isinstance(orbit, PeriodicOrbit):
         raise InvalidOption("{} must be one of those that periodic_orbits returns", "orbit", value=orbit)
-    bounds = checks.several(limits, "limits", InvalidOption)
-    if len(bounds) != 2:
-        raise InvalidOption("{} must be (lower, higher)", "limits")
-    low, high = (checks.finite(each, "limits", InvalidOption) for each in bounds)
-    if not (low < high and math.isfinite(high - low)):
-        raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
+    low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
     start = checks.within(value, "value", InvalidOption, low, high)
     longest = checks.positive(step, "step", InvalidOption)
-    count = checks.whole(most, "most", InvalidOption, least=1)
-    equations = OrbitEquations.of(orbit, family, start, (low, high))
+    count = checks.whole(max_points, "max_points", InvalidOption, least=1)
+    equations = OrbitEquations.from_orbit(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
     backward, forward = (_Walk(equations, z, direction, longest) for direction in (-1.0, 1.0))
     backward.run(count)
@@ -157,7 +152,7 @@ class _Walk:
 
     def run(self, most: int) -> None:
         """Follow the branch over a number of points, or to its end."""
-        if self.points[0][0] == self.equations.limits[0 if self.direction < 0.0 else 1]:
+        if self.points[0][0] == self.equations.bounds[0 if self.direction < 0.0 else 1]:
             self.end = ends.LIMIT
             return
         found = self.equations.solved(self.z, AT_VALUE)
@@ -239,7 +234,7 @@ class _Walk:
         guess = z + self.step * tangent
         found = equations.solved(guess, tangent)
         new = guess if found is None else found.z  # beyond a limit the body or the motion may not exist
-        low, high = (each / equations.sizes[2] for each in equations.limits)
+        low, high = (each / equations.sizes[2] for each in equations.bounds)
         at_limit = not low <= new[2] <= high
         if at_limit:
             wanted = low if new[2] < low else high

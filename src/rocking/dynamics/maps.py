@@ -54,11 +54,11 @@ class PeriodicForcing:
             checks.one_of(model, "model", InvalidOption, MODELS)
             self.model = model
         self.chattering = chattering_scheme(chattering)
-        self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
+        self.forcing_period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
         if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
             raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
         self._ground = repeated(self.motion, self.body.gravity)
-        run = Setup(self.bodies, self.model, self.chattering, self.period).run(self.motion, ground=self._ground)
+        run = Setup(self.bodies, self.model, self.chattering, self.forcing_period).run(self.motion, ground=self._ground)
         self._records, self._settings = run.records, run.settings
         self._settings["stop"], self._settings["no_end_time"] = np.inf, True
         if np.any(self._records["yielding"]):
@@ -163,7 +163,7 @@ class Scale(NamedTuple):
 
 def scale_of(strobe: PeriodicForcing) -> Scale:
     """Compute the natural scales of coordinate and velocity of a body under a motion."""
-    record, period = strobe._records[0], strobe.period
+    record, period = strobe._records[0], strobe.forcing_period
     if not isinstance(strobe.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
         return Scale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
@@ -220,7 +220,7 @@ class StroboscopicMap(PeriodicForcing):
     ----------
     body, motion, model, chattering
         Body, one period of the motion, model, and chattering scheme.
-    period : float
+    forcing_period : float
         Period of the motion, s.
 
     See Also
@@ -229,7 +229,7 @@ class StroboscopicMap(PeriodicForcing):
     periodic_orbits : Find the periodic orbits of the map.
     """
 
-    def __call__(self, states: ArrayLike, periods: int = 1) -> Floats:
+    def __call__(self, states: ArrayLike, n_periods: int = 1) -> Floats:
         """Return states after a number of periods.
 
         Parameters
@@ -237,7 +237,7 @@ class StroboscopicMap(PeriodicForcing):
         states : array_like, shape (..., 2)
             Coordinate and velocity at the start of a period, in rad and rad/s for a block, in m and m/s for other
             bodies.
-        periods : int
+        n_periods : int
             Number of periods.
 
         Returns
@@ -251,13 +251,13 @@ class StroboscopicMap(PeriodicForcing):
         InvalidOption
             If the states have another shape, or a state is behind a stop.
         """
-        found, _, _ = self.followed(states, periods)
+        found, _, _ = self.followed(states, n_periods)
         return found
 
-    def orbit(self, states: ArrayLike, periods: int) -> Floats:
-        """Return states after 0, 1, ... periods, shape (..., periods + 1, 2), as the map does."""
+    def orbit(self, states: ArrayLike, n_periods: int) -> Floats:
+        """Return states after 0, 1, ... periods, shape (..., n_periods + 1, 2), as the map does."""
         given, made = self._states(states)
-        count = checks.whole(periods, "periods", InvalidOption, least=1)
+        count = checks.whole(n_periods, "n_periods", InvalidOption, least=1)
         rows = np.full((len(made), count, 3), np.nan)
         self._iterate(made, count, rows)
         known = ~np.isnan(rows[..., 0])
@@ -265,14 +265,14 @@ class StroboscopicMap(PeriodicForcing):
         whole = np.concatenate([given.reshape(-1, 1, 2), found], axis=1)
         return whole.reshape(*given.shape[:-1], count + 1, 2)
 
-    def followed(self, states: ArrayLike, periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+    def followed(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
         """Return states after a number of periods, the `Fate` of each, and the numbers of resolved impacts."""
         given, made = self._states(states)
-        self._iterate(made, checks.whole(periods, "periods", InvalidOption, least=1))
+        self._iterate(made, checks.whole(n_periods, "n_periods", InvalidOption, least=1))
         fates, impacts = (np.array(made[name]).reshape(given.shape[:-1]) for name in ("ending", "impacts"))
         return self._known(made).reshape(given.shape), fates, impacts
 
-    def derivative(self, states: ArrayLike, periods: int = 1) -> tuple[Floats, Floats]:
+    def derivative(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, Floats]:
         """Return states after a number of periods and their derivatives by the initial states, shape (..., 2, 2).
 
         Derivatives are exactly zero if the body comes to rest on the way or is held at rest at the start, NaN after
@@ -282,7 +282,7 @@ class StroboscopicMap(PeriodicForcing):
         given, made = self._states(states)
         total = np.broadcast_to(np.eye(2), (len(made), 2, 2)).copy()
         change, ended = np.empty_like(total), np.zeros(len(made), dtype=np.bool_)
-        for _ in range(checks.whole(periods, "periods", InvalidOption, least=1)):
+        for _ in range(checks.whole(n_periods, "n_periods", InvalidOption, least=1)):
             signs, before = _signs(made["side"]), made.copy()
             self._iterate(made)
             differentiate(*self._marching(), state.attributed(before), change)
@@ -303,7 +303,7 @@ class StroboscopicMap(PeriodicForcing):
         given = self._pairs(impacts, "impacts", "phase in s")
         flat = given.reshape(-1, 2)
         made = state.new_states(len(flat), 0)
-        phase = np.mod(np.where(np.isfinite(flat[:, 0]), flat[:, 0], np.nan), self.period)
+        phase = np.mod(np.where(np.isfinite(flat[:, 0]), flat[:, 0], np.nan), self.forcing_period)
         starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
         made["piece"] = np.searchsorted(starts, phase, side="right") - 1
         made["offset"] = phase - starts[made["piece"]]
@@ -315,16 +315,16 @@ class StroboscopicMap(PeriodicForcing):
         self._iterate(made)
         return self._known(made).reshape(given.shape)
 
-    def _iterate(self, made: state.Records, periods: int = 1, rows: Floats | None = None) -> None:
+    def _iterate(self, made: state.Records, n_periods: int = 1, rows: Floats | None = None) -> None:
         setting = self._setting()
         orbits = np.empty((len(made), 0, 3)) if rows is None else rows
         traps, counts = np.empty((0, TRAP)), np.zeros((2, len(made)), dtype=np.int64)
 
         def follow(part: slice) -> None:
             found, taken = counts[:, part]
-            iterate(setting, state.new_scratch(), made[part], periods, orbits[part], traps, found, taken)
+            iterate(setting, state.new_scratch(), made[part], n_periods, orbits[part], traps, found, taken)
 
-        for _ in in_threads(follow, parts_of(len(made), periods)):
+        for _ in in_threads(follow, parts_of(len(made), n_periods)):
             pass
 
 
@@ -334,9 +334,9 @@ class HalfMap(StroboscopicMap):
     def __init__(self, strobe: StroboscopicMap) -> None:
         super().__init__(strobe.body, strobe.motion, strobe.model, strobe.chattering)
         motion = strobe.motion
-        middle = int(np.argmin(np.abs(motion.breakpoints - motion.breakpoints[0] - 0.5 * self.period)))
+        middle = int(np.argmin(np.abs(motion.breakpoints - motion.breakpoints[0] - 0.5 * self.forcing_period)))
         half = Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
-        self.period *= 0.5
+        self.forcing_period *= 0.5
         self._ground = repeated(half, self.body.gravity, -1.0)
         self._steps = np.ascontiguousarray(self._steps[:, :middle])  # as kernels require
 
@@ -356,8 +356,8 @@ def is_mirrored(strobe: StroboscopicMap) -> bool:
     motion = strobe.motion
     if not (strobe.bodies.is_symmetric and are_halved(motion)[0]):
         return False
-    times = motion.breakpoints[0] + strobe.period * (np.arange(200) + 0.5) / 400.0
-    sums = motion.acceleration(times) + motion.acceleration(times + 0.5 * strobe.period)
+    times = motion.breakpoints[0] + strobe.forcing_period * (np.arange(200) + 0.5) / 400.0
+    sums = motion.acceleration(times) + motion.acceleration(times + 0.5 * strobe.forcing_period)
     return bool(np.max(np.abs(sums)) <= 1e-12 * motion.pga)
 
 

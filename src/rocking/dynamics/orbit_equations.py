@@ -86,7 +86,7 @@ class OrbitEquations:
     sizes: Floats
     kind: Kind
     #: Range of the parameter, beyond which the family need not be defined.
-    limits: tuple[float, float]
+    bounds: tuple[float, float]
     #: Breakpoint at which a period starts; an impact on it makes the equations non-smooth.
     shift: int = 0
     difference: float = DIFFERENCE
@@ -98,8 +98,8 @@ class OrbitEquations:
         self.half = lru_cache(maxsize=64)(self._half)
 
     @classmethod
-    def of(
-        cls, orbit: PeriodicOrbit, family: Callable[[float], object], value: float, limits: tuple[float, float]
+    def from_orbit(
+        cls, orbit: PeriodicOrbit, family: Callable[[float], object], value: float, bounds: tuple[float, float]
     ) -> OrbitEquations:
         """Create the equations of an orbit at a value of the parameter."""
         pair = family(value) if callable(family) else None
@@ -113,8 +113,8 @@ class OrbitEquations:
             raise InvalidOption(
                 f"the orbit is none of what {{}} makes at {{}} = {value:g}", "family", "value", value=value
             )
-        sizes, kind = np.array([*scale, limits[1] - limits[0]]), kind_of(strobe, orbit.state, orbit.period)
-        made = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, limits)  # type: ignore[arg-type]
+        sizes, kind = np.array([*scale, bounds[1] - bounds[0]]), kind_of(strobe, orbit.state, orbit.period)
+        made = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, bounds)  # type: ignore[arg-type]
         made.by_half = orbit.symmetric and not orbit.rests and made.stays_mirrored(value)
         return made
 
@@ -134,7 +134,7 @@ class OrbitEquations:
 
     def stays_mirrored(self, value: float) -> bool:
         """Whether the family has mirror images at a value, and over the whole range of the parameter."""
-        for each in (value, *np.linspace(*self.limits, 5).tolist()):
+        for each in (value, *np.linspace(*self.bounds, 5).tolist()):
             with suppress(RockingError):  # no body or motion there: the branch ends before
                 if not is_mirrored(self.strobe(each)):
                     return False
@@ -143,7 +143,7 @@ class OrbitEquations:
     def physical(self, z: Floats) -> tuple[Floats, float]:
         """Convert z to state and parameter, exactly a limit within rounding error."""
         value = float(z[2] * self.sizes[2])
-        at_limit = (each for each in self.limits if math.isclose(value, each, rel_tol=2.0**-50))
+        at_limit = (each for each in self.bounds if math.isclose(value, each, rel_tol=2.0**-50))
         return z[:2] * self.sizes[:2], next(at_limit, value)
 
     def returned(self, state: Floats, value: float) -> tuple[Floats, Floats]:
@@ -159,7 +159,7 @@ class OrbitEquations:
         """Compute the residual and its derivative by z."""
         state, value = self.physical(z)
         after, change = self.returned(state, value)
-        h, (low, high) = self.difference * self.sizes[2], self.limits
+        h, (low, high) = self.difference * self.sizes[2], self.bounds
         less = low if value - h < low <= value else value - h
         more = high if value <= high < value + h else value + h
         by_value = (self.returned(state, more)[0] - self.returned(state, less)[0]) / (more - less)

@@ -90,7 +90,7 @@ class PeriodicOrbit(Result):
     @property
     def duration(self) -> float:
         """Period of the orbit, s."""
-        return self.period * self._map.period
+        return self.period * self._map.forcing_period
 
     @cached_property
     def states(self) -> Floats:
@@ -135,7 +135,7 @@ class PeriodicOrbit(Result):
         rows = [
             Row("orbit", self._kind),
             Row("body", self.body.description),
-            Row("motion", f"{self.motion.label}, one period of {self._map.period:.6g} s"),
+            Row("motion", f"{self.motion.label}, one period of {self._map.forcing_period:.6g} s"),
             Row(coordinate.name, f"{x:.12g}", coordinate.unit, " at the start of a period"),
             Row("velocity", f"{v:.12g}", f"{coordinate.unit}/s"),
             Row("multipliers", self._multipliers),
@@ -165,7 +165,7 @@ class PeriodicOrbit(Result):
         if table == "impacts":
             return self.response._columns("impacts")
         coordinate = self.body.coordinate
-        times = self._map.period * np.arange(self.period) if table == "states" else self._times()
+        times = self._map.forcing_period * np.arange(self.period) if table == "states" else self._times()
         states = self.states if table == "states" else self.response.states(times)[:, :2]
         return [
             Column("time", times, "s"),
@@ -186,10 +186,10 @@ class PeriodicOrbit(Result):
         times, coordinate = self._times(), self.body.coordinate
         states = self.response.states(times)
         return orbit_figure(
-            time=times / self._map.period,
+            time=times / self._map.forcing_period,
             coordinate=states[:, 0],
             velocity=states[:, 1],
-            impact_times=self.response.impacts["time"] / self._map.period,
+            impact_times=self.response.impacts["time"] / self._map.forcing_period,
             states=self.states,
             labels=(f"{coordinate.name} ({coordinate.unit})", f"velocity ({coordinate.unit}/s)"),
             title=title or as_written(f"{self.body.description}, {self._kind}"),
@@ -200,10 +200,10 @@ class PeriodicOrbit(Result):
 
 def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Response:
     """Simulate a body from a state over a number of periods."""
-    motion, duration = strobe.motion, periods * strobe.period
+    motion, duration = strobe.motion, periods * strobe.forcing_period
     # The motion after the end determines how long a chattering sequence lasts.
-    starts = strobe.period * np.arange(periods + 1)
-    breakpoints = np.append((starts[:, None] + motion.breakpoints[:-1]).ravel(), strobe.period * (periods + 1))
+    starts = strobe.forcing_period * np.arange(periods + 1)
+    breakpoints = np.append((starts[:, None] + motion.breakpoints[:-1]).ravel(), strobe.forcing_period * (periods + 1))
     many = Motion(
         breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
     )
@@ -224,7 +224,7 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
     _, change = strobe.derivative(state, period)
     symmetric = False
     if period % 2 and is_mirrored(strobe):  # its own mirror image half a period later
-        after = response_of(strobe, state, period).states(0.5 * period * strobe.period)[:2]
+        after = response_of(strobe, state, period).states(0.5 * period * strobe.forcing_period)[:2]
         symmetric = bool(np.all(np.abs(after + state) < 1e-9 * np.array(scale_of(strobe))))
     return PeriodicOrbit(
         strobe.body, strobe.motion, strobe.model, strobe.chattering, state, period,
@@ -345,7 +345,7 @@ class _Search:
         both = strobe._is_two_sided
         speed = self._fastest()
         side = max(2, round(math.sqrt(wanted / (2 if both else 1))))
-        phases = strobe.period * (np.arange(side) + 0.5) / side
+        phases = strobe.forcing_period * (np.arange(side) + 0.5) / side
         speeds = speed * ((np.arange(side) + 0.5) / side) ** 1.5
         impacts = np.stack(np.meshgrid(phases, speeds), axis=-1).reshape(-1, 2)
         if both:
@@ -365,14 +365,14 @@ class _Search:
         strobe = self.strobe
         restitution = float(np.max(strobe.bodies.restitution))
         gain = restitution / max(1.0 - restitution, 1e-300)
-        push = self.count * strobe.period * mean_size(strobe.motion)
+        push = self.count * strobe.forcing_period * mean_size(strobe.motion)
         speed = min(max(gain, _LEAST_GAIN), _MOST_GAIN) * push or self.scale.velocity
         record = strobe._records[0]
         if not math.isinf(min(strobe.body.balance)):
             return min(speed, _BLOCK_SPEED * self.scale.velocity + push)
         if float(record["stiffness"][0]) == 0.0:  # The flight time of a ball is proportional to its speed.
             pull = float(record["threshold_slope"][0] * record["threshold"][0])
-            return min(speed, 0.5 * self.count * strobe.period * pull + push)
+            return min(speed, 0.5 * self.count * strobe.forcing_period * pull + push)
         return speed
 
     def _possible(self, states: Floats) -> Flags:

@@ -50,7 +50,7 @@ def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Gro
 def step_of(motion: Motion) -> float | None:
     """Return the length of the pieces of `ground_of` if equally long and linear in all components, else None."""
     if motion.vertical is None:
-        return motion.step
+        return motion.dt
     steps = [piecewise.even_step(pieces) for pieces in _joined(motion)]
     return None if None in steps else steps[0]
 
@@ -63,7 +63,7 @@ def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
     bodies = [one_body(each) for each in (cast("Iterable[Body]", given) if several else [cast("Body", given)])]
     if len(bodies) == 1:
         return bodies[0].alone()
-    return KINDS[bodies[0].alone().kind if bodies else "blocks"].of(bodies)
+    return KINDS[bodies[0].alone().kind if bodies else "blocks"].from_bodies(bodies)
 
 
 def slenderness_of(bodies: Bodies) -> Floats:

@@ -36,7 +36,7 @@ class ChatteringScheme(ABC):
     """ChatteringScheme of chattering: the rule by which a sequence of impacts ends.
 
     A user-defined subclass is available by its `name` as soon as it is imported. At an impact, one of the measures of
-    the kernels (`rocking.kernels.state`) is compared with its limits.
+    the kernels (`rocking.kernels.state`) is compared with its thresholds.
 
     See Also
     --------
@@ -47,7 +47,7 @@ class ChatteringScheme(ABC):
 
     #: Name in ``chattering=`` and on the command line.
     name: ClassVar[str]
-    #: Measure that the kernels compare with the limits, a code of `rocking.kernels.state`.
+    #: Measure that the kernels compare with the thresholds, a code of `rocking.kernels.state`.
     code: ClassVar[int]
     #: Unit of its parameter in tables: "speed" is the unit of the body, "" stands for a word.
     unit: ClassVar[str]
@@ -73,8 +73,8 @@ class ChatteringScheme(ABC):
         return 0.0
 
     @abstractmethod
-    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Return the limits for the impacts of both sides of every body, shape (n, 2).
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+        """Return the thresholds for the impacts of both sides of every body, shape (n, 2).
 
         The unit is the unit of the measure `code`. Without a motion the rocking is free; `factor` multiplies the
         motion. Raise `InvalidOption` if the scheme does not support such bodies or motions.
@@ -148,7 +148,7 @@ class AsymptoticTime(ChatteringScheme):
         """Create the scheme from the name of a critical amplitude."""
         return cls(value)  # type: ignore[arg-type]
 
-    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Return the chattering time of every side, s; infinite for incomplete chattering."""
         from rocking.kernels.sine.series import eq65_sums
 
@@ -203,8 +203,8 @@ class Certified(ChatteringScheme):
         """The tolerance."""
         return self.tolerance
 
-    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Return zeros, because there is no limit."""
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+        """Return zeros, because there is no threshold."""
         return np.zeros((len(bodies), 2))
 
 
@@ -229,9 +229,9 @@ class VelocityThreshold(ChatteringScheme):
 
     threshold: float = 5e-10
 
-    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Return the threshold of every side, in rad/s for a block."""
-        return bodies.speed_limits(self.threshold)
+        return bodies.speed_thresholds(self.threshold)
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ class IntervalThreshold(ChatteringScheme):
 
     threshold: float = 1e-9
 
-    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Return the threshold of every side, s."""
         return np.full((len(bodies), 2), self.threshold)
 

@@ -83,7 +83,7 @@ class Setup:
         bodies = self.bodies
         check_components(bodies, motion)
         settings = settings_of(bodies, self.model, self.chattering, self.duration, record=record)
-        records = bodies.kernel_records(self.model, self.chattering.limits(bodies, motion, self.model, factor))
+        records = bodies.kernel_records(self.model, self.chattering.thresholds(bodies, motion, self.model, factor))
         if ground is None:
             ground = ground_of(motion, bodies.gravity, factor)
         states = state.new_states(len(bodies), 0)

@@ -170,7 +170,7 @@ def parts(assessment: Assessment) -> Generator[Payload]:
 def _stripes(assessment: Assessment, motion: Motion) -> Floats:
     """Return 1 (overturns), 0 or NaN (unknown) at each level and polarity."""
     case = assessment.case
-    many = Blocks.of(case.block)
+    many = Blocks.from_bodies(case.block)
     table = simulate_levels(
         many, [motion], assessment.measure, assessment.levels, model=case.model, chattering=case.chattering,
         polarity="+" if many.is_symmetric else "both",
@@ -246,7 +246,7 @@ def _margin(case: Case) -> dict[str, Any] | None:
 
     def fall(factors: Floats) -> Flags:
         table = simulate_levels(
-            Blocks.of(case.block), [motion], FACTOR, factors, model=case.model, chattering=case.chattering,
+            Blocks.from_bodies(case.block), [motion], FACTOR, factors, model=case.model, chattering=case.chattering,
         )  # fmt: skip
         return np.asarray(table.overturned.values.ravel())
 
@@ -273,7 +273,7 @@ def _motion(entry: Texts, uploads: UploadStore) -> Motion:
 
 def _sudden(case: Case) -> float:
     """Return the sudden ground velocity, m/s, that just overturns the block on its weaker side."""
-    return float(overturning_velocity(Blocks.of(case.block)).min())
+    return float(overturning_velocity(Blocks.from_bodies(case.block)).min())
 
 
 def _range(case: Case, measure: Measure, motions: Iterable[Motion]) -> tuple[float, float]:

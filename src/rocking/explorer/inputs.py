@@ -152,13 +152,12 @@ def _texts_of_block(block: Block) -> dict[str, str]:
     texts = {name: ",".join(repr(value) for value in pair) for name, pair in pairs.items()}
     if block.gravity != STANDARD_GRAVITY:
         texts["gravity"] = repr(block.gravity)
-    if block.half_width is None or block.half_height is None:
+    if block.width is None or block.height is None:
         return texts
     del texts["p"], texts["alpha"]
-    sizes = {"width": 2.0 * block.half_width, "height": 2.0 * block.half_height}
-    if block.offset:
-        sizes["offset"] = block.offset
-    if block.sides == Block(**sizes, gravity=block.gravity).sides:
+    sizes = {"width": block.width, "height": block.height} | ({"offset": block.offset} if block.offset else {})
+    same = Block(width=block.width, height=block.height, offset=block.offset, gravity=block.gravity)
+    if block.sides == same.sides:
         del texts["restitution"]
     return {name: repr(size) for name, size in sizes.items()} | texts
 

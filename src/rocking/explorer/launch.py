@@ -160,6 +160,8 @@ class Frame:
         Case in the format of the page's address.
     height : int
         Height of the frame, pixels.
+    new_link : callable
+        Function that returns a new link to the page of a case.
 
     See Also
     --------
@@ -168,12 +170,12 @@ class Frame:
 
     texts: dict[str, str]
     height: int
-    _link: Callable[[Mapping[str, str]], str] = field(repr=False)
+    new_link: Callable[[Mapping[str, str]], str] = field(repr=False)
 
     @property
     def link(self) -> str:
         """Return a link that opens the page once, in a browser on this machine."""
-        return self._link(self.texts)
+        return self.new_link(self.texts)
 
     def _repr_html_(self) -> str:
         style = f"width:100%;height:{self.height}px;border:0"

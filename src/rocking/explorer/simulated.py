@@ -85,7 +85,7 @@ def unresolved(response: Response, start: float, end: float) -> list[float]:
 
 def drifts(motion: Motion) -> bool:
     """Whether a motion has the displacement of a record, which can be filtered."""
-    long_enough = motion.step is not None and motion.duration > 2.0 * _LONGEST_PERIOD > 20.0 * motion.step
+    long_enough = motion.dt is not None and motion.duration > 2.0 * _LONGEST_PERIOD > 20.0 * motion.dt
     return long_enough and motion.coefficients.shape[1] == 2 and not motion.jumps
 
 

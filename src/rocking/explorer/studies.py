@@ -44,7 +44,7 @@ class StudyView:
 
     def __init__(self, folder: Path) -> None:
         self.name = folder.name
-        self.study = rocking.study(folder)
+        self.study = rocking.Study(folder)
         if not self.study.status.done:
             raise StudyError(f"nothing of the study in {folder} is done yet: rocking study run {folder}")
         self.quantities = [*QUANTITIES]
@@ -114,7 +114,7 @@ class StudyView:
             chosen = {"motion": motion, "scale": scale, "polarity": self._index(texts, "polarity_index")}
             found = results.isel({name: k for name, k in chosen.items() if name in results.dims})
             values[at[y], at[x]] = np.asarray(found.values, dtype=float)[blocks]
-        script = f"results = rocking.study({self.name!r}).results()\nprint(results[{quantity!r}])\n"
+        script = f"results = rocking.Study({self.name!r}).results()\nprint(results[{quantity!r}])\n"
         header = {
             "x": self._described(x, axes),
             "y": self._described(y, axes),

@@ -85,10 +85,10 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
 def reading_notes(motion: Motion) -> tuple[str, ...]:
     """Return likely mistakes in the units or the step with which a motion was read."""
     notes = [*_strength_notes(motion)]
-    step = motion.step or motion.duration / len(motion.coefficients)
+    step = motion.dt or motion.duration / len(motion.coefficients)
     if motion.description.family.endswith("record") and step > _COARSEST:
         notes.append(f"the sampling step is {step:.3g} s, too coarse for a record: are the times in seconds?")
-    if motion.step is None and motion.description.family.endswith("record"):
+    if motion.dt is None and motion.description.family.endswith("record"):
         notes += _gap_notes(motion)
     origin = _origin(motion)
     if origin.heading_units and origin.heading_units != origin.units:
@@ -137,9 +137,9 @@ def block_notes(block: Block) -> tuple[str, ...]:
         notes.append(
             f"the diagonal of the block is {largest:.0f} m, more than {_LARGEST:g} m: are its sizes in metres?"
         )
-    if block.half_width is not None and block.half_height is not None and block.half_width > block.half_height:
-        width, height = 2.0 * block.half_width, 2.0 * block.half_height
-        notes.append(f"the block is wider, {width:g} m, than it is high, {height:g} m: are the sizes swapped?")
+    if block.width is not None and block.height is not None and block.width > block.height:
+        wider = f"wider, {block.width:g} m, than it is high, {block.height:g} m"
+        notes.append(f"the block is {wider}: are the sizes swapped?")
     slender, stocky = sorted(block.sides, key=lambda side: side.alpha)
     if slender.alpha < stocky.alpha and slender.p <= stocky.p:
         notes.append(
@@ -190,7 +190,7 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
 
 def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
     """Yield notes on components that seem to start at different times."""
-    if later := begins_later(motion.description, vertical.description, motion.step):
+    if later := begins_later(motion.description, vertical.description, motion.dt):
         yield (
             f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
             "horizontal one, but both are taken to start together: cut what comes first"

@@ -41,9 +41,14 @@ class Measured:
         return float(self.breakpoints[-1])
 
     @property
-    def samples(self) -> tuple[Floats, Floats]:
-        """Times (s) and accelerations (m/s^2) at the breakpoints, with the value after a jump."""
-        return piecewise.samples(self)
+    def times(self) -> Floats:
+        """Times of the samples (the breakpoints), s."""
+        return self.breakpoints
+
+    @property
+    def samples(self) -> Floats:
+        """Accelerations at `times`, m/s^2, with the value after a jump."""
+        return piecewise.samples(self)[1]
 
     @property
     def jumps(self) -> bool:

@@ -51,7 +51,7 @@ class Motion(Processable):
 
     Attributes
     ----------
-    step : float or None
+    dt : float or None
         Sampling step, s, if all pieces are straight lines of equal length.
 
     Raises
@@ -80,7 +80,7 @@ class Motion(Processable):
     history: tuple[str, ...] = ()
     error: float = 0.0
     vertical: Motion | None = None
-    step: float | None = field(init=False)
+    dt: float | None = field(init=False)
 
     def __post_init__(self) -> None:
         breakpoints, coefficients = piecewise.checked_pieces(self.breakpoints, self.coefficients)
@@ -103,7 +103,7 @@ class Motion(Processable):
         held = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
         for name, value in held.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "step", piecewise.even_step(self))
+        object.__setattr__(self, "dt", piecewise.even_step(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The constructor makes the arrays read-only again.
@@ -220,7 +220,7 @@ class Motion(Processable):
         --------
         rocking.Measure : intensity measure.
         """
-        wanted = Measure.of(measure, among=SCALES)
+        wanted = Measure.parse(measure, among=SCALES)
         if wanted.name == "factor":
             return self.scaled(level)
         goal = checks.positive(level, "level", InvalidMotion, wanted.units)
@@ -278,7 +278,7 @@ class Motion(Processable):
 
     def __str__(self) -> str:
         """Return name, duration, step, peak acceleration and changes in one line."""
-        step = "" if self.step is None else f" in steps of {self.step:.5g} s"
+        step = "" if self.dt is None else f" in steps of {self.dt:.5g} s"
         parts = [f"{self.name}, {self.duration:.5g} s{step}, {_peak(self)}", *self.history]
         if self.vertical is not None:
             parts.append(f"vertical: {self.vertical.name}, {_peak(self.vertical)}")

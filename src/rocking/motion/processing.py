@@ -47,7 +47,7 @@ class Processable(Measured):
     history: tuple[str, ...]
     error: float
     vertical: Self | None
-    step: float | None
+    dt: float | None
 
     def _changed(self, how: str, done: str, **fields: Any) -> Self:
         """Return the motion with other fields and an extended history."""
@@ -90,7 +90,7 @@ class Processable(Measured):
             sentence = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
             raise InvalidMotion(sentence, "other", value=other)
         first, second = _recorded_azimuths(self, other, recorded)
-        if later := begins_later(self.description, other.description, self.step):
+        if later := begins_later(self.description, other.description, self.dt):
             early, late = (self, other) if later > 0.0 else (other, self)
             raise InvalidMotion(
                 f"by their files {checks.shown(late.name)} begins {abs(later):.6g} s after {checks.shown(early.name)}: "
@@ -210,7 +210,7 @@ class Processable(Measured):
         if vertical is not None and kept is not None and kept[0] > vertical.duration - piecewise.SHORTEST:
             vertical = None  # the vertical motion has ended by then
         if vertical is not None:
-            vertical = vertical._processed(kept, steps, self.step)
+            vertical = vertical._processed(kept, steps, self.dt)
         return replace(self._processed(kept, steps), vertical=vertical)  # type: ignore[type-var]
 
     def _processed(self, kept: tuple[float, float] | None, steps: list[_Step], grid: float | None = None) -> Self:

@@ -85,7 +85,7 @@ class Measure:
             raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', wrong, "measure")
 
     @classmethod
-    def of(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
+    def parse(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
         """Return a measure, or the measure with an accepted name."""
         name = measure.name if isinstance(measure, Measure) else measure
         checks.one_of(name, "measure", InvalidOption, among)

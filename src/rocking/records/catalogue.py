@@ -38,7 +38,7 @@ class Record:
         Direction of positive acceleration, degrees clockwise from north, or "up".
     state : str
         Whether and how the record was corrected.
-    step, samples : float, int
+    dt, samples : float, int
         Sampling step, s, and number of samples.
     units, denominator : str, int
         Unit of the published numbers, which are integer multiples of 1/`denominator`.
@@ -56,7 +56,7 @@ class Record:
     station: str
     direction: str
     state: str
-    step: float
+    dt: float
     samples: int
     units: str
     denominator: int
@@ -113,7 +113,7 @@ def info(name: str) -> Record:
     Examples
     --------
     >>> record = info("ridgecrest-clc-090")
-    >>> record.step, record.samples, record.units, record.terms
+    >>> record.dt, record.samples, record.units, record.terms
     (0.01, 31932, 'g', 'CC0 1.0')
     """
     catalogue = _catalogue()
@@ -178,7 +178,7 @@ def load(name: str) -> Motion:
     azimuth = float(record.direction) if record.direction.isdecimal() else None
     description = Description("record", text=text, origin=Origin(azimuth=azimuth, **known))
     samples = choose_unit(record.units).to_si(published)
-    return Motion.from_samples(samples, record.step, name=name, description=description)
+    return Motion.from_samples(samples, record.dt, name=name, description=description)
 
 
 def _catalogue() -> dict[str, dict[str, Any]]:

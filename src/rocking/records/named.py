@@ -292,7 +292,7 @@ def contents(
 
 def _measures(motion: Motion) -> dict[str, Any]:
     return {
-        named("step", "s"): motion.step,
+        named("step", "s"): motion.dt,
         named("duration", "s"): motion.duration,
         named("pga", "g"): decimal(motion.pga / STANDARD_GRAVITY),
         named("pgv", "m/s"): motion.pgv,

@@ -11,6 +11,7 @@ import numpy as np
 
 from rocking.block import RestrainedBlock
 from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.result import Row, dictionary_of, text_of
 from rocking.core.tables import Column, frame_of, named, records_of, write_csv, write_netcdf
 from rocking.errors import InvalidOption
@@ -199,6 +200,18 @@ class Response(Simulated):
         }
         return xr.Dataset(variables, {"time": ("time", time.values, {"units": "s"})}, attributes)
 
+    @property
+    def _default_dt(self) -> float:
+        """Step of the motion, or the duration divided by 2000."""
+        step = self.motion and self.motion.dt
+        # A pulse of a few straight lines also has a step, but its resolution is too coarse.
+        return step if step and step <= 0.01 * self.duration else max(self.duration, 1e-3) / _POINTS
+
+    @property
+    def times(self) -> Floats:
+        """Times of the histories of `to_xarray` at its default step, s, for methods such as `rotation`."""
+        return even_times(self.duration, self._default_dt)
+
     def _columns(self, table: str, dt: float | None = None) -> list[Column]:
         checks.one_of(table, "table", InvalidOption, self.TABLES)
         if table == "histories":
@@ -216,9 +229,7 @@ class Response(Simulated):
     def _histories(self, dt: float | None) -> list[Column]:
         motion, (name, rate, _, unit, _) = self.motion, self.block.coordinate
         if dt is None:
-            step = motion and motion.step
-            # A pulse of a few straight lines also has a step, but its resolution is too coarse.
-            dt = step if step and step <= 0.01 * self.duration else max(self.duration, 1e-3) / _POINTS
+            dt = self._default_dt
         step = checks.positive(dt, "dt", InvalidOption, "s")
         if self.duration > _MOST_POINTS * step:
             most = f"more than {_MOST_POINTS:,} points of {self.duration:g} s"
@@ -257,7 +268,7 @@ class Response(Simulated):
         self,
         ax: Axes | None = None,
         *,
-        units: RotationUnits = "slenderness",
+        rotation_units: RotationUnits = "slenderness",
         window: tuple[float, float] | None = None,
         longest_sequence: bool = False,
         title: str = "",
@@ -269,7 +280,7 @@ class Response(Simulated):
         ----------
         ax, title, figsize
             As of `Result.plot`.
-        units : {"slenderness", "rad", "deg"}
+        rotation_units : {"slenderness", "rad", "deg"}
             Units; "slenderness" normalises by the slenderness of the side (or the balance of a restrained block, if
             any).
         window : (start, end), optional
@@ -279,7 +290,7 @@ class Response(Simulated):
         """
         title = title or figure.titled(self)
         return figure.histories(
-            self, units, window, longest_sequence=longest_sequence, title=title, ax=ax, figsize=figsize
+            self, rotation_units, window, longest_sequence=longest_sequence, title=title, ax=ax, figsize=figsize
         )
 
     def plot_phase_plane(

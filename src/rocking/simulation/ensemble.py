@@ -87,9 +87,9 @@ class Scales:
     values: Floats = field(default_factory=lambda: np.ones(1))
 
     @classmethod
-    def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
+    def from_levels(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
         """Create scales from `levels` and `measure` as in `simulate_many`, or for unscaled motions."""
-        known = Measure.of(measure, among=SCALES)
+        known = Measure.parse(measure, among=SCALES)
         if levels is None:
             if known.name != "factor":
                 raise InvalidOption("{} says what {} are: give those as well", "measure", "levels")
@@ -196,7 +196,7 @@ def product_of(
     """Create a product from the arguments of `simulate_many`."""
     bodies, shaking = bodies_of(blocks), tuple(several_motions(motions))
     return Product(
-        bodies, shaking, Scales.of(levels, measure), polarity, model, chattering_scheme(chattering), duration
+        bodies, shaking, Scales.from_levels(levels, measure), polarity, model, chattering_scheme(chattering), duration
     )
 
 

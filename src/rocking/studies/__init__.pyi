@@ -1,6 +1,6 @@
 from .file import TEMPLATE, StudyFile, read_study
 from .results import BlockTable
-from .study import RunReport, Status, Study, study
+from .study import RunReport, Status, Study, create_study
 
 __all__ = [
     "TEMPLATE",
@@ -9,6 +9,6 @@ __all__ = [
     "Status",
     "Study",
     "StudyFile",
+    "create_study",
     "read_study",
-    "study",
 ]

@@ -175,7 +175,7 @@ def _bodies(tables: Tables) -> Bodies:
             body_of(block, row, [one for one in row.values() if isinstance(one, Restraint)]) for block, row in pairs
         ]
         note_likely_mistakes(blocks, bodies)
-        return Blocks.of(bodies)
+        return Blocks.from_bodies(bodies)
 
 
 def _made(
@@ -237,7 +237,7 @@ def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
             given = {name: cells.get(name, text) for name, text in texts.items()}
             blocks.append(block_of({name: INPUTS[name].read(text) for name, text in given.items() if text}))
     note_likely_mistakes(blocks)
-    return Blocks.of(blocks)
+    return Blocks.from_bodies(blocks)
 
 
 def _scales(tables: Tables) -> Scales:
@@ -251,12 +251,12 @@ def _scales(tables: Tables) -> Scales:
     for option in () if "sa" in given else options:
         raise tables.wrong("scales", option, "{} goes with {}, and only with it", option, "sa")
     if not measures:
-        return Scales.of(None, FACTOR)
+        return Scales.from_levels(None, FACTOR)
     (name,) = measures
     with tables.located("scales", key=name):
         values = quantities.axis(given[name], name, _MEASURES[name])
         checks.positive_numbers(values, name, InvalidOption)
-        return Scales.of(values, Measure(cast(MeasureName, name), **options))
+        return Scales.from_levels(values, Measure(cast(MeasureName, name), **options))
 
 
 def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:

@@ -18,8 +18,8 @@ from rocking.analysis.curve import fitted_curve
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.levels import (
     checked_limit,
+    checked_limit_states,
     clusters_of,
-    limit_states,
     motions_in_words,
     of_polarities,
     passed,
@@ -59,7 +59,7 @@ _EVERYTHING: Final = slice(None)
 #: An integer, a slice or an array of indices along each axis.
 _Selection = tuple[Any, ...]
 
-StudyVerdict = Literal["overturning", "complete_chattering"]
+StudyOutcome = Literal["overturning", "complete_chattering"]
 
 
 def results_of(store: Store) -> xr.Dataset:
@@ -163,11 +163,11 @@ def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
             file.write_table(table)
 
 
-def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
+def critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     """Compute `Study.critical_scales` of a complete study."""
     import xarray as xr
 
-    checks.one_of(verdict, "verdict", InvalidOption, get_args(StudyVerdict))
+    checks.one_of(outcome, "outcome", InvalidOption, get_args(StudyOutcome))
     product, levels = store.product, store.product.scales.values
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
@@ -178,7 +178,7 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
         outcomes = _selected(store, names, True, (part, _EVERYTHING, _EVERYTHING, _EVERYTHING))
         unfinished, stopped, overturned, completes, rests, stalled = (values != 0.0 for values in outcomes)
         holds[part], known[part] = overturned, ~(unfinished | stopped)
-        if verdict == "complete_chattering":
+        if outcome == "complete_chattering":
             holds[part], known[part] = completes, (known[part] | rests) & ~stalled
     # Unknown outcomes inherit the last known one below, so that no change is lost.
     below = np.zeros(store.grid.shape, np.int64)  # index of that scale; -1 if no outcome is known so far
@@ -192,14 +192,14 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
     above, meaning = {
         "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
         "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not below"),
-    }[verdict]
+    }[outcome]
     unit = about["units"]
     return xr.Dataset(
         {
             "low": variable("change", levels[low], "scale below the change", unit),
             "high": variable("change", levels[scale + 1], "scale above the change", unit),
             above: variable("change", holds[motion, scale + 1, polarity, block], meaning),
-            "known": variable("change", low == scale, "whether the verdicts of all simulations are known"),
+            "known": variable("change", low == scale, "whether the outcomes of all simulations are known"),
         },
         {
             **{
@@ -233,7 +233,7 @@ def _peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
         if stopped.any():
             raise StudyError(
                 f"{np.count_nonzero(stopped)} of {stopped.size} simulations were stopped by the study's duration, "
-                "while the block moved or the motion went on, so that their verdicts are not known: make the study "
+                "while the block moved or the motion went on, so that their outcomes are not known: make the study "
                 "without a duration"
             )
         alpha = slenderness_of(store.product.bodies.select(blocks))
@@ -334,11 +334,13 @@ def checked_fractiles(fractiles: Sequence[float]) -> Floats:
     return shares
 
 
-def _check_fit(limits: Mapping[str, float], confidence: float) -> None:
-    """Check what is asked of curves, before outcomes are read."""
+def _checked_states(limit_states: Mapping[str, float] | None, confidence: float) -> Mapping[str, float]:
+    """Return limits by limit state. Check the arguments of curves before outcomes are read."""
     checks.share(confidence, "confidence", InvalidOption)
-    for name, limit in limit_states(limits, "limits").items():
+    limits = checked_limit_states(limit_states)
+    for name, limit in limits.items():
         checked_limit(limit, name)
+    return limits
 
 
 def study_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
@@ -374,13 +376,13 @@ def study_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
 def pooled_fragility(
     store: Store,
     measure: Measure,
-    limits: Mapping[str, float],
+    limit_states: Mapping[str, float] | None,
     confidence: float,
     weights: ArrayLike | None,
     clusters: ArrayLike | None,
 ) -> Fragility:
     """Fit one curve to the outcomes of all blocks, with optional weights."""
-    _check_fit(limits, confidence)
+    limits = _checked_states(limit_states, confidence)
     product, bodies = store.product, store.product.bodies
     units, which = np.unique(units_of(bodies, measure, product.model), return_inverse=True)
     shares = weights_of(weights, len(bodies))
@@ -436,14 +438,14 @@ _KEPT: Final[Mapping[str, str]] = {
 def block_fragilities(
     store: Store,
     measure: Measure,
-    limits: Mapping[str, float],
+    limit_states: Mapping[str, float] | None,
     confidence: float,
     clusters: ArrayLike | None,
 ) -> BlockTable:
     """Fit a curve to the outcomes of each block."""
     import xarray as xr
 
-    _check_fit(limits, confidence)
+    limits = _checked_states(limit_states, confidence)
     product, bodies, scales = store.product, store.product.bodies, store.product.scales.count
     kept = {name: np.full((len(limits), len(bodies)), np.nan) for name in _KEPT}
     faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0

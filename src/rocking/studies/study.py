@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis.fragility import Fragility
-from rocking.analysis.levels import OVERTURNING
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.constants import Model
@@ -40,7 +39,7 @@ from rocking.simulation.ensemble import Polarity, Product, product_of
 from rocking.studies.folder import Store, exists, locked, put, read, require_free
 from rocking.studies.results import (
     BlockTable,
-    StudyVerdict,
+    StudyOutcome,
     block_fragilities,
     critical_scales,
     pooled_fragility,
@@ -134,7 +133,7 @@ class Study:
     --------
     >>> import pathlib, rocking, tempfile
     >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-    >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
+    >>> study = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
     >>> _ = study.run()
     >>> table = pathlib.Path(tempfile.mkdtemp(), "all.csv")
     >>> study.to_csv(table)
@@ -144,7 +143,7 @@ class Study:
 
     def __init__(self, folder: str | Path) -> None:
         self._store = Store(folder)
-        self.place = str(self._store.folder)
+        self.folder = str(self._store.folder)
         self.product: Product = self._store.product
 
     @property
@@ -184,7 +183,7 @@ class Study:
         """
         first, step = (1, 1) if part is None else _part(part)
         self._store.check_program()
-        with locked(self.place, shared=part is not None):
+        with locked(self.folder, shared=part is not None):
             share = [*itertools.islice(self._store.grid, first - 1, None, step)]
             return _run(self._store, share, executor)
 
@@ -233,17 +232,17 @@ class Study:
                     faults[key] = error.text()
                 bar.advance()
         if repair and faults:
-            with locked(self.place):
+            with locked(self.folder):
                 for key in faults:
                     put(store.file_of(key), compute(store.work(key)))
         return [*faults.values()]
 
-    def critical_scales(self, verdict: StudyVerdict = "overturning") -> xr.Dataset:
+    def critical_scales(self, outcome: StudyOutcome = "overturning") -> xr.Dataset:
         """Find the scales between which the outcome of a block changes.
 
         Parameters
         ----------
-        verdict : {"overturning", "complete_chattering"}
+        outcome : {"overturning", "complete_chattering"}
             Whether a block overturns; or whether it comes to rest after its first uplift before the motion exceeds a
             threshold again.
 
@@ -260,15 +259,15 @@ class Study:
         StudyError
             If units are missing or damaged.
         InvalidOption
-            If `verdict` is unknown, or the study has fewer than two scales in increasing order.
+            If `outcome` is unknown, or the study has fewer than two scales in increasing order.
         """
-        return critical_scales(self._store, verdict)
+        return critical_scales(self._store, outcome)
 
     def fragility(
         self,
         *,
         measure: IntensityName | Measure = "pga",
-        limits: Mapping[str, float] = OVERTURNING,
+        limit_states: Mapping[str, float] | None = None,
         confidence: float = 0.9,
         weights: ArrayLike | None = None,
         clusters: ArrayLike | None = None,
@@ -277,13 +276,13 @@ class Study:
 
         The intensity is the measure of a motion at a scale. A StudyError is raised if units are missing or damaged.
         """
-        return pooled_fragility(self._store, Measure.of(measure), limits, confidence, weights, clusters)
+        return pooled_fragility(self._store, Measure.parse(measure), limit_states, confidence, weights, clusters)
 
     def block_fragilities(
         self,
         *,
         measure: IntensityName | Measure = "pga",
-        limits: Mapping[str, float] = OVERTURNING,
+        limit_states: Mapping[str, float] | None = None,
         confidence: float = 0.9,
         clusters: ArrayLike | None = None,
     ) -> BlockTable:
@@ -293,7 +292,7 @@ class Study:
         (median_lower, median_upper, ...; SI units), exceeded and outcomes (counts; for a symmetric block of one
         polarity), and fault: the reason why no lognormal fits, or an empty string.
         """
-        return block_fragilities(self._store, Measure.of(measure), limits, confidence, clusters)
+        return block_fragilities(self._store, Measure.parse(measure), limit_states, confidence, clusters)
 
     def spectrum(self, fractiles: Sequence[float] = (0.16, 0.5, 0.84)) -> BlockTable:
         """Compute fractiles of the normalised peak rotation over the motions, for each scale and block.
@@ -318,11 +317,11 @@ class Study:
         """
         return study_spectrum(self._store, fractiles)
 
-    def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
+    def to_netcdf(self, path: str | Path, *, critical: StudyOutcome | None = None) -> None:
         """Write the `results`, or the critical scales as `to_csv` does, to a NetCDF file."""
         write_netcdf(path, self.critical_scales(critical) if critical else self.results())
 
-    def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
+    def to_csv(self, path: str | Path, *, critical: StudyOutcome | None = None) -> None:
         """Write a CSV row for each simulation, with units in the column names.
 
         Parameters
@@ -341,11 +340,11 @@ class Study:
         """
         self._write("csv", path, critical)
 
-    def to_parquet(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
+    def to_parquet(self, path: str | Path, *, critical: StudyOutcome | None = None) -> None:
         """Write the table of `to_csv` as Parquet, with the same arguments and errors; requires pyarrow."""
         self._write("parquet", path, critical)
 
-    def _write(self, kind: str, path: str | Path, critical: StudyVerdict | None) -> None:
+    def _write(self, kind: str, path: str | Path, critical: StudyOutcome | None) -> None:
         dataset = self.critical_scales(critical) if critical else self.results()
         write_table(kind, path, dataset, 1 << 16 if critical else self._store.grid.unit[0])
 
@@ -355,10 +354,10 @@ class Study:
         return f"<Study: {sizes}; {self.status}>"
 
 
-def study(
+def create_study(
     folder: str | Path,
-    blocks: Bodies | Body | Sequence[Body] | None = None,
-    motions: Motions | None = None,
+    blocks: Bodies | Body | Sequence[Body],
+    motions: Motions,
     *,
     model: Model = "nonlinear",
     chattering: str | ChatteringScheme = "certified",
@@ -368,14 +367,14 @@ def study(
     duration: float | None = None,
     unit_blocks: int | None = None,
 ) -> Study:
-    """Create a study, or open an existing one and check its inputs.
+    """Create a study, or open an existing one with the same inputs.
 
     Parameters
     ----------
     folder : path
         Folder of the study.
-    blocks, motions : optional
-        As for `simulate_many`; without both, the study must exist, and no other argument is accepted.
+    blocks, motions
+        As for `simulate_many`.
     model, chattering, levels, measure, polarity, duration : optional
         As for `simulate_many`.
     unit_blocks : int, optional
@@ -390,13 +389,13 @@ def study(
     Raises
     ------
     StudyError
-        If the study does not exist and no inputs are provided, contains other inputs, or is damaged.
+        If the folder contains a study with other inputs, or a damaged one.
     InvalidOption
         If an argument is out of its range.
 
     See Also
     --------
-    Study : Methods of a study.
+    Study : Open an existing study.
     simulate_many : Simulate in memory.
 
     Examples
@@ -404,19 +403,12 @@ def study(
     >>> import rocking, tempfile
     >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     >>> folder, pulse = tempfile.mkdtemp(), rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-    >>> _ = study(folder, blocks, pulse, levels=[0.4, 1.0], unit_blocks=512).run()
-    >>> study(folder).results().overturned.sel(scale=0.4).values.tolist()
+    >>> _ = create_study(folder, blocks, pulse, levels=[0.4, 1.0], unit_blocks=512).run()
+    >>> rocking.Study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    if blocks is not None and motions is not None:
-        product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
-        return study_of(folder, product, unit_blocks)
-    if blocks is not None or motions is not None:
-        raise InvalidOption("a new study needs {} and {}; one that is there needs neither", "blocks", "motions")
-    others = model, chattering, levels, measure, polarity, duration, unit_blocks
-    if str(others) != str(("nonlinear", "certified", None, "factor", "+", None, None)):
-        raise InvalidOption("a study that is opened has rules of its own: give its folder alone, or all its inputs")
-    return Study(folder)
+    product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    return study_of(folder, product, unit_blocks)
 
 
 def study_of(
