@@ -31,14 +31,15 @@ from rocking.motion.motion import Motion
 #: Fields of an outcome. ``unfinished``: the step budget was exceeded. ``stopped``: the duration ended while the body
 #: moved or the motion continued. In both cases all other fields are incomplete. ``leans``: restraints hold the body in
 #: a leaning position for ever. ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
-#: rested after its first uplift before the motion exceeded a threshold again. ``stalled``: number of unproven rests.
-#: Times of events that did not occur are 0.
+#: rested after its first uplift before the motion exceeded a threshold again. ``rests_by_rounding``: number of rests
+#: because time no longer advanced. Times of events that did not occur are 0.
 OUTCOME = np.dtype(
     [
         ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("peak_rotation", "f8"),
         ("residual_rotation", "f8"), ("peak_time", "f8"),
         ("impacts", "i8"), ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("first_uplift", "f8"),
-        ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("stalled", "i8"), ("duration", "f8"),
+        ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("rests_by_rounding", "i8"),
+        ("duration", "f8"),
     ]
 )  # fmt: skip
 
@@ -274,7 +275,7 @@ def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
         ("rests", "rests"), ("time_at_rest", "time_at_rest"), ("first_uplift", "first_uplift"),
-        ("first_rest", "first_rest"), ("last_rest", "last_rest_time"), ("stalled", "rests_by_rounding"),
+        ("first_rest", "first_rest"), ("last_rest", "last_rest_time"), ("rests_by_rounding", "rests_by_rounding"),
         ("duration", "end"),
     ):  # fmt: skip
         outcomes[name] = states[field]

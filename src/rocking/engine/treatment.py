@@ -101,7 +101,7 @@ class AsymptoticTime(Treatment):
     """Rest once the asymptotic chattering time (paper, Eq. 65) has passed since uplift (paper, Fig. 8a).
 
     Only sinusoidal motions and symmetric blocks are supported. Above the critical amplitude the block never rests. If
-    Eq. 65 exceeds the true time, the block rests once time no longer advances between impacts (counted as `stalled`).
+    Eq. 65 exceeds the true time, the block rests once time no longer advances between impacts (`rests_by_rounding`).
 
     Parameters
     ----------

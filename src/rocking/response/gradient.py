@@ -158,7 +158,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     out = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
     change = np.zeros(3)
     reason = _UNFINISHED if response.unfinished else target.reason
-    if response.near_ties and not reason and _ties_before(trail, target.instant):
+    if response.rounding_decisions and not reason and _ties_before(trail, target.instant):
         reason = _REASONS[Ends.GRAZES]
     reason = reason or _by_adjoint(target, change, out)
     if reason and reason != _FROM_REST:

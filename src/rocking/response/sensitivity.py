@@ -151,18 +151,18 @@ def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: in
     return heights, at_impacts, at_events
 
 
-def ambiguities(changes: Sensitivity, trail: Trail, height: float, near_ties: int) -> tuple[str, ...]:
+def ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding_decisions: int) -> tuple[str, ...]:
     """Return the results ("peak", "events", "touch") that one unit in the last place of all inputs changes visibly.
 
-    ``height`` is the height of the peak above the stop, and ``near_ties`` counts the ties that are already known.
+    ``height`` is the height of the peak above the stop, and ``rounding_decisions`` the known number of ties.
     """
     early, late = (_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
-    near_ties += int(np.any(late > early + AMBIGUITY))
+    rounding_decisions += int(np.any(late > early + AMBIGUITY))
     peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._all)
     known = {
         "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
         "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
-        "touch": near_ties == 0,
+        "touch": rounding_decisions == 0,
     }
     return tuple(name for name, is_known in known.items() if not is_known)
 

@@ -136,8 +136,8 @@ def response_to(
         duration=float(start["end"]),
         events=_events(events),
         impacts=_public(table["impact"][: start["impacts"]], _IMPACT),
-        stalled=int(start["rests_by_rounding"]),
-        near_ties=int(start["rounding_decisions"]),
+        rests_by_rounding=int(start["rests_by_rounding"]),
+        rounding_decisions=int(start["rounding_decisions"]),
         solution=Solution(
             trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
             sequences=_public(table["sequence"][: start["sequences"]], _CHATTERING),
