@@ -167,7 +167,7 @@ def test_the_first_impact_is_never_missed() -> None:
             assert first > found.time * (1.0 - 1e-14)
 
     holds()
-    assert min(judged[StepOutcome.STEP], judged[StepOutcome.IMPACT]) >= 10, judged
+    assert judged[StepOutcome.STEP] >= 10 and judged[StepOutcome.IMPACT] >= 5, judged
     assert judged[StepOutcome.UNDECIDED] <= 0.6 * sum(judged.values()), judged
 
 
