@@ -32,7 +32,7 @@ REPEATS = 3
 
 
 def main() -> None:
-    print(f"processor time, s; {compiled.state()}")
+    print(f"processor time, s; {compiled.describe_mode()}")
     for name, code in ANSWERS.items():
         print(f"{name:26s} {min(spent(code) for _ in range(REPEATS)):9.2f}")
 

@@ -80,8 +80,8 @@ def build() -> list[Path]:
             with tempfile.TemporaryDirectory(dir=OUT, prefix=".") as folder:
                 _make(Path(folder))
         manifest = json.loads((OUT / "manifest.json").read_text("utf-8"))
-        if manifest["text"] != sources("text_hash"):  # comments have changed, and nothing else
-            _put_manifest(manifest | {"text": sources("text_hash")})
+        if manifest["text"] != sources("hash_text"):  # comments have changed, and nothing else
+            _put_manifest(manifest | {"text": sources("hash_text")})
     return [OUT / "manifest.json", *(OUT / each["file"] for each in manifest["libraries"])]
 
 
@@ -115,7 +115,7 @@ def is_current() -> bool:
 def _made() -> dict[str, Any]:
     """Describe what libraries are made from and for."""
     scripts = [_digest(path) for path in sorted(Path(__file__).parent.glob("*.py"))]
-    code = sources("code_hash")
+    code = sources("hash_code")
     return {"code": code, "scripts": scripts, "compiler": REQUIREMENTS[0], "platform": sysconfig.get_platform()}
 
 
@@ -130,7 +130,7 @@ def _digest(path: Path) -> str:
 
 def _make(folder: Path) -> None:
     """Make libraries and manifest in a folder, and move them to their place."""
-    linker, made, text = _linker(), _made(), sources("text_hash")
+    linker, made, text = _linker(), _made(), sources("hash_text")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(lambda step: _run(folder, *step), [("lower", "0"), ("lower", "1"), ("level", "-")]))
         levels = LEVELS if EVERY_LEVEL else [*dict.fromkeys([LEVELS[0], (folder / "level").read_text("utf-8")])]

@@ -275,14 +275,14 @@ def lower(folder: Path, share: str) -> None:
     """Write a share of the kernels with all that they call, the functions around them, and the manifest's part."""
     name_alike(int(share))
     compiled.compiler = Part
-    from rocking.kernels.signatures import named, signatures
+    from rocking.kernels.signatures import find_kernel, sample_arguments
 
     module, linked, around = llvm.parse_assembly(""), set(), []
     manifest: dict[str, dict[str, Any]] = {}
-    for name, arguments in signatures().items():
+    for name, arguments in sample_arguments().items():
         if (name.partition(".")[0] in MARCHES) != (share == "0"):
             continue
-        part: Part = named(name)
+        part: Part = find_kernel(name)
         kinds = tuple(numba.typeof(argument) for argument in arguments)
         part.dispatcher.compile(kinds)
         made = part.dispatcher.overloads[kinds]

@@ -152,12 +152,12 @@ def rests_under(case, chattering):
     """Start and end of each rest, and how many ended a sequence only because time no longer advanced."""
     response = rocking.simulate(case.block, case.motion, model="linear", chattering=chattering)
     times, kinds = response.events["time"], response.events["kind"]
-    return np.column_stack([times, np.append(times, math.inf)[1:]])[kinds == "rest"], response.stalled
+    return np.column_stack([times, np.append(times, math.inf)[1:]])[kinds == "rest"], response.rests_by_rounding
 
 
 def verdict_on(found, certified):
     """Say which rests overlap with no certified rest, and which of these have no counterpart."""
-    (rests, stalled), (proven, _) = found, certified
+    (rests, rests_by_rounding), (proven, _) = found, certified
     overlap = np.minimum.outer(rests[:, 1], proven[:, 1]) > np.maximum.outer(rests[:, 0], proven[:, 0])
     false, missed = rests[~overlap.any(axis=1), 0], proven[~overlap.any(axis=0), 0]
     faults = []
@@ -165,8 +165,8 @@ def verdict_on(found, certified):
         faults.append(f"{counted(false.size, 'false rest')}, the first at {false[0]:.6f} s")
     if missed.size:
         faults.append(f"{counted(missed.size, 'rest')} missed, the first at {missed[0]:.6f} s")
-    if stalled:
-        faults.append(f"{counted(stalled, 'rest')} only as time no longer advanced")
+    if rests_by_rounding:
+        faults.append(f"{counted(rests_by_rounding, 'rest')} only as time no longer advanced")
     return "; ".join(faults) or "every rest found, no other"
 
 

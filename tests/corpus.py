@@ -143,7 +143,10 @@ def of_response(response: Any) -> dict[str, Any]:
     times = np.arange(26) * (response.duration / 25.0)
     sequences = response.sequences
     return {
-        **{name: getattr(response, name) for name in (*fields, "duration", "stalled", "near_ties")},
+        **{name: getattr(response, name) for name in (*fields, "duration")},
+        # Earlier names of the counts, which are part of the digests.
+        "stalled": response.rests_by_rounding,
+        "near_ties": response.rounding_decisions,
         "events": {name: response.events[name] for name in ("time", "kind", "side")},
         "impacts": {name: response.impacts[name] for name in ("time", "side", "speed_before", "speed_after")},
         "sequences": {name: sequences[name] for name in ("start", "end", "impacts")},

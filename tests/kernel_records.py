@@ -11,7 +11,7 @@ from oracles.problem import Problem
 from rocking.kernels import state
 from rocking.kernels.compiled import UNCOMPILED
 from rocking.kernels.ground import Ground
-from rocking.kernels.ground import ground_of as laid_out
+from rocking.kernels.ground import build_ground as laid_out
 from rocking.kernels.state import Record
 
 GRAVITY = 9.80665
@@ -47,7 +47,7 @@ def rocking_block(
     fallen: float = 0.5 * math.pi,
 ) -> Record:
     p, alpha = np.array(p, dtype=float), np.array(alpha, dtype=float)
-    return state.record(
+    return state.new_record(
         state.BLOCK,
         stiffness=p * p,
         slenderness=alpha,
@@ -56,7 +56,7 @@ def rocking_block(
         threshold=np.tan(alpha) if nonlinear else alpha,
         threshold_slope=p * p * np.cos(alpha) if nonlinear else p * p,
         restitution=e,
-        limit=limit,
+        rest_limit=limit,
         next_side=(1, 0),
         overturn_angle=fallen,
     )
@@ -64,7 +64,7 @@ def rocking_block(
 
 def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Record:
     """Something that bounces on one side: u'' = stiffness u - gain (threshold + a), and back with e times the speed."""
-    return state.record(
+    return state.new_record(
         state.BLOCK,
         stiffness=stiffness,
         threshold=(threshold, math.inf),
@@ -83,7 +83,7 @@ def rules_for(
     stop: float = math.inf,
     record: bool = True,
 ) -> Record:
-    return state.record(
+    return state.new_record(
         state.SETTINGS,
         nonlinear=nonlinear,
         rest_rule=rest_rule,

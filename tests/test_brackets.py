@@ -112,5 +112,5 @@ def test_an_arc_that_just_turns_above_the_ground_is_flagged(model: str) -> None:
     while (middle := 0.5 * (low + high)) not in (low, high):
         low, high = (middle, high) if not len(under(middle).impacts) else (low, middle)
     assert not len(under(low).impacts) and len(under(high).impacts)
-    assert under(low).near_ties and under(low).ambiguous
+    assert under(low).rounding_decisions and under(low).ambiguous
     assert not under(low * (1.0 + 1e-6)).ambiguous

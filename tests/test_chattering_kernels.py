@@ -6,10 +6,10 @@ import pytest
 from numpy.polynomial import polynomial
 
 from rocking import chattering
-from rocking.kernels.sine import Verdict
-from rocking.kernels.sine.arc import State, arc, basis
-from rocking.kernels.sine.sequence import remaining_phase
-from rocking.kernels.sine.series import PowerSeries, remaining_series
+from rocking.kernels.sine import SequenceStatus
+from rocking.kernels.sine.arc import State, compute_basis, solve_arc
+from rocking.kernels.sine.sequence import estimate_remaining_phase
+from rocking.kernels.sine.series import PowerSeries, expand_remaining_phase
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -35,7 +35,7 @@ DELTAS = (1e-6, 0.1, 1.0, 40.0, 1e6, 1e12)
 )
 def test_the_basis_is_right_on_both_sides_of_every_change_of_sum(reach, delta):
     t = float(np.sqrt(reach / (1.0 + delta)))
-    *values, decay = basis(t, delta)
+    *values, decay = compute_basis(t, delta)
     exact = exact_basis(t, delta)
     assert values[:2] == pytest.approx([float(x) for x in exact[:2]], rel=4e-16)
     with mpmath.workdps(50):
@@ -48,10 +48,12 @@ def test_the_basis_is_right_on_both_sides_of_every_change_of_sum(reach, delta):
 
 def test_an_arc_tells_what_became_of_it():
     lands = State(0.01, 0.3, 0.5)
-    assert arc(lands, 0.06, 1.0, 1.0, 2.0)[0] == Verdict.FOUND
-    assert arc(lands, 1e-3, 1.0, 1.0, 2.0)[1] == pytest.approx(arc(lands, 0.06, 1.0, 1.0, 2.0)[1], rel=1e-15)
-    assert arc(lands, 0.06, 1.0, 1.0, 0.02)[0] == Verdict.INCOMPLETE
-    assert arc(State(1.0, 0.3, 0.5), 0.06, 1.0, 1e12, 3.0)[0] == Verdict.INCOMPLETE
+    assert solve_arc(lands, 0.06, 1.0, 1.0, 2.0)[0] == SequenceStatus.FOUND
+    assert solve_arc(lands, 1e-3, 1.0, 1.0, 2.0)[1] == pytest.approx(
+        solve_arc(lands, 0.06, 1.0, 1.0, 2.0)[1], rel=1e-15
+    )
+    assert solve_arc(lands, 0.06, 1.0, 1.0, 0.02)[0] == SequenceStatus.INCOMPLETE
+    assert solve_arc(State(1.0, 0.3, 0.5), 0.06, 1.0, 1e12, 3.0)[0] == SequenceStatus.INCOMPLETE
 
 
 @pytest.mark.parametrize("count", [1, 4095, 4096, 4097])
@@ -82,8 +84,8 @@ def test_the_closure_of_series_is_that_of_numbers():
     """A series of one term is a number."""
     V, P, D = 0.013, 0.4, 0.7
     one = [PowerSeries(np.array([[value]]), 0) for value in (V, P, D)]
-    number = float(remaining_series(tuple(one), 0.25, 0.9).coefficients[0, 0])
-    assert number == pytest.approx(remaining_phase(State(V, P, D), 0.25, 0.9), rel=1e-14)
+    number = float(expand_remaining_phase(tuple(one), 0.25, 0.9).coefficients[0, 0])
+    assert number == pytest.approx(estimate_remaining_phase(State(V, P, D), 0.25, 0.9), rel=1e-14)
 
 
 @pytest.mark.parametrize("omega, eta", [(0.7, 0.6), (3.0, 0.8), (5.0, 0.95)])

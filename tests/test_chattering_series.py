@@ -102,7 +102,7 @@ def test_series_knows_its_ends():
 @pytest.fixture
 def unresolved(monkeypatch):
     """No coefficient is resolved: so it is at eta = 0.99999, after half a minute."""
-    monkeypatch.setattr(expansions, "phase_coefficients", lambda _, __, order: np.full(order, np.inf))
+    monkeypatch.setattr(expansions, "compute_phase_coefficients", lambda _, __, order: np.full(order, np.inf))
 
 
 def test_where_double_precision_does_not_resolve_the_series_the_rest_is_told(unresolved):

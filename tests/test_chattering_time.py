@@ -5,8 +5,8 @@ import pytest
 from oracles.sine_chattering import rest_time
 
 from rocking import chattering
-from rocking.kernels.sine import Verdict
-from rocking.kernels.sine.sequence import semianalytical_phases
+from rocking.kernels.sine import SequenceStatus
+from rocking.kernels.sine.sequence import write_semianalytical_phases
 
 
 def random_parameters(count, seed, spread=1.5):
@@ -88,8 +88,8 @@ def test_verdicts_agree_with_the_semianalytical_scheme(count):
     a, omega, eta = random_parameters(count, seed=1)
     exact = chattering.chattering_time(a, omega, eta)
     phases, statuses = np.zeros(a.size), np.zeros(a.size, np.int8)
-    semianalytical_phases((a, omega, eta), np.full(a.size, 1000), phases, statuses)
-    resolved = np.where(statuses == Verdict.FOUND, phases / omega, np.nan)
+    write_semianalytical_phases((a, omega, eta), np.full(a.size, 1000), phases, statuses)
+    resolved = np.where(statuses == SequenceStatus.FOUND, phases / omega, np.nan)
     both = np.isfinite(exact) & np.isfinite(resolved)
     assert both.mean() > 0.5
     differ = np.flatnonzero(np.isnan(exact) != np.isnan(resolved))

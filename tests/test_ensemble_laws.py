@@ -9,7 +9,7 @@ from oracles.problem import Problem
 import rocking
 from rocking import Blocks, Motion, simulate, simulate_many
 from rocking.engine.problem import ground_of
-from rocking.kernels.ground import components
+from rocking.kernels.ground import component_coefficients
 from rocking.simulation import ensemble
 from rocking.simulation.ensemble import Scales
 
@@ -77,7 +77,9 @@ def test_a_motion_times_a_factor_is_laid_out_as_the_scaled_motion(
     assert_allclose(found.pieces, expected.pieces, rtol=1e-14, atol=1e-15)
     assert_allclose(found.stretches, expected.stretches, rtol=1e-13, atol=1e-14)
     if errors is not None:
-        (_, lifts), (_, as_it_is) = (components(each, np.arange(30)) for each in (found, ground_of(motion, GRAVITY)))
+        (_, lifts), (_, as_it_is) = (
+            component_coefficients(each, np.arange(30)) for each in (found, ground_of(motion, GRAVITY))
+        )
         assert np.abs(as_it_is).max() > 0.1
         assert_allclose(lifts, abs(factor) * as_it_is, rtol=1e-14)
 

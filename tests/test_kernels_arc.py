@@ -9,8 +9,8 @@ from kernel_records import in_units_of_g, numbers, one_sided, rocking_block, rul
 from oracles.taylor import System, after, coefficients, mp
 
 from rocking.kernels import arc
-from rocking.kernels.arc import converged, evaluate, expand, linear_order, step_length
-from rocking.kernels.series import linear_coefficients
+from rocking.kernels.arc import converged_order, evaluate_series, expand_arc, linear_order, step_length
+from rocking.kernels.series import write_linear_coefficients
 from rocking.kernels.state import ORDER, Record, new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -68,12 +68,12 @@ def linear_series(
     degree = len(A) - 1
     order = linear_order(lam, h) if degree <= 1 else ORDER
     body = one_sided(lam, gain, threshold, 0.5)
-    linear_coefficients(body, start, scratch, degree, order)
+    write_linear_coefficients(body, start, scratch, degree, order)
     if degree > 1:
-        order = converged(scratch["rotation"], degree, h)
+        order = converged_order(scratch["rotation"], degree, h)
         if order > ORDER:
             scratch["weight"][0] = 1.0
-            order, h = ORDER, arc.shortened(body, rules_for(), 0, scratch, (degree, 0), h)
+            order, h = ORDER, arc.shorten_step(body, rules_for(), 0, scratch, (degree, 0), h)
     return scratch["rotation"], order, h
 
 
@@ -85,12 +85,12 @@ def nonlinear_series(
     scratch["weight"][0] = 1.0
     block = rocking_block((p, p), (alpha, alpha), nonlinear=True)
     block["stiffness"] = lam
-    order, h = arc.expand_checked(block, rules_for(nonlinear=True), state_of(0, u, v), scratch, (len(A) - 1, 0), h)
+    order, h = arc.expand_with_bound(block, rules_for(nonlinear=True), state_of(0, u, v), scratch, (len(A) - 1, 0), h)
     return scratch["rotation"], order, h
 
 
 def assert_series_is(c: np.ndarray, order: int, t: float, expected: tuple[mpmath.mpf, mpmath.mpf]) -> None:
-    rotation, speed, _ = evaluate(c, order, t)
+    rotation, speed, _ = evaluate_series(c, order, t)
     rounding = 0.5 * ULP * order * terms(c, order, t)
     assert abs(rotation - expected[0]) <= rounding
     assert abs(speed - expected[1]) * t <= order * rounding
@@ -163,7 +163,7 @@ def test_the_nonlinear_arc_of_a_slender_block_is_the_linear_one(u: float, v: flo
         motion = alpha * np.array([a, slope])
         one, order, _ = linear_series(alpha * u, alpha * v, 1.0, 1.0, alpha, motion, 0.5)
         other, other_order, _ = nonlinear_series(alpha * u, alpha * v, 1.0, alpha, motion, 0.5)
-        return abs(evaluate(one, order, 0.5)[0] - evaluate(other, other_order, 0.5)[0]) / alpha
+        return abs(evaluate_series(one, order, 0.5)[0] - evaluate_series(other, other_order, 0.5)[0]) / alpha
 
     assert difference(1e-3) <= 1e-5
     assert difference(1e-5) <= 1e-9
@@ -180,9 +180,9 @@ def test_an_arc_takes_the_motion_about_its_start_and_in_the_frame_of_its_side(
     block = rocking_block((2.0, 3.0), (0.2, 0.3), nonlinear=nonlinear)
     scratch, start = new_scratch(), state_of(side, 0.05, 0.1, piece=1, offset=offset)
     ground = in_units_of_g([0.0, 1.0, 2.0], [9.0 + 0.0 * row, row])
-    order, step, _ = expand(ground, block, rules_for(nonlinear=nonlinear), scratch, start, h)
+    order, step, _ = expand_arc(ground, block, rules_for(nonlinear=nonlinear), scratch, start, h)
     assert step == h
-    u, _, w = evaluate(scratch["rotation"], order, h)
+    u, _, w = evaluate_series(scratch["rotation"], order, h)
     a = sign * np.polynomial.Polynomial(row)(offset + h)
     lam = (4.0, 9.0)[side]
     expected = -lam * (np.sin(alpha - u) + a * np.cos(alpha - u)) if nonlinear else lam * (u - alpha - a)

@@ -21,22 +21,22 @@ from oracles import multiprecision
 from oracles.cases import between
 from oracles.problem import Problem
 
-from rocking.kernels.arc import restoring, weight_series
+from rocking.kernels.arc import restoring_acceleration, write_weight_series
 from rocking.kernels.certificate import (
     Bounds,
     Horizon,
     MotionBounds,
     Proof,
-    arc_bounds,
-    bounds_on_motion,
-    geometric_bracket,
+    bound_arc,
+    bound_motion,
+    bound_side,
+    bracket_geometrically,
+    fit_restoring_parabola,
     prove_rest,
-    restoring_parabola,
-    side_bounds,
-    widened,
-    with_drag,
+    widen_for_drag,
+    widen_for_error,
 )
-from rocking.kernels.ground import Window, bounds_over, local_series, vertical_of
+from rocking.kernels.ground import Window, bound_window, vertical_component, write_local_series
 from rocking.kernels.state import new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -105,9 +105,9 @@ def proof(
 def test_bounds_on_an_arc_hold_its_duration_and_its_impact(problem: Problem, side: int, share: float) -> None:
     v, i = speed(problem, side, 0.0, share), 1 - 2 * side
     window = 4.0 * v / problem.restoring(0.0, i)
-    seen = bounds_over(ground_of(problem), 0, 0.0, window, ANYTHING, new_scratch()["ground"])
+    seen = bound_window(ground_of(problem), 0, 0.0, window, ANYTHING, new_scratch()["ground"])
     rules = rules_for(nonlinear=problem.model == "nonlinear")
-    change, shortest, longest = arc_bounds(v, side_bounds(block_of(problem), rules, side, MotionBounds(seen, STILL)))
+    change, shortest, longest = bound_arc(v, bound_side(block_of(problem), rules, side, MotionBounds(seen, STILL)))
     assume(longest <= window)
     soon_at_rest = replace(problem, restitution=(0.01, 0.01))
     time, _, w, _ = multiprecision.follow(soon_at_rest, velocity=i * v).impacts[0]
@@ -185,7 +185,7 @@ def test_the_estimate_of_the_time_to_rest_is_accurate_to_its_order(
 
 @st.composite
 def brackets(draw: st.DrawFn) -> tuple[float, list[list[float]], tuple[float, float]]:
-    """Speed, bounds on both sides as `arc_bounds` takes them, restitutions."""
+    """Speed, bounds on both sides as `bound_arc` takes them, restitutions."""
     sides = []
     for _ in range(2):
         m = draw(between(0.1, 10.0))
@@ -200,15 +200,15 @@ def test_wider_bounds_never_give_a_narrower_bracket(
     bracket: tuple[float, list[list[float]], tuple[float, float]], side: int, which: int, more: float
 ) -> None:
     v, sides, e = bracket
-    lower, upper = geometric_bracket(v, Bounds(*sides[0]), Bounds(*sides[1]), e, e)
+    lower, upper = bracket_geometrically(v, Bounds(*sides[0]), Bounds(*sides[1]), e, e)
     sides[side][which] *= 1.0 - 0.5 * more if which == 1 else 1.0 + more
-    wider_lower, wider_upper = geometric_bracket(v, Bounds(*sides[0]), Bounds(*sides[1]), e, e)
+    wider_lower, wider_upper = bracket_geometrically(v, Bounds(*sides[0]), Bounds(*sides[1]), e, e)
     assert math.isnan(wider_upper) or wider_lower <= lower * (1.0 + 1e-14) <= upper <= wider_upper * (1.0 + 1e-14)
 
 
 def test_a_constant_motion_of_little_stiffness_leaves_only_rounding_between_the_bounds() -> None:
     bounds = Bounds(1e-20, 3.0, 3.0, 0.0, 0.0, 0.0)
-    lower, upper = geometric_bracket(0.6, bounds, bounds, (0.5, 0.8), (0.5, 0.8))
+    lower, upper = bracket_geometrically(0.6, bounds, bounds, (0.5, 0.8), (0.5, 0.8))
     assert lower == pytest.approx(0.4 * 1.5 / 0.6, rel=1e-13)
     assert lower < 0.4 * 1.5 / 0.6 < upper < lower * (1.0 + 1e-13)
 
@@ -232,8 +232,8 @@ STEADY = Bounds(1.0, 2.0, 2.0, 0.0, 0.0, 0.0)
 def test_where_a_condition_fails_nothing_is_proven(
     v: float, first: tuple[float, ...], second: tuple[float, ...], e: float
 ) -> None:
-    assert np.all(np.isnan(geometric_bracket(v, Bounds(*first), Bounds(*second), (e, e), (e, e))))
-    assert np.all(np.isfinite(geometric_bracket(0.1, STEADY, STEADY, (0.5, 0.5), (0.5, 0.5))))
+    assert np.all(np.isnan(bracket_geometrically(v, Bounds(*first), Bounds(*second), (e, e), (e, e))))
+    assert np.all(np.isfinite(bracket_geometrically(0.1, STEADY, STEADY, (0.5, 0.5), (0.5, 0.5))))
 
 
 def test_a_window_over_too_many_pieces_proves_nothing_until_the_block_is_slower() -> None:
@@ -260,8 +260,8 @@ def test_a_jump_just_past_the_end_of_a_window_is_not_ruled_out() -> None:
 @pytest.mark.parametrize("error", [0.0, 1e-3])
 def test_a_disturbed_motion_may_be_off_by_its_error_at_any_time(error: float) -> None:
     problem = Problem("linear", (2.0, 2.0), (0.2, 0.2), (0.5, 0.5), np.array([0.0, 9.0]), np.array([[0.5, 0.1]]))
-    seen = bounds_over(ground_of(problem), 0, 1.0, 2.0, ANYTHING, new_scratch()["ground"])
-    wider = widened(seen, error)
+    seen = bound_window(ground_of(problem), 0, 1.0, 2.0, ANYTHING, new_scratch()["ground"])
+    wider = widen_for_error(seen, error)
     assert (wider.low, wider.high) == (seen.low - error, seen.high + error)
     assert (wider.slope, wider.jumps) == (seen.slope, seen.jumps + 2.0 * error)
 
@@ -272,7 +272,9 @@ def test_the_restoring_acceleration_is_that_of_the_equation_of_motion(problem: P
     here = problem.acceleration(0.0) / GRAVITY
     expected = problem.restoring(0.0, 1 - 2 * side)
     size = problem.p[side] ** 2 * (problem.alpha[side] + abs(here))
-    assert restoring(ground_of(problem), block_of(problem), side, 0, 0.0) == pytest.approx(expected, abs=1e-15 * size)
+    assert restoring_acceleration(ground_of(problem), block_of(problem), side, 0, 0.0) == pytest.approx(
+        expected, abs=1e-15 * size
+    )
 
 
 @quick
@@ -308,14 +310,14 @@ def test_the_restoring_acceleration_stays_within_its_parabola_s_error(
     )
     motion = MotionBounds(
         *(
-            widened(bounds_over(component, 0, 0.0, window, ANYTHING, new_scratch()["ground"]), error)
-            for component in (ground, vertical_of(ground))
+            widen_for_error(bound_window(component, 0, 0.0, window, ANYTHING, new_scratch()["ground"]), error)
+            for component in (ground, vertical_component(ground))
         )
     )
-    local_series(ground, 0, 0.0, 1.0, scratch["ground"])
-    weight_series(ground, 0, 0.0, scratch["weight"])
+    write_local_series(ground, 0, 0.0, 1.0, scratch["ground"])
+    write_weight_series(ground, 0, 0.0, scratch["weight"])
     horizon = Horizon(motion, error, columns, window, height, 0.0)
-    found = restoring_parabola(block, rules, side, scratch, horizon)
+    found = fit_restoring_parabola(block, rules, side, scratch, horizon)
     sign, p, tilt = 1 - 2 * side, (2.0, 3.0)[side], (alpha, 0.9 * alpha)[side]
     if columns == 2 and not error:
         changes = window * np.abs(rows[:, 1]).sum() + 0.5 * height * (1.0 + np.abs(rows).sum(axis=0) @ [1.0, window])
@@ -334,7 +336,7 @@ def test_the_restoring_acceleration_stays_within_its_parabola_s_error(
 
 
 def test_resistance_takes_from_and_adds_to_the_restoring_acceleration() -> None:
-    assert with_drag(Bounds(1.0, 2.0, 3.0, 0.5, 0.25, 0.125), 0.1) == (1.0, 1.9, 3.1, 0.7, 0.25, 0.325)
+    assert widen_for_drag(Bounds(1.0, 2.0, 3.0, 0.5, 0.25, 0.125), 0.1) == (1.0, 1.9, 3.1, 0.7, 0.25, 0.325)
 
 
 @pytest.mark.parametrize("weight", [-0.5, 0.0, 0.5])
@@ -342,5 +344,5 @@ def test_resistance_takes_from_and_adds_to_the_restoring_acceleration() -> None:
 def test_a_motion_passes_the_threshold_where_the_greatest_weight_lets_it(weight: float, share: float) -> None:
     strong = share * 0.15 * (1.0 + weight)
     ground = in_units_of_g([0.0, 9.0], [[strong, 0.0]], 0.0, [[weight, 0.0]])
-    found = bounds_on_motion(ground, rocking_block(), state_of(0, 0.0, 1e-3), 0.1, new_scratch())
+    found = bound_motion(ground, rocking_block(), state_of(0, 0.0, 1e-3), 0.1, new_scratch())
     assert math.isnan(found.horizontal.high) == (share > 1.0)

@@ -8,8 +8,8 @@ from kernel_records import long_uncompiled, rocking_block, state_of
 
 import rocking
 from rocking.engine.problem import ground_of
-from rocking.kernels.state import AT_REST, new_scratch, records
-from rocking.kernels.uplift import note_complete
+from rocking.kernels.state import AT_REST, new_records, new_scratch
+from rocking.kernels.uplift import write_completeness
 from rocking.motion.motion import exceedances
 
 Pair = tuple[float, float]
@@ -19,10 +19,10 @@ def is_complete(motion: rocking.Motion, thresholds: Pair, rest: float, *, uplift
     block = rocking_block()
     block["threshold"] = thresholds
     state = state_of(AT_REST, 0.0, 0.0, rests=rests, first_uplift=uplift, first_rest=rest)
-    blocks, states = records(1, block.dtype), records(1, state.dtype)
+    blocks, states = new_records(1, block.dtype), new_records(1, state.dtype)
     blocks[0], states[0] = block, state
     complete = np.zeros(1, dtype=bool)
-    note_complete(ground_of(motion, 1.0, 1.0), blocks, states, new_scratch(), complete)
+    write_completeness(ground_of(motion, 1.0, 1.0), blocks, states, new_scratch(), complete)
     return bool(complete[0])
 
 

@@ -16,15 +16,15 @@ from rocking.kernels.ground import (
     STRETCH,
     Ground,
     acceleration,
-    bounds_over,
-    bounds_within,
-    ground_of,
-    local_series,
-    move,
-    next_beyond,
-    slope,
+    acceleration_rate,
+    bound_piece,
+    bound_window,
+    build_ground,
+    next_piece_beyond,
+    shift_polynomial,
+    write_local_series,
 )
-from rocking.kernels.ground import ground_of as laid_out
+from rocking.kernels.ground import build_ground as laid_out
 from rocking.kernels.state import new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -75,7 +75,7 @@ def test_the_local_series_is_the_same_polynomial_about_a_later_time(
     coefficients: list[float], offset: float, sign: float
 ) -> None:
     A = np.full(24, np.nan)
-    degree = local_series(in_units_of_g([0.0, 9.0], [coefficients]), 0, offset, sign, A)
+    degree = write_local_series(in_units_of_g([0.0, 9.0], [coefficients]), 0, offset, sign, A)
     exact, sizes = ([f(Fraction(x) * Fraction(sign)) for x in coefficients] for f in (lambda x: x, abs))
     for row in (exact, sizes):
         for k in range(len(row) - 1):
@@ -101,7 +101,9 @@ def test_value_and_slope_are_those_of_the_polynomial(coefficients: list[float], 
     steepness = sum(k * abs(c) * offset ** (k - 1) for k, c in enumerate(coefficients) if k > 0)
     at = exact(offset)
     assert abs(exact(acceleration(ground, 0, offset)) - f(at)) <= exact(2.0 * len(coefficients) * ULP * size)
-    assert abs(exact(slope(ground, 0, offset)) - f.derivative()(at)) <= exact(2.0 * len(coefficients) * ULP * steepness)
+    assert abs(exact(acceleration_rate(ground, 0, offset)) - f.derivative()(at)) <= exact(
+        2.0 * len(coefficients) * ULP * steepness
+    )
 
 
 def test_the_last_piece_has_no_end_and_no_motion() -> None:
@@ -109,18 +111,18 @@ def test_the_last_piece_has_no_end_and_no_motion() -> None:
     assert ground.pieces.tolist() == [[1.0, 2.0, 1.0, 0.0], [3.0, math.inf, 0.0, 0.0]]
     assert ground.error == 0.125
     assert laid_out(np.zeros(1), np.zeros((0, 2)), 1.0, 0.0).pieces.tolist() == [[0.0, math.inf, 0.0, 0.0]]
-    assert bounds_over(ground, 1, 0.3, 5.0, ANYTHING, work()) == (0.0, 0.0, 0.0, 0.0)
+    assert bound_window(ground, 1, 0.3, 5.0, ANYTHING, work()) == (0.0, 0.0, 0.0, 0.0)
 
 
 @quick
 @given(rows, st.floats(0.0, 2.0))
 def test_a_polynomial_is_moved_and_moved_back(coefficients: list[float], t: float) -> None:
     c = np.array(coefficients)
-    move(c, len(c) - 1, t)
+    shift_polynomial(c, len(c) - 1, t)
     reached = np.polynomial.Polynomial(coefficients)(t)
     assert c[0] == pytest.approx(reached, abs=1e-14 * sum(abs(x) * t**k for k, x in enumerate(coefficients)))
     size = sum(abs(x) * (2.0 * t) ** k for k, x in enumerate(np.abs(c)))
-    move(c, len(c) - 1, -t)
+    shift_polynomial(c, len(c) - 1, -t)
     assert np.all(np.abs(c - coefficients) * t ** np.arange(len(c)) <= 1e-13 * (size + np.sum(np.abs(coefficients))))
 
 
@@ -132,7 +134,7 @@ def test_the_bounds_on_a_window_within_a_piece_hold_every_value_and_slope(
     length = float(ground.pieces[0, 1])
     offset = share * length
     window = part * (length - offset)
-    bounds = bounds_within(ground, 0, offset, window, work())
+    bounds = bound_piece(ground, 0, offset, window, work())
     f = polynomial(ground.pieces[0, 2:])
     for t in np.linspace(offset, offset + window, 25):
         assert exact(bounds.low) <= f(exact(t)) <= exact(bounds.high)
@@ -142,7 +144,7 @@ def test_the_bounds_on_a_window_within_a_piece_hold_every_value_and_slope(
 @quick
 @given(st.lists(numbers(-1.0, 1.0), min_size=2, max_size=2), st.floats(0.0, 1.0), st.floats(1e-6, 1.0))
 def test_the_bounds_on_an_even_change_are_its_ends(row: list[float], offset: float, window: float) -> None:
-    bounds = bounds_within(in_units_of_g([0.0, 2.0], [row]), 0, offset, window, work())
+    bounds = bound_piece(in_units_of_g([0.0, 2.0], [row]), 0, offset, window, work())
     ends = [row[0] + row[1] * t for t in (offset, offset + window)]
     size = abs(row[0]) + 2.0 * abs(row[1])
     assert bounds[:3] == pytest.approx((min(ends), max(ends), abs(row[1])), abs=2.0**-46 * size)
@@ -155,7 +157,7 @@ def test_the_bounds_over_any_window_hold_dense_samples_their_slopes_and_their_ju
 ) -> None:
     piece = min(piece, len(ground.pieces) - 2)
     offset = share * float(ground.pieces[piece, 1])
-    bounds = bounds_over(ground, piece, offset, window, ANYTHING, work())
+    bounds = bound_window(ground, piece, offset, window, ANYTHING, work())
     times, values = dense(ground, piece, offset, window)
     size = np.max(np.abs(ground.pieces[:, 2:]) @ 2.0 ** np.arange(ground.pieces.shape[1] - 2))
     assert bounds.low <= np.min(values) + 1e-13 * size
@@ -171,16 +173,16 @@ def test_every_jump_of_a_window_is_counted_and_none_beyond() -> None:
     ground = in_units_of_g([0.0, 1.0, 2.0, 3.0], [[0.0, 0.25], [0.5, 0.0], [-0.25, 0.0]])
     expected = {0.5: 0.0, 1.5: 0.25, 2.5: 1.0, 3.5: 1.25, 9.0: 1.25}
     for window, jumps in expected.items():
-        assert bounds_over(ground, 0, 0.0, window, ANYTHING, work()).jumps == pytest.approx(jumps, abs=1e-12)
-    assert bounds_over(ground, 1, 0.5, 1.0, ANYTHING, work()).jumps == pytest.approx(0.75, abs=1e-12)
+        assert bound_window(ground, 0, 0.0, window, ANYTHING, work()).jumps == pytest.approx(jumps, abs=1e-12)
+    assert bound_window(ground, 1, 0.5, 1.0, ANYTHING, work()).jumps == pytest.approx(0.75, abs=1e-12)
 
 
 def test_a_window_in_which_the_motion_passes_a_limit_has_no_bounds() -> None:
-    ground = ground_of(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 0.0], [0.5, 0.0]]), 1.0, 0.0)
-    assert bounds_over(ground, 0, 0.0, 1.5, (-0.6, 0.6), work()).high == pytest.approx(0.5)
+    ground = build_ground(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 0.0], [0.5, 0.0]]), 1.0, 0.0)
+    assert bound_window(ground, 0, 0.0, 1.5, (-0.6, 0.6), work()).high == pytest.approx(0.5)
     for limits in ((-0.6, 0.4), (0.1, 0.6)):
-        assert np.all(np.isnan(bounds_over(ground, 0, 0.0, 1.5, limits, work())))
-    assert np.all(np.isfinite(bounds_over(ground, 0, 0.0, 0.9, (-0.6, 0.4), work())))
+        assert np.all(np.isnan(bound_window(ground, 0, 0.0, 1.5, limits, work())))
+    assert np.all(np.isfinite(bound_window(ground, 0, 0.0, 0.9, (-0.6, 0.4), work())))
 
 
 def piece_by_piece(ground: Ground, piece: int, offset: float, window: float) -> np.ndarray:
@@ -188,7 +190,7 @@ def piece_by_piece(ground: Ground, piece: int, offset: float, window: float) -> 
     low, high, steepest, jumps = math.inf, -math.inf, 0.0, 0.0
     while True:
         left = float(ground.pieces[piece, 1]) - offset
-        here = bounds_within(ground, piece, offset, min(window, left), work())
+        here = bound_piece(ground, piece, offset, min(window, left), work())
         low, high, steepest = min(low, here.low), max(high, here.high), max(steepest, here.slope)
         if window <= left:
             return np.array([low, high, steepest, jumps])
@@ -210,15 +212,15 @@ def test_bounds_over_whole_stretches_are_those_of_their_pieces(
     ground = in_units_of_g(np.cumsum([0.0, *widths]), random.normal(size=(count, columns)) * random.random((count, 1)))
     offset = share * float(ground.pieces[piece, 1]) * (seed % 2)
     window = part * float(ground.pieces[-1, 0])
-    bounds = bounds_over(ground, piece, offset, window, ANYTHING, work())
+    bounds = bound_window(ground, piece, offset, window, ANYTHING, work())
     assert np.array(bounds) == pytest.approx(piece_by_piece(ground, piece, offset, window), rel=1e-13)
 
 
 def test_a_window_over_too_many_stretches_has_no_bounds() -> None:
     count = 200 * STRETCH
     ground = in_units_of_g(np.arange(count + 1.0), np.zeros((count, 2)))
-    assert np.all(np.isfinite(bounds_over(ground, 0, 0.0, 100.0 * STRETCH, ANYTHING, work())))
-    assert np.all(np.isnan(bounds_over(ground, 0, 0.0, 150.0 * STRETCH, ANYTHING, work())))
+    assert np.all(np.isfinite(bound_window(ground, 0, 0.0, 100.0 * STRETCH, ANYTHING, work())))
+    assert np.all(np.isnan(bound_window(ground, 0, 0.0, 150.0 * STRETCH, ANYTHING, work())))
 
 
 @long_uncompiled
@@ -234,7 +236,7 @@ def test_no_piece_that_passes_the_threshold_is_passed_over(
     samples = np.array([dense(ground, k, 0.0, float(ground.pieces[k, 1]), 30)[1] for k in range(count)])
     beyond = np.append(np.max(samples, axis=1) > above, True) | np.append(np.min(samples, axis=1) < -below, True)
     for piece in random.integers(0, count + 1, size=20):
-        found = next_beyond(ground, int(piece), (-below, above), (0.0, 0.0))
+        found = next_piece_beyond(ground, int(piece), (-below, above), (0.0, 0.0))
         assert piece <= found <= piece + np.argmax(beyond[piece:])
 
 
@@ -243,11 +245,11 @@ def test_stretches_without_anything_are_passed_over() -> None:
     coefficients = np.full((count, 2), [0.1, 0.0])
     coefficients[7 * STRETCH + 5, 0] = -0.5
     ground = in_units_of_g(np.arange(count + 1.0), coefficients)
-    assert next_beyond(ground, 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * STRETCH
-    assert next_beyond(ground, 7 * STRETCH + 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * STRETCH + 3
-    assert next_beyond(ground, 8 * STRETCH, (-0.2, 0.2), (0.0, 0.0)) == count
-    assert next_beyond(ground, 3, (-0.6, 0.2), (0.0, 0.0)) == count
-    assert next_beyond(ground, 3, (-0.6, 0.05), (0.0, 0.0)) == 3
+    assert next_piece_beyond(ground, 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * STRETCH
+    assert next_piece_beyond(ground, 7 * STRETCH + 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * STRETCH + 3
+    assert next_piece_beyond(ground, 8 * STRETCH, (-0.2, 0.2), (0.0, 0.0)) == count
+    assert next_piece_beyond(ground, 3, (-0.6, 0.2), (0.0, 0.0)) == count
+    assert next_piece_beyond(ground, 3, (-0.6, 0.05), (0.0, 0.0)) == 3
 
 
 @pytest.mark.parametrize(("offset", "count"), [(0.0, 1), (0.0, 2), (0.7, 2), (0.7, 4), (-0.3, 6)])

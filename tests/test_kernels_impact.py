@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from kernel_records import MINUS, PLUS, ULP, in_units_of_g, numbers, rocking_block, rules_for, state_of
 from oracles.exact import exact, first_above, polynomial, turning_points
 
-from rocking.kernels.arc import expand
-from rocking.kernels.events import advance, apply_impact
-from rocking.kernels.state import Outcome, new_scratch
+from rocking.kernels.arc import expand_arc
+from rocking.kernels.events import advance_to_event, apply_impact
+from rocking.kernels.state import StepOutcome, new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -36,12 +36,12 @@ def series(draw: st.DrawFn) -> np.ndarray:
 def follow(c: np.ndarray, h: float) -> tuple[int, float, float, float, float, float]:
     scratch = new_scratch()
     scratch["rotation"][: len(c)] = c
-    outcome, time, u, v, top, height = advance(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, QUARTER_TURN)
+    outcome, time, u, v, top, height = advance_to_event(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, QUARTER_TURN)
     return outcome, time, u, v, top, height
 
 
 def test_a_step_ends_at_its_first_event() -> None:
-    judged: Counter[Outcome] = Counter()
+    judged: Counter[StepOutcome] = Counter()
 
     # What is drawn need not fall, nor come down, three times.
     @quick
@@ -54,29 +54,29 @@ def test_a_step_ends_at_its_first_event() -> None:
     @given(series(), st.floats(0.1, 1.5))
     def judge(c: np.ndarray, h: float) -> None:
         status, time, u, v, _, _ = follow(c, h)
-        judged[Outcome(status)] += 1
+        judged[StepOutcome(status)] += 1
         f = polynomial(c)
         size = float(np.sum(np.abs(c) * h ** np.arange(len(c))))
         rounding = exact(1e-14 * size)
         impact = first_above(-f if c[0] > 0.0 else -polynomial(c[1:]), 0.0, h)
         inside = turning_points(f, 0.0, time)[1:-1]
         overturn = first_above(f - exact(QUARTER_TURN), 0.0, h)
-        if status == Outcome.IMPACT:
+        if status == StepOutcome.IMPACT:
             assert (u, v) == (0.0, pytest.approx(float(np.polynomial.Polynomial(c).deriv()(time)), abs=1e-12 * size))
             assert time >= min(impact, h) * (1.0 - 1e-14) or f(exact(time)) <= rounding
             assert overturn >= time * (1.0 - 1e-14)
-        elif status == Outcome.OVERTURN:
+        elif status == StepOutcome.OVERTURN:
             assert u == QUARTER_TURN
             assert abs(f(exact(time)) - exact(u)) <= rounding
             assert not inside or c[0] == 0.0 or all(abs(f.derivative()(r)) <= 1e-6 for r in inside)
         else:
-            assert (status, time) == (Outcome.STEP, h)
+            assert (status, time) == (StepOutcome.STEP, h)
             assert u > 0.0
             assert u == pytest.approx(float(np.polynomial.Polynomial(c)(h)), abs=1e-14 * size)
             assert overturn == math.inf or f(exact(h)) <= exact(QUARTER_TURN) + rounding
 
     judge()
-    assert all(judged[each] >= 3 for each in (Outcome.IMPACT, Outcome.OVERTURN, Outcome.STEP)), judged
+    assert all(judged[each] >= 3 for each in (StepOutcome.IMPACT, StepOutcome.OVERTURN, StepOutcome.STEP)), judged
 
 
 @quick
@@ -104,7 +104,7 @@ def test_a_late_hump_is_not_overlooked(turns: list[float]) -> None:
 def test_an_impact_within_rounding_of_the_steps_end_is_never_left_behind(u: float, v: float, ulps: int) -> None:
     h = u / v * (1.0 + ulps * ULP / 2.0)
     status, time, end, speed, _, _ = follow(np.array([u, -v, 0.0]), h)
-    assert status == Outcome.IMPACT or end > 0.0
+    assert status == StepOutcome.IMPACT or end > 0.0
     assert time == pytest.approx(u / v, rel=1e-15)
     assert speed == -v
 
@@ -112,7 +112,7 @@ def test_an_impact_within_rounding_of_the_steps_end_is_never_left_behind(u: floa
 @pytest.mark.parametrize("start", [0.0, 1e-300, 1e-20, 1e-14])
 def test_an_arc_that_a_step_caught_just_off_the_ground_comes_down_all_the_same(start: float) -> None:
     status, time, _, speed, peak_time, peak = follow(np.array([start, 0.4, -1.0]), 1.0)
-    assert (status, time) == (Outcome.IMPACT, pytest.approx(0.4, rel=1e-12))
+    assert (status, time) == (StepOutcome.IMPACT, pytest.approx(0.4, rel=1e-12))
     assert (speed, peak_time, peak) == (pytest.approx(-0.4), pytest.approx(0.2), pytest.approx(0.04))
 
 
@@ -126,14 +126,14 @@ def test_a_fall_is_where_the_rotation_first_reaches_the_limit() -> None:
         nonlocal judged
         scratch, fallen = new_scratch(), max(share, 1.01 * float(c[0]))
         scratch["rotation"][: len(c)] = c
-        end = advance(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, fallen)
-        free = advance(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, math.inf)
-        assert free.outcome != Outcome.OVERTURN
-        judged += end.outcome == Outcome.OVERTURN
+        end = advance_to_event(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, fallen)
+        free = advance_to_event(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, math.inf)
+        assert free.outcome != StepOutcome.OVERTURN
+        judged += end.outcome == StepOutcome.OVERTURN
         rounding = 1e-13 * float(np.sum(np.abs(c) * h ** np.arange(len(c))))
         earliest = first_above(polynomial(c) - exact(fallen - rounding), 0.0, h)
         latest = first_above(polynomial(c) - exact(fallen + rounding), 0.0, h)
-        if end.outcome == Outcome.OVERTURN:
+        if end.outcome == StepOutcome.OVERTURN:
             assert (end.u, end.peak, end.peak_time) == (fallen, fallen, end.time)
             assert earliest <= end.time * (1.0 + 1e-14)
             assert end.time <= latest * (1.0 + 1e-14)
@@ -158,12 +158,12 @@ def test_a_step_after_an_impact_is_sized_by_the_arc_under_weak_and_violent_motio
     ground, scratch = in_units_of_g([0.0, 9.0], [row]), new_scratch()
     block, rules = rocking_block(alpha=(0.2, 0.2), nonlinear=nonlinear), rules_for(nonlinear=nonlinear)
     start = state_of(PLUS, 0.0, 1e-3)
-    order, h, degree = expand(ground, block, rules, scratch, start, 9.0)
-    outcome, time, *_ = advance(start, scratch, order, h, QUARTER_TURN)
-    assert outcome == Outcome.IMPACT
+    order, h, degree = expand_arc(ground, block, rules, scratch, start, 9.0)
+    outcome, time, *_ = advance_to_event(start, scratch, order, h, QUARTER_TURN)
+    assert outcome == StepOutcome.IMPACT
     assert time == pytest.approx(2e-3 / (4.0 * (0.2 + strength)), rel=0.03)
     assert (time < h <= 0.5, degree) == (True, 0)
-    order, h, _ = expand(ground, block, rules, scratch, state_of(MINUS, 0.0, 1e-3), 9.0)
+    order, h, _ = expand_arc(ground, block, rules, scratch, state_of(MINUS, 0.0, 1e-3), 9.0)
     assert (h <= 0.5) if strength > 0.2 else (h < 0.01)
 
 

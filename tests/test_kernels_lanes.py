@@ -12,15 +12,15 @@ from kernel_records import ULP, in_units_of_g, long_uncompiled, one_sided, rocki
 from oracles.taylor import System, after
 
 from rocking.kernels import state
-from rocking.kernels.arc import evaluate, expand
+from rocking.kernels.arc import evaluate_series, expand_arc
 from rocking.kernels.ground import Ground
 from rocking.kernels.lane_steps import WIDTH, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.lanes import (
-    LONGEST_SUBSTEP,
-    LONGEST_WEIGHTED_SUBSTEP,
+    MAX_SUBSTEP,
+    MAX_WEIGHTED_SUBSTEP,
     Pool,
+    build_pool,
     fill_lane,
-    pool_of,
     set_angles,
     stumpff,
     write_lane,
@@ -90,7 +90,7 @@ def stepped(
     fallen: float = QUARTER_TURN,
 ) -> list[Step]:
     """Take up to a group of blocks through one sample that starts with row[0] and changes by row[1] per second."""
-    pool: Pool = pool_of(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
+    pool: Pool = build_pool(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
     for lane in range(len(blocks)):
         fill_lane(pool, lane, lane)
         if way.nonlinear:
@@ -114,7 +114,7 @@ def stepped(
 
 def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: float = 1.0) -> tuple[Records, Records]:
     """A group of blocks in motion: steps from next to nothing to one over p, rotations and speeds of all sizes."""
-    blocks, states = state.records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
+    blocks, states = state.new_records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
     width = 10.0 ** random.uniform(-9.0, -1.4 if nonlinear else 0.0, WIDTH)
     for k in range(WIDTH):
         p, alpha = width[k] / h, 10.0 ** random.uniform(-2.0, 0.0)
@@ -188,9 +188,9 @@ def test_a_quiet_nonlinear_step_is_the_full_series(substeps: int, late: float, r
                 assert step.start["u"] == step.end["u"]
                 continue
             quiet += 1
-            order, reach, _ = expand(ground, step.block, rules, scratch, step.start, h + late)
+            order, reach, _ = expand_arc(ground, step.block, rules, scratch, step.start, h + late)
             assert reach == h + late
-            u, v, _ = evaluate(scratch["rotation"], order, h + late)
+            u, v, _ = evaluate_series(scratch["rotation"], order, h + late)
             alpha = float(step.block["slenderness"][int(step.start["side"])])
             size = max(step.start["u"], abs(step.start["v"]) * h, abs(u), abs(v) * h, 0.125 * alpha)
             assert abs(step.end["u"] - u) <= 8.0 * substeps * ULP * size
@@ -215,8 +215,8 @@ def weighted_cases(
     low, high, swing = WEIGHTS[kind]
     weight = (random.uniform(low, high), random.normal() * swing)
     heaviest = max(1.0, abs(weight[0]), abs(sum(weight)))
-    longest = substeps * (LONGEST_SUBSTEP if nonlinear else LONGEST_WEIGHTED_SUBSTEP) / math.sqrt(heaviest)
-    blocks, states = state.records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
+    longest = substeps * (MAX_SUBSTEP if nonlinear else MAX_WEIGHTED_SUBSTEP) / math.sqrt(heaviest)
+    blocks, states = state.new_records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
     for k in range(WIDTH):
         p, alpha = longest * 10.0 ** random.choice([0.0, random.uniform(-9.0, 0.0)]), 10.0 ** random.uniform(-2.0, 0.0)
         blocks[k] = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
@@ -259,7 +259,7 @@ def test_a_quiet_step_is_exact_while_the_weight_changes(
 
 def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Records, Records]:
     """Steps with turning points: down to nearly nothing and up again, up to nearly the highest and down again."""
-    blocks, states = state.records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
+    blocks, states = state.new_records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
     for k in range(WIDTH):
         alpha = 0.2
         p = random.uniform(0.05, 1.0) * (0.02 if nonlinear else 1.0) / h
@@ -295,8 +295,8 @@ def test_a_lane_is_quiet_only_if_nothing_happens_in_its_step(nonlinear: bool, we
             if not step.quiet:
                 continue
             quiet += 1
-            order, reach, _ = expand(ground, step.block, rules, scratch, step.start, h)
-            path = [evaluate(scratch["rotation"], order, t)[:2] for t in np.linspace(0.0, reach, 41)]
+            order, reach, _ = expand_arc(ground, step.block, rules, scratch, step.start, h)
+            path = [evaluate_series(scratch["rotation"], order, t)[:2] for t in np.linspace(0.0, reach, 41)]
             u = np.array([rotation for rotation, _ in path])
             highest = max(u[0], u[-1])
             assert np.min(u) > 0.0
@@ -312,7 +312,7 @@ P, ALPHA, H = 0.5, 0.2, 0.005
 
 
 def one(u: float, v: float, peak: float, *, nonlinear: bool = False) -> tuple[Records, Records]:
-    blocks, states = state.records(1, state.BLOCK), state.new_states(1, 0)
+    blocks, states = state.new_records(1, state.BLOCK), state.new_states(1, 0)
     blocks[0] = rocking_block((P, P), (ALPHA, ALPHA), nonlinear=nonlinear)
     states[0] = state_of(0, u, v, peak=peak)
     return blocks, states
@@ -337,8 +337,8 @@ def path(way: Way, u: float, v: float, row: tuple[float, float]) -> np.ndarray:
     """Rotation throughout the step."""
     blocks, states = one(u, v, 0.0, nonlinear=way.nonlinear)
     rules, scratch = rules_for(nonlinear=way.nonlinear), new_scratch()
-    order, reach, _ = expand(ground_under(way, row, 0.0, 9.0), blocks[0], rules, scratch, states[0], H)
-    return np.array([evaluate(scratch["rotation"], order, t)[0] for t in np.linspace(0.0, reach, 2001)])
+    order, reach, _ = expand_arc(ground_under(way, row, 0.0, 9.0), blocks[0], rules, scratch, states[0], H)
+    return np.array([evaluate_series(scratch["rotation"], order, t)[0] for t in np.linspace(0.0, reach, 2001)])
 
 
 @every
@@ -372,7 +372,7 @@ def test_a_bulge_over_the_highest_so_far_between_two_ends_below_it_is_an_event(w
 def test_the_curvature_of_an_oscillator_may_be_largest_inside_a_step(up: float) -> None:
     """u = A cos(omega (t - h/2)) - c over a step of one radian: bulges by A (1 - cos(1/2))."""
     a, beyond = up, 1.0 - math.cos(0.5)
-    blocks, states = state.records(1, state.BLOCK), state.new_states(1, 0)
+    blocks, states = state.new_records(1, state.BLOCK), state.new_states(1, 0)
     for share, quiet in ((0.95, False), (1.06, True)):
         u = 1.0 if up > 0.0 else share * beyond
         pull = (a * math.cos(0.5) - u) / H**2
@@ -425,11 +425,11 @@ def test_a_nonlinear_series_whose_last_terms_still_count_is_an_event(strength: f
     u, v, row = 1.0, 1e-3, (-strength, 0.0)
     blocks, states = one(u, v, 9.0, nonlinear=True)
     scratch = new_scratch()
-    order, reach, _ = expand(
+    order, reach, _ = expand_arc(
         in_units_of_g([0.0, 9.0], [row]), blocks[0], rules_for(nonlinear=True), scratch, states[0], H
     )
     assert reach == H
-    expected = evaluate(scratch["rotation"], order, H)
+    expected = evaluate_series(scratch["rotation"], order, H)
     found = stepped(blocks, states, row, H, Way(True, 1), fallen=math.inf)[0]
     if found.quiet:
         assert found.end["u"] == pytest.approx(expected[0], rel=4.0 * ULP)

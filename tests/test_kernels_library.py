@@ -17,8 +17,8 @@ import pytest
 import rocking.kernels
 from rocking.errors import KernelsError
 from rocking.kernels import compiled, library, sources
-from rocking.kernels.signatures import signatures
-from rocking.kernels.sine.sequence import critical_amplitudes
+from rocking.kernels.signatures import sample_arguments
+from rocking.kernels.sine.sequence import write_critical_amplitudes
 
 pytestmark = pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
 
@@ -28,10 +28,10 @@ def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A copy of the libraries and the manifest, where the package looks for them."""
     folder = shutil.copytree(library.FOLDER, tmp_path / "built")
     monkeypatch.setattr(library, "FOLDER", folder)
-    for each in (library.opened, library.manifest):
+    for each in (library.open_library, library.read_manifest):
         each.cache_clear()
     yield folder
-    for each in (library.opened, library.manifest):
+    for each in (library.open_library, library.read_manifest):
         each.cache_clear()
 
 
@@ -51,7 +51,7 @@ def test_every_kernel_that_python_calls_is_listed_once() -> None:
             if isinstance(value, library.Kernel) and value.__module__ == info.name:
                 found.add(f"{info.name.removeprefix('rocking.kernels.')}.{name}")
     assert len(found) >= 20
-    assert {*signatures()} == found == {*library.opened().kernels}
+    assert {*sample_arguments()} == found == {*library.open_library().kernels}
 
 
 @pytest.mark.parametrize(
@@ -70,22 +70,22 @@ def test_every_kernel_that_python_calls_is_listed_once() -> None:
 )
 def test_arguments_of_other_types_are_refused(change: Any) -> None:
     arguments = np.ones(4), np.full(4, 0.9), np.zeros(4)
-    with pytest.raises(TypeError, match="critical_amplitudes is not compiled for these arguments"):
-        critical_amplitudes(*change(*arguments))
-    critical_amplitudes(*arguments)
+    with pytest.raises(TypeError, match="write_critical_amplitudes is not compiled for these arguments"):
+        write_critical_amplitudes(*change(*arguments))
+    write_critical_amplitudes(*arguments)
     assert np.all(arguments[-1] > 1.0)
 
 
 def test_what_is_only_read_may_be_read_only() -> None:
     omega, eta, out = np.ones(4), np.full(4, 0.9), np.zeros(4)
     omega.flags.writeable = False
-    critical_amplitudes(omega, eta, out)
+    write_critical_amplitudes(omega, eta, out)
     assert np.all(out > 1.0)
 
 
 def test_records_of_another_layout_are_not_taken_for_the_same() -> None:
     kind = np.dtype([("u", "f8"), ("v", "f8")])
-    take = library._taker({"record": str(kind.descr)})
+    take = library._make_packer({"record": str(kind.descr)})
     packed: list[Any] = []
     take(np.zeros(1, kind)[0], packed)
     take(np.zeros(1, np.dtype(kind.descr))[0], packed)
@@ -96,13 +96,13 @@ def test_records_of_another_layout_are_not_taken_for_the_same() -> None:
 
 
 def test_numbers_are_converted_only_without_loss() -> None:
-    kernel = library._caller("sine.series.eq65_sums", library.opened())
+    kernel = library._make_caller("sine.series.sum_eq65", library.open_library())
     assert kernel(np.float64(0.5)) == kernel(0.5)
     for wrong in ("0.5", None, 1j):
         with pytest.raises(TypeError):
             kernel(wrong)
     with pytest.raises(TypeError):
-        library._taker("bool")(1, [])
+        library._make_packer("bool")(1, [])
 
 
 def damage(name: str, folder: Path) -> None:
@@ -126,42 +126,42 @@ def damage(name: str, folder: Path) -> None:
 def test_a_library_that_is_damaged_is_refused_in_a_sentence(built: Path, name: str) -> None:
     damage(name, built)
     with pytest.raises(KernelsError, match=r"compiled kernels in .*; run make kernels"):
-        library.opened()
+        library.open_library()
 
 
 def test_changed_sources_are_refused_and_reworded_ones_are_not(kernels: Path) -> None:
-    text, code = sources.text_hash(kernels), sources.code_hash(kernels)
+    text, code = sources.hash_text(kernels), sources.hash_code(kernels)
     file = kernels / "arc.py"
     before = file.read_text("utf-8")
     file.write_text(before.replace('"""', '"""Reworded. ', 1) + "# A comment.\n", "utf-8")
-    assert (sources.text_hash(kernels) != text, sources.code_hash(kernels)) == (True, code)
-    library.opened()
+    assert (sources.hash_text(kernels) != text, sources.hash_code(kernels)) == (True, code)
+    library.open_library()
     file.write_text(before + "x = 1\n", "utf-8")
-    for each in (library.opened, library.manifest):
+    for each in (library.open_library, library.read_manifest):
         each.cache_clear()
     with pytest.raises(KernelsError, match="have changed since the kernels were compiled; run make kernels"):
-        library.opened()
+        library.open_library()
     file.write_text(before, "utf-8")
     file.rename(kernels / "renamed.py")
-    assert sources.code_hash(kernels) != code
+    assert sources.hash_code(kernels) != code
 
 
 def test_a_processor_has_the_library_of_its_highest_level(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    best = library.manifest()["libraries"][-1]
-    assert library.opened().name == best["file"]
+    best = library.read_manifest()["libraries"][-1]
+    assert library.open_library().name == best["file"]
     if Path("/proc/cpuinfo").exists() and best["level"]:
         flags = set(Path("/proc/cpuinfo").read_text("utf-8").partition("flags")[2].partition("\n")[0].split())
         third = {"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"} <= flags and bool({"abm", "lzcnt"} & flags)
         fourth = third and {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"} <= flags
-        assert library.opened().handle.rocking_level() == third + fourth
+        assert library.open_library().handle.rocking_level() == third + fourth
     manifest = json.loads((built / "manifest.json").read_text("utf-8"))
     manifest["libraries"][-1]["level"] = 99
     (built / "manifest.json").write_text(json.dumps(manifest), "utf-8")
-    for each in (library.opened, library.manifest):
+    for each in (library.open_library, library.read_manifest):
         each.cache_clear()
     if len(manifest["libraries"]) == 1:
         pytest.skip("this machine has one level only")
-    assert library.opened().name == manifest["libraries"][-2]["file"]
+    assert library.open_library().name == manifest["libraries"][-2]["file"]
 
 
 PROGRAM = """

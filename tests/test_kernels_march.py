@@ -88,11 +88,11 @@ def run(
     table, at, scratch = state.new_table(rows), started(rotation, velocity), new_scratch()
     ending = march(ground, block, rules, table, scratch, at)
     while ending == state.Ending.FULL and len(table) < 200_000:
-        table = state.grown(table)
+        table = state.enlarge_table(table)
         ending = march(ground, block, rules, table, scratch, at)
     nodes = table["node"][: at["nodes"]].copy()
     kept = (table[name][: at[name + "s"] if keep else 0] for name in ("impact", "event", "sequence"))
-    return Run(ending, nodes, *kept, at, Trail(ground, block, rules, state.attributed(nodes)))
+    return Run(ending, nodes, *kept, at, Trail(ground, block, rules, state.expose_fields(nodes)))
 
 
 def assert_sound(found: Run) -> None:
@@ -104,7 +104,7 @@ def assert_sound(found: Run) -> None:
     assert np.all(nodes["u"] >= 0.0)
     assert np.all(np.diff(impacts["time"]) >= 0.0)
     assert np.all(impacts["speed_after"] <= impacts["speed_before"])
-    assert all(np.isfinite(found.at[name]) for name in ("u", "v", "peak", "end"))
+    assert all(np.isfinite(found.at[name]) for name in ("u", "v", "peak", "end_time"))
 
 
 def assert_same(one: Run, other: Run) -> None:
@@ -149,7 +149,7 @@ def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, colu
         assert table[size:].tobytes() == guard
         while ending == state.Ending.FULL:
             size *= 2
-            grown = state.records(max(size, 8) + 5, state.TABLE)
+            grown = state.new_records(max(size, 8) + 5, state.TABLE)
             grown.view(np.uint8)[:] = 0xA5
             grown[: len(table) - 5] = table[: len(table) - 5]
             size = max(size, 8)
@@ -238,7 +238,7 @@ def test_a_motion_of_one_piece_may_uplift_at_its_very_start(row: list[float]) ->
 def test_a_motion_that_never_passes_a_threshold_leaves_the_block_at_rest() -> None:
     found = run(in_units_of_g([0.0, 1.0, 2.0], [[0.1, 0.04], [0.14, -0.2]]))
     assert (len(found.events), len(found.impacts), found.nodes.shape[0]) == (0, 0, 1)
-    assert found.at["end"] == 2.0
+    assert found.at["end_time"] == 2.0
 
 
 @long_uncompiled
@@ -281,7 +281,7 @@ def test_a_march_stops_in_an_arc_at_rest_and_exactly_at_an_impact(nonlinear: boo
     middle = 0.5 * (whole.impacts["time"][5] + whole.impacts["time"][6])
     for stop in (middle, impact, rest + 0.5, 1e3, whole.nodes["time"][7], whole.events["time"][0]):
         found = run(record(1), nonlinear=nonlinear, stop=stop)
-        assert (found.ending, found.at["end"]) == (state.Ending.DONE, stop)
+        assert (found.ending, found.at["end_time"]) == (state.Ending.DONE, stop)
         before = whole.impacts[whole.impacts["time"] < stop]
         assert_array_equal(found.impacts[: len(before)], before)
         assert len(found.impacts) - len(before) in ((0, 1) if stop == impact else (0,))
@@ -296,14 +296,14 @@ def test_a_march_may_stop_between_the_last_impact_resolved_and_rest() -> None:
     found = run(NO_GROUND, velocity=0.1, stop=0.5 * (last + rest))
     assert (found.ending, found.kinds) == (state.Ending.DONE, [])
     assert found.sequences["lower"][0] <= rest <= found.sequences["upper"][0]
-    assert_array_equal(found.traced(np.linspace(last, found.at["end"], 9)[2:]), np.zeros((7, 3)))
+    assert_array_equal(found.traced(np.linspace(last, found.at["end_time"], 9)[2:]), np.zeros((7, 3)))
 
 
 @long_uncompiled
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_without_loss_the_block_rocks_on_until_the_stop(nonlinear: bool) -> None:
     found = run(NO_GROUND, velocity=0.1, e=(1.0, 1.0), nonlinear=nonlinear, stop=50.0)
-    assert (found.ending, found.at["end"], len(found.sequences)) == (state.Ending.DONE, 50.0, 0)
+    assert (found.ending, found.at["end_time"], len(found.sequences)) == (state.Ending.DONE, 50.0, 0)
     assert np.max(np.abs(found.impacts["speed_after"] - 0.1)) <= 1e-13
     assert np.ptp(np.diff(found.impacts["time"])) <= 1e-12
     assert_sound(found)
@@ -316,7 +316,7 @@ def test_a_block_on_its_corner_balances() -> None:
         fallen = run(NO_GROUND, rotation=0.15 * (1.0 + ULP), nonlinear=nonlinear)
         assert (fallen.ending, fallen.kinds) == (state.Ending.OVERTURNED, [state.EventKind.OVERTURN])
         assert fallen.at["peak"] == 0.5 * math.pi
-        assert fallen.at["peak_time"] == fallen.at["end"] == fallen.events["time"][0]
+        assert fallen.at["peak_time"] == fallen.at["end_time"] == fallen.events["time"][0]
 
 
 def test_intervals_that_time_can_no_longer_tell_apart_end_a_sequence() -> None:
@@ -406,7 +406,7 @@ def test_every_march_ends_and_stays_sound(case: dict[str, object]) -> None:
 def assert_traced_well(found: Run) -> None:
     """Continuous across the nodes, zero at impacts, with the velocities of the impact table, and never NaN."""
     nodes, impacts = found.nodes, found.impacts
-    assert np.all(np.isfinite(found.traced(np.linspace(0.0, found.at["end"], 400))))
+    assert np.all(np.isfinite(found.traced(np.linspace(0.0, found.at["end_time"], 400))))
     steps = np.flatnonzero((nodes["side"][:-1] != state.AT_REST) & (nodes["side"][1:] != state.AT_REST))
     ends = nodes["time"][steps + 1]
     left, right = found.traced(ends, steps), found.traced(ends, steps + 1)
@@ -449,6 +449,6 @@ def test_the_trace_lies_still_between_the_last_arc_followed_and_rest() -> None:
 
 def test_the_trace_does_not_depend_on_the_order_of_the_times() -> None:
     found = run(record(2), nonlinear=True)
-    times = np.linspace(0.0, found.at["end"], 500)
+    times = np.linspace(0.0, found.at["end_time"], 500)
     shuffled = np.random.default_rng(0).permutation(500)
     assert_array_equal(found.traced(times[shuffled]), found.traced(times)[shuffled])

@@ -12,7 +12,7 @@ from rocking.kernels import state
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.ground import Ground
 from rocking.kernels.state import Record, new_scratch
-from rocking.kernels.uplift import next_uplift
+from rocking.kernels.uplift import find_next_uplift
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -65,7 +65,7 @@ def test_a_ball_on_a_table_at_rest_stops_bouncing_at_zenos_time(e: float, v: flo
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.9, 0.99])
 def test_a_geometric_bypass_is_exact_for_a_ball_on_a_table_at_rest(e: float) -> None:
     made = ball(e)
-    made["limit"] = 0.05
+    made["rest_limit"] = 0.05
     found, zeno = thrown(NO_GROUND, made, 1.0, rest_rule=state.RestRule.BYPASS), 2.0 / (G * (1.0 - e))
     assert found.impacts["speed_after"][-2] > 0.05 >= found.impacts["speed_after"][-1]
     assert found.events["time"] == pytest.approx([zeno], rel=1e-13)
@@ -74,7 +74,7 @@ def test_a_geometric_bypass_is_exact_for_a_ball_on_a_table_at_rest(e: float) -> 
 
 def test_a_geometric_bypass_waits_until_the_motion_presses_the_ball_down() -> None:
     made = ball(0.5)
-    made["limit"] = 1e9
+    made["rest_limit"] = 1e9
     table = in_units_of_g([0.0, 0.1], [[-1.5, 0.0]])
     found = thrown(table, made, 0.0, rest_rule=state.RestRule.BYPASS)
     start, v = 0.1, 0.5 * G * 0.1  # the table falls away and stops, and the ball comes down on it
@@ -170,7 +170,7 @@ def test_the_bracket_of_a_body_that_bounces_on_one_side_holds_its_rest(make, exa
 def test_a_march_of_a_ball_without_a_table_of_rows_is_the_same() -> None:
     ground = sine_table(0.4, 3.0, 3.0, 0.02)
     kept, alone = thrown(ground, ball(0.9), 0.5), run(ground, block=ball(0.9), velocity=0.5, rows=0, keep=False)
-    for name in ("peak", "peak_time", "impacts", "rests", "last_rest_time", "end"):
+    for name in ("peak", "peak_time", "impacts", "rests", "last_rest_time", "end_time"):
         assert kept.at[name] == alone.at[name]
 
 
@@ -181,4 +181,4 @@ def test_what_has_one_side_is_lifted_to_no_other() -> None:
         (one_sided(0.0, 1.0, -0.1, 0.5), in_units_of_g([0.0, 1.0], [[0.05, 0.0]])),
         (one_sided(0.0, 1.0, 1.0, 0.5), in_units_of_g([0.0, 1.0], [[0.05, 0.0]], vertical=[[-2.0, 0.0]])),
     ):
-        assert next_uplift(ground, body, new_scratch(), state.AT_REST, 0, 0.0, math.inf).side == 0
+        assert find_next_uplift(ground, body, new_scratch(), state.AT_REST, 0, 0.0, math.inf).side == 0

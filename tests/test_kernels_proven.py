@@ -10,7 +10,7 @@ from test_kernels_march import Run, record, run, with_rows
 
 from rocking.kernels import state
 from rocking.kernels.ground import Ground
-from rocking.kernels.rest import pass_proven_impacts
+from rocking.kernels.rest import apply_proven_impacts
 from rocking.kernels.state import PROVEN_PER_ITERATION, Record, has_space
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -26,7 +26,7 @@ def one_by_one(ground: Ground) -> Ground:
 def passed(ground: Ground, start: Record, *, rows: int = 100, left: float = 9.0, e: float = 0.9) -> Record:
     """State after the impacts that can be passed."""
     table = state.new_table(rows)
-    pass_proven_impacts(ground, rocking_block(e=(e, e)), rules_for(), table, start, left)
+    apply_proven_impacts(ground, rocking_block(e=(e, e)), rules_for(), table, start, left)
     return start
 
 

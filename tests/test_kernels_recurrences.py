@@ -11,15 +11,15 @@ from oracles.taylor import Line, Number, System, coefficients, mp
 from rocking.core.arrays import Floats
 from rocking.kernels import state
 from rocking.kernels.series import (
-    angle_coefficients,
-    linear_coefficients,
-    linear_ten,
+    expand_linear,
+    expand_nonlinear,
+    expand_weighted,
     nonlinear_coefficient,
-    nonlinear_rates,
-    nonlinear_ten,
+    nonlinear_velocity_terms,
     weighted_coefficient,
-    weighted_rates,
-    weighted_ten,
+    weighted_velocity_terms,
+    write_angle_coefficients,
+    write_linear_coefficients,
 )
 from rocking.kernels.state import ORDER, Record, new_scratch
 from rocking.kernels.trace import Quantity, Trail, expand_variation
@@ -46,7 +46,7 @@ def scratch_with(push: Line, weight: Line) -> Record:
 
 def linear_any_order(system: System, start: Start, push: Line, weight: Line) -> Series:
     scratch = scratch_with(push, weight)
-    linear_coefficients(body(system), state_of(0, *start), scratch, 1, ORDER)
+    write_linear_coefficients(body(system), state_of(0, *start), scratch, 1, ORDER)
     return list(scratch["rotation"][: ORDER + 1])
 
 
@@ -64,7 +64,7 @@ def nonlinear_any_order(system: System, start: Start, push: Line, weight: Line) 
     scratch["sine"][0], scratch["cosine"][0] = angle(system, start)
     for k in range(ORDER - 1):
         scratch["rotation"][k + 2] = nonlinear_coefficient(system.lam, scratch, (1, 1), k)
-        angle_coefficients(scratch, k)
+        write_angle_coefficients(scratch, k)
     return list(scratch["rotation"][: ORDER + 1])
 
 
@@ -78,20 +78,20 @@ def pushed(system: System, push: Line) -> Line:
 
 def linear_nine(system: System, start: Start, push: Line, weight: Line) -> Series:
     gain = float(system.gained)
-    return list(linear_ten(*start, system.lam, gain * (system.alpha + push[0]), gain * push[1]))
+    return list(expand_linear(*start, system.lam, gain * (system.alpha + push[0]), gain * push[1]))
 
 
 def weighted_nine(system: System, start: Start, push: Line, weight: Line) -> Series:
     at_rest = float(system.gained) * system.alpha
-    return list(weighted_ten(*start, system.lam, at_rest, pushed(system, push), weight))
+    return list(expand_weighted(*start, system.lam, at_rest, pushed(system, push), weight))
 
 
 def nonlinear_nine(system: System, start: Start, push: Line, weight: Line) -> Series:
-    return list(nonlinear_ten(start, angle(system, start), system.lam, push, weight)[0])
+    return list(expand_nonlinear(start, angle(system, start), system.lam, push, weight)[0])
 
 
 def nonlinear_nine_at_rest(system: System, start: Start, push: Line, weight: Line) -> Series:
-    return list(nonlinear_ten(start, angle(system, start), system.lam, push, None)[0])
+    return list(expand_nonlinear(start, angle(system, start), system.lam, push, None)[0])
 
 
 def integrated(u: float, rates: tuple[float, ...]) -> Series:
@@ -100,16 +100,20 @@ def integrated(u: float, rates: tuple[float, ...]) -> Series:
 
 def weighted_lanes(system: System, start: Start, push: Line, weight: Line) -> Series:
     z = system.lam * start[0] - float(system.gained) * system.alpha
-    nine, *others = weighted_rates(start[1], z, system.lam, pushed(system, push), weight)
+    nine, *others = weighted_velocity_terms(start[1], z, system.lam, pushed(system, push), weight)
     return integrated(start[0], (*nine, *others))
 
 
 def nonlinear_lanes(system: System, start: Start, push: Line, weight: Line) -> Series:
-    return integrated(start[0], nonlinear_rates(start[1], angle(system, start), -0.5 * system.lam, push, weight)[0])
+    return integrated(
+        start[0], nonlinear_velocity_terms(start[1], angle(system, start), -0.5 * system.lam, push, weight)[0]
+    )
 
 
 def nonlinear_lanes_at_rest(system: System, start: Start, push: Line, weight: Line) -> Series:
-    return integrated(start[0], nonlinear_rates(start[1], angle(system, start), -0.5 * system.lam, push, None)[0])
+    return integrated(
+        start[0], nonlinear_velocity_terms(start[1], angle(system, start), -0.5 * system.lam, push, None)[0]
+    )
 
 
 #: Each with the number of terms that it has, and whether the weight changes.
@@ -195,9 +199,9 @@ def test_the_variation_along_an_arc_is_the_derivative_by_what_is_changed(
         lift = random.uniform(-0.5, 0.5, degree + 1) / h ** np.arange(degree + 1.0) if weighted else np.zeros(1)
         block = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
         ground = in_units_of_g([0.0, 9.0], [push], vertical=[lift] if weighted else None)
-        trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.records(0, state.NODE_ROW))
-        node = state.record(state.NODE_ROW, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
-        work = state.record(state.VARIATION)
+        trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.new_records(0, state.NODE_ROW))
+        node = state.new_record(state.NODE_ROW, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
+        work = state.new_record(state.VARIATION)
         order = expand_variation(trail, new_scratch(), work, node, quantity, (du, dv, 0.0), h)
         name, _, of_side = quantity.name.partition("_")
         of_this = Quantity[name] if of_side in ("", ("PLUS", "MINUS")[side]) else Quantity.NOTHING

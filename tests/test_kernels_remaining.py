@@ -10,8 +10,14 @@ from oracles import multiprecision, one_piece
 from oracles.cases import between
 from oracles.problem import Problem
 
-from rocking.kernels.remaining import Restoring, deviation, ratio, refined_bracket, remaining_time
-from rocking.kernels.rest import LARGEST_BETA, LARGEST_GAMMA, proven_arc
+from rocking.kernels.remaining import (
+    ImpactSide,
+    bound_ratio,
+    bound_restoring_error,
+    estimate_remaining_time,
+    refine_bracket,
+)
+from rocking.kernels.rest import MAX_BETA, MAX_GAMMA, solve_proven_arc
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -24,7 +30,7 @@ quick = settings(
 )
 few = settings(deadline=None, max_examples=12)
 
-Sides = tuple[Restoring, Restoring]
+Sides = tuple[ImpactSide, ImpactSide]
 
 
 def signed(low: float, high: float) -> st.SearchStrategy[float]:
@@ -44,7 +50,7 @@ def sequences(draw: st.DrawFn, *, weakest: float = -5.0, bent: bool = True) -> t
     v = 10.0 ** draw(between(-6.0, 0.0))
     s = 2.0 * v * (1.0 / g[0] + e[0] / g[1]) / (1.0 - e[0] * e[1])
     sides = [
-        Restoring(
+        ImpactSide(
             g[k],
             draw(signed(weakest, -0.3)) * g[k] / s,
             draw(signed(weakest, -0.6)) * g[k] / s**2 if bent else 0.0,
@@ -65,7 +71,7 @@ def exact(v: float, sides: Sides) -> one_piece.Number:
 @given(sequences())
 def test_the_bracket_holds_the_time_to_rest(case: tuple[float, Sides]) -> None:
     v, sides = case
-    lower, upper = refined_bracket(v, *sides, FOREVER)
+    lower, upper = refine_bracket(v, *sides, FOREVER)
     event("proven" if upper > 0.0 else "not proven")
     assume(upper > 0.0)
     assert lower <= exact(v, sides) <= upper
@@ -75,12 +81,12 @@ def test_the_bracket_holds_the_time_to_rest(case: tuple[float, Sides]) -> None:
 @pytest.mark.parametrize("stiffness", [9.0, 0.0, -9.0])
 @pytest.mark.parametrize("one_sided", [True, False])
 def test_width_and_error_fall_with_the_fifth_power_of_the_speed(stiffness: float, one_sided: bool) -> None:
-    i = Restoring(2.0, 30.0, 40.0, stiffness, 0.8, 0.0)
-    j = i if one_sided else Restoring(1.5, -40.0, 20.0, 1.5 * stiffness, 0.7, 0.0)
+    i = ImpactSide(2.0, 30.0, 40.0, stiffness, 0.8, 0.0)
+    j = i if one_sided else ImpactSide(1.5, -40.0, 20.0, 1.5 * stiffness, 0.7, 0.0)
     speeds = 2e-4 * 0.5 ** np.arange(4)
     widths, errors = [], []
     for v in speeds:
-        lower, upper = refined_bracket(v, i, j, FOREVER)
+        lower, upper = refine_bracket(v, i, j, FOREVER)
         widths.append(upper - lower)
         errors.append(abs(float(exact(v, (i, j)) - 0.5 * (lower + upper))))
     assert np.diff(np.log2(widths)) == pytest.approx(-5.0, abs=0.25)
@@ -94,10 +100,10 @@ def test_a_body_without_stiffness_under_a_constant_motion_rests_at_the_geometric
     v, sides = case
     i, j = (side._replace(rate=0.0, curvature=0.0, stiffness=0.0) for side in sides)
     expected = 2.0 * v / (1.0 - i.restitution * j.restitution) * (1.0 / i.g + i.restitution / j.g)
-    lower, upper = refined_bracket(v, i, j, FOREVER)
+    lower, upper = refine_bracket(v, i, j, FOREVER)
     assert lower <= expected * (1.0 + 1e-14) and expected * (1.0 - 1e-14) <= upper
     assert upper - lower <= 1e-10 * expected
-    assert remaining_time(v, i, j) == pytest.approx(expected, rel=1e-13)
+    assert estimate_remaining_time(v, i, j) == pytest.approx(expected, rel=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -110,10 +116,10 @@ def test_a_body_without_stiffness_under_a_constant_motion_rests_at_the_geometric
     ],
 )
 def test_the_estimate_is_accurate_to_its_order(stiffness: float, slope: float, order: int) -> None:
-    i = Restoring(1.0, 4.0 * slope, 0.0, stiffness, 0.7, 0.0)
-    j = Restoring(1.3, -9.0 * slope, 0.0, 2.0 * stiffness, 0.5, 0.0)
+    i = ImpactSide(1.0, 4.0 * slope, 0.0, stiffness, 0.7, 0.0)
+    j = ImpactSide(1.3, -9.0 * slope, 0.0, 2.0 * stiffness, 0.5, 0.0)
     speeds = (0.001 if slope else 0.02) * 0.5 ** np.arange(4)
-    errors = [abs(float(exact(v, (i, j)) - remaining_time(v, i, j))) for v in speeds]
+    errors = [abs(float(exact(v, (i, j)) - estimate_remaining_time(v, i, j))) for v in speeds]
     assert np.diff(np.log2(errors)) == pytest.approx(-order, abs=0.2)
 
 
@@ -149,9 +155,9 @@ def test_the_bracket_holds_the_time_to_rest_under_any_disturbance_within_the_err
     shape: str, sign: float, e: tuple[float, float], rate: float
 ) -> None:
     v, size = 1e-3, 1e-7
-    i, j = Restoring(2.0, rate, 0.0, 0.0, e[0], size), Restoring(1.5, -rate, 0.0, 0.0, e[1], size)
-    lower, upper = refined_bracket(v, i, j, FOREVER)
-    plain_lower, plain_upper = refined_bracket(v, i._replace(error=0.0), j._replace(error=0.0), FOREVER)
+    i, j = ImpactSide(2.0, rate, 0.0, 0.0, e[0], size), ImpactSide(1.5, -rate, 0.0, 0.0, e[1], size)
+    lower, upper = refine_bracket(v, i, j, FOREVER)
+    plain_lower, plain_upper = refine_bracket(v, i._replace(error=0.0), j._replace(error=0.0), FOREVER)
     rest = disturbed_rest(v, (i, j), sign * size, shape)
     assert lower <= rest <= upper
     if shape == "swing" and rate == 0.0:
@@ -163,12 +169,12 @@ def test_the_bracket_holds_the_time_to_rest_under_any_disturbance_within_the_err
 @given(sequences(weakest=-3.0), st.sampled_from([1.0, -1.0]))
 def test_a_curvature_left_out_is_an_error_of_its_own(case: tuple[float, Sides], sign: float) -> None:
     v, sides = case
-    T = 1.5 * remaining_time(v, sides[0]._replace(rate=0.0), sides[1]._replace(rate=0.0))
+    T = 1.5 * estimate_remaining_time(v, sides[0]._replace(rate=0.0), sides[1]._replace(rate=0.0))
     known = [
         side._replace(curvature=0.0, rate=0.1 * side.rate, stiffness=0.0, error=abs(side.curvature) * T * T)
         for side in sides
     ]
-    lower, upper = refined_bracket(v, known[0], known[1], T)
+    lower, upper = refine_bracket(v, known[0], known[1], T)
     assume(upper > 0.0)
     true = [one._replace(curvature=sign * abs(side.curvature)) for one, side in zip(known, sides, strict=True)]
     assert lower <= exact(v, (true[0], true[1])) <= upper
@@ -187,8 +193,10 @@ def nonlinear_sides(problem: Problem, v: float, window: float, first: int) -> Si
         most = max(abs(here), abs(here + slope * window))
         least = min(g, g + rate * window)
         height = 1.1 * v * v / least
-        error = deviation(0.0, square * abs(slope) * math.sin(alpha) * window, square * math.hypot(1.0, most), height)
-        sides.append(Restoring(g, rate, 0.0, stiffness, e, error))
+        error = bound_restoring_error(
+            0.0, square * abs(slope) * math.sin(alpha) * window, square * math.hypot(1.0, most), height
+        )
+        sides.append(ImpactSide(g, rate, 0.0, stiffness, e, error))
     return sides[0], sides[1]
 
 
@@ -212,7 +220,7 @@ def test_the_bracket_holds_the_time_to_rest_of_a_nonlinear_block(
     window = 3.0 * v / (1.0 - e[0] * e[1]) * sum(1.0 / problem.restoring(0.0, i) for i in (1, -1))
     assume(min(problem.restoring(window, i) for i in (1, -1)) > 0.0)
     i, j = nonlinear_sides(problem, v, window, first)
-    lower, upper = refined_bracket(v, i, j, window)
+    lower, upper = refine_bracket(v, i, j, window)
     assume(upper > 0.0)
     assert lower <= multiprecision.rest_time(problem, 0.0, first, v) <= upper
 
@@ -222,19 +230,19 @@ def test_the_bracket_holds_the_time_to_rest_of_a_nonlinear_block(
 def test_what_a_nonlinear_block_deviates_by_is_bounded_closely(alpha: float, a: float, height: float) -> None:
     g = math.sin(alpha) + a * math.cos(alpha)
     stiffness = math.cos(alpha) - a * math.sin(alpha)
-    bound = deviation(0.0, 0.0, math.hypot(1.0, a), height)
+    bound = bound_restoring_error(0.0, 0.0, math.hypot(1.0, a), height)
     for u in np.linspace(0.0, height, 7):
         G = math.sin(alpha - u) + a * math.cos(alpha - u)
         assert abs(G - (g - stiffness * u)) <= bound + 1e-15
     steep = math.atan2(1.0, abs(a))
     worst = math.sin(steep - 1e-3) + abs(a) * math.cos(steep - 1e-3)
     linear = math.sin(steep) + abs(a) * math.cos(steep) - 1e-3 * (math.cos(steep) - abs(a) * math.sin(steep))
-    assert abs(worst - linear) == pytest.approx(deviation(0.0, 0.0, math.hypot(1.0, a), 1e-3), rel=1e-5)
+    assert abs(worst - linear) == pytest.approx(bound_restoring_error(0.0, 0.0, math.hypot(1.0, a), 1e-3), rel=1e-5)
 
 
 def test_nothing_is_claimed_where_a_hypothesis_fails() -> None:
-    side = Restoring(2.0, 10.0, 0.0, 9.0, 0.9, 0.0)
-    fine = refined_bracket(1e-4, side, side, FOREVER)
+    side = ImpactSide(2.0, 10.0, 0.0, 9.0, 0.9, 0.0)
+    fine = refine_bracket(1e-4, side, side, FOREVER)
     assert fine[1] > fine[0] > 0.0
     bad = [
         (1e-4, side, side, 0.99 * fine[1]),
@@ -252,25 +260,25 @@ def test_nothing_is_claimed_where_a_hypothesis_fails() -> None:
         (math.inf, side, side, FOREVER),
     ]
     for v, i, j, window in bad:
-        assert all(math.isnan(bound) for bound in refined_bracket(v, i, j, window)), (v, i, j, window)
+        assert all(math.isnan(bound) for bound in refine_bracket(v, i, j, window)), (v, i, j, window)
 
 
 @many
 @given(between(-6.0, 1.0), between(-1.0, 1.3), between(-1.0, 1.0), between(-1.0, 1.0))
 def test_an_arc_of_a_proven_sequence_is_right_to_a_few_ulp(size: float, pull: float, beta: float, gamma: float) -> None:
     v, g = 10.0**size, 10.0**pull
-    rate = beta * (1.0 - 1e-12) * LARGEST_BETA * g * g / v
-    stiffness = gamma * (1.0 - 1e-12) * LARGEST_GAMMA * (g / v) ** 2
-    tau, w = proven_arc(v, g, rate, stiffness)
+    rate = beta * (1.0 - 1e-12) * MAX_BETA * g * g / v
+    stiffness = gamma * (1.0 - 1e-12) * MAX_GAMMA * (g / v) ** 2
+    tau, w = solve_proven_arc(v, g, rate, stiffness)
     true_tau, true_w = one_piece.arc(one_piece.mp.mpf(v), one_piece.mp.mpf(0), (g, rate, 0.0, stiffness, 1.0))
     assert abs(tau / true_tau - 1) <= 3 * 2.0**-52
     assert abs(w / true_w - 1) <= 2.0**-52
 
 
 def test_an_arc_out_of_the_reach_of_its_sums_is_refused() -> None:
-    assert math.isnan(proven_arc(1.0, 1.0, 1.01 * LARGEST_BETA, 0.0)[0])
-    assert math.isnan(proven_arc(1.0, 1.0, 0.0, -1.01 * LARGEST_GAMMA)[0])
-    assert math.isnan(proven_arc(1.0, 0.0, 0.0, 0.0)[0])
+    assert math.isnan(solve_proven_arc(1.0, 1.0, 1.01 * MAX_BETA, 0.0)[0])
+    assert math.isnan(solve_proven_arc(1.0, 1.0, 0.0, -1.01 * MAX_GAMMA)[0])
+    assert math.isnan(solve_proven_arc(1.0, 0.0, 0.0, 0.0)[0])
 
 
 @quick
@@ -283,17 +291,17 @@ def test_the_estimate_without_stiffness_under_a_constant_motion_is_the_geometric
     v: float, g: tuple[float, float], e: tuple[float, float]
 ) -> None:
     expected = 2.0 * v / (1.0 - e[0] * e[1]) * (1.0 / g[0] + e[0] / g[1])
-    sides = [Restoring(g[k], 0.0, 0.0, 0.0, e[k], 0.0) for k in range(2)]
-    assert remaining_time(v, *sides) == pytest.approx(expected, rel=1e-14)
+    sides = [ImpactSide(g[k], 0.0, 0.0, 0.0, e[k], 0.0) for k in range(2)]
+    assert estimate_remaining_time(v, *sides) == pytest.approx(expected, rel=1e-14)
 
 
 def test_the_ratio_of_remaining_times_allows_for_every_term_and_shift():
     """Each by what it is, but a small margin."""
     none = (0.0, 0.0, 0.0)
-    assert ratio((0.5, 0.0, 0.0, 0.0), none, none) == 0.5
+    assert bound_ratio((0.5, 0.0, 0.0, 0.0), none, none) == 0.5
     for k, term in ((1, 0.2), (2, 0.1), (3, -0.05)):
         series = tuple(0.5 if j == 0 else term if j == k else 0.0 for j in range(4))
-        assert abs(term) < ratio(series, none, none) - 0.5 < 1.5 * abs(term)
+        assert abs(term) < bound_ratio(series, none, none) - 0.5 < 1.5 * abs(term)
     for shift, following in (((0.1, 0.0, 0.0), none), ((0.0, 0.1, 0.0), none), (none, (0.0, 0.1, 0.0))):
-        assert ratio((0.5, 0.0, 0.0, 0.0), shift, following) == pytest.approx(0.6)
-    assert math.isnan(ratio((0.5, 0.6, 0.0, 0.0), none, none))
+        assert bound_ratio((0.5, 0.0, 0.0, 0.0), shift, following) == pytest.approx(0.6)
+    assert math.isnan(bound_ratio((0.5, 0.6, 0.0, 0.0), none, none))

@@ -13,7 +13,7 @@ from oracles.problem import Problem
 import rocking
 from rocking.core.constants import Model
 from rocking.kernels import state
-from rocking.kernels.arc import restoring
+from rocking.kernels.arc import restoring_acceleration
 from rocking.kernels.state import Record
 from rocking.kernels.trace import Quantity, Trail, rest_shift
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
 
 def node_of(side: int, u: float, v: float, time: float = 0.0) -> Record:
-    return state.record(state.NODE_ROW, time=time, piece=0, offset=time, side=side, u=u, v=v)
+    return state.new_record(state.NODE_ROW, time=time, piece=0, offset=time, side=side, u=u, v=v)
 
 
 @pytest.mark.cases(fast=8)
@@ -49,9 +49,9 @@ def test_the_shift_of_the_rest_is_its_derivative_by_what_is_changed(model: str, 
         return multiprecision.rest_time(changed, start + strength * shift, 1 - 2 * side, v + strength * faster)
 
     block = block_of(problem)
-    dv = faster + restoring(ground_of(problem), block, side, 0, start) * shift
+    dv = faster + restoring_acceleration(ground_of(problem), block, side, 0, start) * shift
     trail = Trail(
-        ground_of(problem), block, rules_for(nonlinear=model == "nonlinear"), state.records(0, state.NODE_ROW)
+        ground_of(problem), block, rules_for(nonlinear=model == "nonlinear"), state.new_records(0, state.NODE_ROW)
     )
     # What happens to the speed at the impact itself is in dv.
     node, later = node_of(side, 0.0, v, start), node_of(state.AT_REST, 0.0, 0.0, start + 1e-4)

@@ -112,7 +112,7 @@ def test_a_tolerance_below_all_rounding_proves_the_rest_that_a_wider_one_proves(
     for tolerance in (1e-30, 1e-80, 1e-300):
         found = simulate(block, None, model=model, initial_rotation=0.05, chattering=Certified(tolerance))
         (row,), (proof,) = found.sequences, found.solution.sequences
-        assert found.stalled == 0
+        assert found.rests_by_rounding == 0
         assert row["start"] == known["start"]
         assert row["lower"] <= proof["lower"] <= row["end"] <= proof["upper"] <= row["upper"]
         assert proof["upper"] <= proof["lower"] + 1e-11

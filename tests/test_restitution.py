@@ -19,7 +19,7 @@ from rocking import (
     one_sided_restitution,
 )
 from rocking.block import housner_restitution
-from rocking.kernels.events import factor, uniform
+from rocking.kernels.events import draw_uniform, restitution_factor
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -113,18 +113,18 @@ def test_draws_are_those_of_philox():
         (0x243F6A88, 0x85A308D3, 0x13198A2E, 0xDD7CE038, 0xF62A4C12),
     ]
     for low, high, key, first, second in known:
-        drawn = uniform(key + ((high & 0x7FFFFFFF) << 32), low)
+        drawn = draw_uniform(key + ((high & 0x7FFFFFFF) << 32), low)
         if high <= 0x7FFFFFFF:
             assert drawn == ((first >> 5) * 2**26 + (second >> 6)) / 2**53
         if high > 0x7FFFFFFF:  # seeds end below: Python's integers, of which the same code makes the same bits
-            assert uniform(key + (high << 32), low) == ((first >> 5) * 2**26 + (second >> 6)) / 2**53
-            assert drawn == uniform(key + ((high & 0x7FFFFFFF) << 32), low)
+            assert draw_uniform(key + (high << 32), low) == ((first >> 5) * 2**26 + (second >> 6)) / 2**53
+            assert drawn == draw_uniform(key + ((high & 0x7FFFFFFF) << 32), low)
 
 
 def test_draws_are_even_between_their_bounds():
     block = rocking_block(e=(0.9, 0.8))
     block["variable_restitution"], block["seed"], block["min_restitution"] = True, 7, (0.5, 0.6)
-    draws = np.array([factor(block, 0, 1.0, n) for n in range(2_000)])
+    draws = np.array([restitution_factor(block, 0, 1.0, n) for n in range(2_000)])
     assert draws.min() >= 0.5
     assert draws.max() <= 0.9
     assert np.histogram(draws, 8, (0.5, 0.9))[0] == pytest.approx([250.0] * 8, abs=60)

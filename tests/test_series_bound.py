@@ -8,7 +8,7 @@ from kernel_records import in_units_of_g, rocking_block, rules_for, state_of
 from oracles.taylor import System, angles, coefficients, mp
 
 from rocking.kernels import arc, series
-from rocking.kernels.arc import ORDER, evaluate, expand
+from rocking.kernels.arc import ORDER, evaluate_series, expand_arc
 from rocking.kernels.state import new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -55,14 +55,14 @@ def test_a_series_ends_where_what_it_leaves_out_is_nothing(nonlinear: bool, case
         block = rocking_block((1.0, 1.0), (alpha, alpha), nonlinear=nonlinear)
         ground = in_units_of_g([0.0, 1e3], [push], vertical=[[weight[0] - 1.0, *weight[1:]]])
         scratch, start = new_scratch(), state_of(0, u, v, peak=2.0)
-        order, h, _ = expand(ground, block, rules_for(nonlinear=nonlinear), scratch, start, 1.0)
+        order, h, _ = expand_arc(ground, block, rules_for(nonlinear=nonlinear), scratch, start, 1.0)
         c = coefficients(System(1.0, alpha, nonlinear), u, v, push, weight, terms)
         rates = [k * c[k] * mp.mpf(h) ** k for k in range(1, terms)]
         assert abs(rates[-1]) + abs(rates[-2]) + abs(rates[-9]) <= mp.mpf("1e-25") * max(map(abs, rates))
         largest = float(max(abs(x) for x in rates))
         # Weight and push each round by themselves, and may cancel.
         pulls = h * h * (sum(map(abs, push)) + alpha * sum(map(abs, weight)))
-        _, found, _ = evaluate(scratch["rotation"], order, h)
+        _, found, _ = evaluate_series(scratch["rotation"], order, h)
         assert abs(found * h - float(sum(rates))) <= 1e-15 * (largest + pulls)
         left_out = float(sum(abs(x) for x in rates[order:]))
         assert left_out <= 2.0**-53 * largest
@@ -91,9 +91,9 @@ def test_the_bound_holds_all_that_a_series_leaves_out(nonlinear: bool, order: in
             sine, cosine = angles(alpha, c, order)
             scratch["sine"][:order] = [float(x) for x in sine[:order]]
             scratch["cosine"][:order] = [float(x) for x in cosine[:order]]
-            bound, _ = arc.truncation_nonlinear(scratch, 1.0, (len(push) - 1, len(weight) - 1), order, h)
+            bound, _ = arc.bound_nonlinear_truncation(scratch, 1.0, (len(push) - 1, len(weight) - 1), order, h)
         else:
-            bound, _ = arc.truncation_linear(scratch, 1.0, len(weight) - 1, order, h)
+            bound, _ = arc.bound_linear_truncation(scratch, 1.0, len(weight) - 1, order, h)
         left_out = float(mp.fsum(abs(k * c[k]) * mp.mpf(h) ** k for k in range(order + 1, terms)))
         if math.isinf(bound):
             continue
@@ -120,13 +120,13 @@ def test_the_bound_of_nine_terms_is_that_of_any_number(count: int) -> None:
         scratch["rotation"][1:10] = sizes / np.arange(1.0, 10.0)
         scratch["sine"][:8], scratch["cosine"][:8] = sine, cosine
         scratch["ground"][:2], scratch["weight"][:2] = push, weight
-        lam, strength = 10.0 ** random.uniform(-4.0, -0.7), series.strength_of(weight, push, 1.0)
+        lam, strength = 10.0 ** random.uniform(-4.0, -0.7), series.sum_forcing(weight, push, 1.0)
         angles = np.abs(sine[1:]) + np.abs(cosine[1:])
         if sizes.sum() > 0.25 or lam * strength[0] > 0.25 or angles.sum() > 0.4:
             continue
         judged += 1
-        bound, _ = arc.truncation_nonlinear(scratch, lam, (1, 1), 9, 1.0)
-        nothing, rest = series.truncation_is_negligible(tuple(sizes), tuple(angles), lam, strength)
+        bound, _ = arc.bound_nonlinear_truncation(scratch, lam, (1, 1), 9, 1.0)
+        nothing, rest = series.has_negligible_truncation(tuple(sizes), tuple(angles), lam, strength)
         assert rest == pytest.approx(np.arange(2.0, 9.0) @ sizes[2:])
         if nothing:
             negligible += 1

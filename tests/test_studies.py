@@ -478,7 +478,7 @@ COLUMNS = [
         "time_at_rest_s",
         "complete_chattering",
     ),
-    *("stalled", "leans", "unfinished", "stopped"),
+    *("rests_by_rounding", "leans", "unfinished", "stopped"),
 ]
 
 

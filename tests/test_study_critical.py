@@ -52,7 +52,7 @@ def test_changes_lie_between_neighbouring_scales_whose_verdicts_are_known(comple
     known = ~(results.unfinished | results.stopped).values
     holds = results.overturned.values
     if verdict == "complete_chattering":
-        known = (known | (results.rests > 0).values) & (results.stalled == 0).values
+        known = (known | (results.rests > 0).values) & (results.rests_by_rounding == 0).values
         holds = results.complete_chattering.values
     assert as_rows(found, above, results) == changes(holds, known)
     assert found.sizes["change"] >= 68

@@ -248,7 +248,7 @@ def test_a_push_that_only_rounding_makes_is_no_push_and_calls_the_side_ambiguous
     exact = Motion.from_points([0.0, 0.25, 0.5], [0.0, rounded.acceleration(0.25), 0.0])
     found, known = (rocking.simulate(block, motion.with_vertical(lift), model=model) for motion in (rounded, exact))
     assert found.events["side"][0] == known.events["side"][0] and found.events["time"][0] == 0.0
-    assert (found.near_ties, known.near_ties) == (1, 0)
+    assert (found.rounding_decisions, known.rounding_decisions) == (1, 0)
     assert found.ambiguous
 
 

@@ -154,7 +154,7 @@ def simulated(case: dict[str, Any], chattering: Any) -> Any:
 def solved(case: dict[str, Any]) -> dict[str, Any] | None:
     """Return impacts and rests; None if it overturns."""
     certified, followed = simulated(case, "certified"), simulated(case, rocking.VelocityThreshold(1e-8))
-    if certified.overturned or certified.stalled or certified.unfinished:
+    if certified.overturned or certified.rests_by_rounding or certified.unfinished:
         return None
     ends = certified.sequences["end"]
     rests = ends[ends <= case["duration"]]

@@ -117,7 +117,7 @@ def _apart(part: int, *library: Path) -> str:
 def elsewhere(part: int) -> Iterator[tuple[str, str]]:
     """Digests with kernels that numba compiles, and with the libraries up to each level that were built."""
     yield "kernels compiled by numba", _apart(part)
-    manifest = library.manifest()
+    manifest = library.read_manifest()
     for count, highest in enumerate(manifest["libraries"], 1):
         with tempfile.TemporaryDirectory() as name:
             folder = shutil.copytree(library.FOLDER, Path(name, "built"))

@@ -14,7 +14,7 @@ from typing import Final
 from oracles.rounding import COMPILING, FUSED, PRODUCTS, RELAXED, optimised, translated
 
 from promises.promise import ABOVE_ENSEMBLES, Found, Promise
-from rocking.kernels.signatures import signatures
+from rocking.kernels.signatures import sample_arguments
 
 #: Products that a kernel has at least, on an average: with fewer the program would look at something else.
 _PRODUCTS: Final = 20
@@ -26,7 +26,7 @@ def judge(part: int) -> Found:
     with tempfile.TemporaryDirectory() as name:
         middle = translated(Path(name))
         relaxed = RELAXED.findall(middle)
-        if relaxed or middle.count("fmul double") < _PRODUCTS * len(signatures()):
+        if relaxed or middle.count("fmul double") < _PRODUCTS * len(sample_arguments()):
             found.fail(f"LLVM's code: {middle.count('fmul double')} products; relaxed: {sorted({*relaxed})[:5]}")
         for level in runpy.run_path(str(COMPILING / "libraries.py"))["LEVELS"]:
             _judge(found, f"the library for {level}", optimised(Path(name), level))
@@ -34,7 +34,7 @@ def judge(part: int) -> Found:
 
 
 def _judge(found: Found, what: str, machine: str) -> None:
-    kernels, products, fused = len(signatures()), len(PRODUCTS.findall(machine)), FUSED.findall(machine)
+    kernels, products, fused = len(sample_arguments()), len(PRODUCTS.findall(machine)), FUSED.findall(machine)
     found.cases += kernels
     found.judged += kernels
     found.notes[f"products, {what}"] += products

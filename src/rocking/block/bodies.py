@@ -224,14 +224,14 @@ class Blocks:
     def kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
         """Return records for kernels (`kernels.state.BLOCK`), shape (n,)."""
         p, alpha = self.p, self.alpha
-        made = state.records(len(self), state.BLOCK)
+        made = state.new_records(len(self), state.BLOCK)
         stiffness, cosine = p * p, np.cos(alpha)
         made["stiffness"], made["slenderness"] = stiffness, alpha
         made["sine"], made["cosine"] = np.sin(alpha), cosine
         made["threshold"] = alpha if model == "linear" else np.tan(alpha)
         made["threshold_slope"] = stiffness if model == "linear" else stiffness * cosine
         made["restitution"] = self.restitution
-        made["limit"] = thresholds
+        made["rest_limit"] = thresholds
         made["next_side"] = (1, 0)
         made["overturn_angle"] = 0.5 * math.pi
         if self.terms:
@@ -263,9 +263,9 @@ class Blocks:
         if np.any(made["yielding"]):  # at first such a tendon is elastic
             for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
                 made[f"base_{name.removeprefix('added_')}"] = made[name]
-            made["tendon"] = p * p * term["stiffness"]
+            made["tendon_stiffness"] = p * p * term["stiffness"]
             made["lever_arm"] = term["opening"]
-            made["yields"], made["slack"] = term["yields"][:, 0], term["slack"][:, 0]
+            made["yield_elongation"], made["slack_elongation"] = term["yields"][:, 0], term["slack"][:, 0]
             stiff, at_rest = term["stiffness"] * term["opening"], -term["stiffness"] * term["slack"]
             made["tendon_weight"] = -stiff * (1.0 if model == "linear" else cosine)
             made["tendon_push"] = stiff * (self.alpha if model == "linear" else sine)
@@ -273,7 +273,15 @@ class Blocks:
             made["added_push"] += made["tendon_push"]
             made["prestress"] += p * p * at_rest
             made["restraint_threshold"] += at_rest / across
-        names = ("restraint_threshold", "added_weight", "added_push", "prestress", "spring", "damping", "tendon")
+        names = (
+            "restraint_threshold",
+            "added_weight",
+            "added_push",
+            "prestress",
+            "spring",
+            "damping",
+            "tendon_stiffness",
+        )
         made["restrained"] = np.any([np.any(made[name] != 0.0, axis=1) for name in names], axis=0)
 
     @property

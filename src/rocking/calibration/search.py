@@ -74,7 +74,7 @@ def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
     powers = np.ascontiguousarray(np.vstack([(precision * centre).T, -0.5 * precision.T, constant]))
     factors = np.hstack([from_middle, from_middle**2, np.ones((len(points), 1))])
     found = np.empty(len(points))
-    kernel.log_density(factors, powers, np.empty(len(populations)), found)
+    kernel.write_log_sums(factors, powers, np.empty(len(populations)), found)
     return np.asarray(found - np.log(len(populations)))
 
 
@@ -165,7 +165,9 @@ class Evidence:
 
         def weigh(start: int, end: int) -> None:
             exponents = np.empty(powers.shape[1], np.float32)
-            kernel.shares(factors[start:end], powers, overturned, exponents, found[start:end], effective[start:end])
+            kernel.write_overturned_fractions(
+                factors[start:end], powers, overturned, exponents, found[start:end], effective[start:end]
+            )
 
         each = max(-(-len(populations) // thread_count()), 16)
         starts = range(0, len(populations), each)

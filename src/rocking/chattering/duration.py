@@ -33,9 +33,9 @@ from rocking.core.threads import in_threads
 from rocking.engine.schemes import critical_amplitudes_by
 from rocking.engine.tasks import require_finished
 from rocking.errors import InvalidOption, Unfinished
-from rocking.kernels.sine import Verdict
+from rocking.kernels.sine import SequenceStatus
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
-from rocking.kernels.sine.sequence import resolve, rest_phases, semianalytical_phases
+from rocking.kernels.sine.sequence import resolve_impacts, write_rest_phases, write_semianalytical_phases
 from rocking.simulation.simulate import simulate
 
 #: Sequences per task of a thread.
@@ -225,7 +225,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     while True:
         status, impacts, phases = _resolved(amplitude, frequency, restitution, tolerance, capacity)
         stays = impacts.size > 1 and not impacts["time"][-1] > impacts["time"][impacts.size // 2]
-        if status != Verdict.UNRESOLVED or impacts.size < capacity or stays:
+        if status != SequenceStatus.UNRESOLVED or impacts.size < capacity or stays:
             break
         capacity *= 2
         if capacity > _LARGEST_CAPACITY:
@@ -233,14 +233,14 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
                 f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower {{}} = {eta!r}", "eta", value=eta
             )
     # This late, the amplitude may be within rounding of the critical one.
-    if status == Verdict.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - 1e-6):
+    if status == SequenceStatus.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - 1e-6):
         # If rounding decides, the outcome of `chattering_time` counts.
         settled = float(chattering_time(amplitude, frequency, restitution))
-        if status != Verdict.FOUND and math.isfinite(settled):
+        if status != SequenceStatus.FOUND and math.isfinite(settled):
             impacts = impacts[impacts["time"] < settled]
             return ChatteringSequence(impacts, True, settled, float(impacts["time"].max(initial=0.0)), half_period)
-        status = status if math.isfinite(settled) else Verdict.INCOMPLETE
-    if status == Verdict.FOUND:
+        status = status if math.isfinite(settled) else SequenceStatus.INCOMPLETE
+    if status == SequenceStatus.FOUND:
         return ChatteringSequence(impacts, True, *phases)
     return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
 
@@ -291,7 +291,7 @@ def _resolved(
 ) -> tuple[int, NDArray[np.void], tuple[float, float, float]]:
     """Return the status (UNRESOLVED if the capacity is exhausted), impacts, and time of rest with its bracket."""
     table = np.zeros(capacity, RESOLVED)
-    status, count, rest, lower, upper = resolve(a - 1.0, 1.0 / (omega * omega), eta, tolerance, table)
+    status, count, rest, lower, upper = resolve_impacts(a - 1.0, 1.0 / (omega * omega), eta, tolerance, table)
     table = table[:count]
     impacts = np.zeros(count, IMPACT)
     impacts["interval"] = table["interval"] / omega
@@ -310,9 +310,9 @@ def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     def part(start: int) -> None:
         some = rock[start : start + _PART]
         phases, statuses = np.zeros(some.size), np.zeros(some.size, np.int8)
-        rest_phases((amplitudes[some], frequencies[some], restitutions[some]), phases, statuses)
-        phases[statuses == Verdict.INCOMPLETE] = math.nan
-        phases[statuses == Verdict.UNRESOLVED] = math.inf
+        write_rest_phases((amplitudes[some], frequencies[some], restitutions[some]), phases, statuses)
+        phases[statuses == SequenceStatus.INCOMPLETE] = math.nan
+        phases[statuses == SequenceStatus.UNRESOLVED] = math.inf
         times[some] = phases / frequencies[some]
 
     for _ in in_threads(part, range(0, rock.size, _PART)):  # the compiled function holds no lock
@@ -328,10 +328,10 @@ def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int |
     sequences = amplitudes[complete], frequencies[complete], restitutions[complete]
     impacts = resolved_by_default(sequences[2]) if resolved is None else np.full(complete.size, resolved)
     phases = np.zeros(complete.size)
-    statuses = np.full(complete.size, Verdict.UNRESOLVED, np.int8)
-    semianalytical_phases(sequences, impacts, phases, statuses)
+    statuses = np.full(complete.size, SequenceStatus.UNRESOLVED, np.int8)
+    write_semianalytical_phases(sequences, impacts, phases, statuses)
     # Proven complete: an estimate beyond half a period is inaccurate.
-    phases[statuses == Verdict.UNRESOLVED] = math.inf
+    phases[statuses == SequenceStatus.UNRESOLVED] = math.inf
     times[complete] = phases / sequences[1]
     return times.reshape(shape)[()]
 

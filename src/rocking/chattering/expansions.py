@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.errors import InvalidOption
-from rocking.kernels.sine.series import eq65_sums, eq65_terms, phase_coefficients
+from rocking.kernels.sine.series import compute_phase_coefficients, sum_eq65, write_eq65_terms
 
 #: Frequencies, divided by p of the block, for which double precision resolves the problem.
 LOWEST_FREQUENCY: Final = 1e-6
@@ -113,7 +113,7 @@ def broadcast(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
 def asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     """Compute Eq. 65, with its sums once per value of eta."""
     values, where = np.unique(eta, return_inverse=True)
-    sums = np.array([eq65_sums(float(value)) for value in values])[where.reshape(eta.shape)]
+    sums = np.array([sum_eq65(float(value)) for value in values])[where.reshape(eta.shape)]
     shape, (amplitudes, frequencies, first, third) = broadcast(a, omega, sums[..., 0], sums[..., 1])
     excess = amplitudes - 1.0
     times = np.full(excess.shape, math.nan)
@@ -161,7 +161,7 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     frequency = single(checked_frequency(omega), "omega")
     restitution = single(checked_loss(eta), "eta")
     pairs = 64
-    while (count := eq65_terms(restitution, *(terms := np.zeros((2, pairs))))) == pairs:
+    while (count := write_eq65_terms(restitution, *(terms := np.zeros((2, pairs))))) == pairs:
         pairs *= 2
     table = np.zeros(2 * count, CYCLE)
     even = np.arange(2 * count) % 2 == 0
@@ -316,7 +316,7 @@ def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
     coefficients = np.full((pairs.shape[1], order), math.inf)
     for i in np.flatnonzero(pairs[1] < 1.0):
         w, restitution = pairs[:, i].tolist()
-        coefficients[i] = phase_coefficients(1.0 / (w * w), restitution, order) / w
+        coefficients[i] = compute_phase_coefficients(1.0 / (w * w), restitution, order) / w
         if not np.isfinite(coefficients[i]).all():
             raise InvalidOption(
                 f"the expansion at omega = {w:g}, eta = {restitution:g} is not resolved to order {order} "

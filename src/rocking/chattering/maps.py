@@ -286,7 +286,7 @@ def outcomes_of(ends: NDArray[np.void], last: float | None) -> Integers:
     found = np.where(ends["first_rest"] <= last, Outcome.RESTS_LATER, Outcome.RESTS_AT_LAST)
     found[ends["complete_chattering"]] = Outcome.COMPLETE
     found[~rested] = Outcome.OVERTURNS
-    found[(ends["stalled"] > 0) | (ends["unfinished"] & ~rested)] = Outcome.UNPROVEN
+    found[(ends["rests_by_rounding"] > 0) | (ends["unfinished"] & ~rested)] = Outcome.UNPROVEN
     found[ends["uplifts"] == 0] = Outcome.NO_UPLIFT
     return found.astype(np.int64)
 
@@ -318,7 +318,7 @@ def _simulated(given: SimulationInput) -> _Point:
         first = response.sequences[0]
         times = {"rest": float(first["end"]), "lower": float(first["lower"]), "upper": float(first["upper"])}
         # The motion must not exceed a threshold before the upper bound of the rest.
-        ends["first_rest"], ends["stalled"] = times["upper"], math.isnan(times["upper"])
+        ends["first_rest"], ends["rests_by_rounding"] = times["upper"], math.isnan(times["upper"])
         if not math.isnan(times["upper"]):
             states, trail = state.new_states(1, 0), response.solution.trail
             states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, times["upper"]

@@ -73,7 +73,7 @@ def _version(*, verbose: bool = False) -> None:
         "rocking": rocking.__version__,
         "Python": f"{platform.python_version()} on {platform.platform()}",
         "packages": below,
-        "compiled code": compiled.state(),
+        "compiled code": compiled.describe_mode(),
     }
     for name, value in rows.items():
         print(f"{name:13}  {value}")

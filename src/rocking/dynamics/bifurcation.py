@@ -25,7 +25,7 @@ from rocking.dynamics.maps import TOGETHER, Fate, Scale, StroboscopicMap, descri
 from rocking.dynamics.orbits import impacts_of
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
-from rocking.kernels.periodic import stretch
+from rocking.kernels.periodic import measure_stretches
 from rocking.motion.motion import Motion
 
 if TYPE_CHECKING:
@@ -471,7 +471,7 @@ def lyapunov_exponents(
     made, marching = strobe._states(given[None])[1][0], strobe._marching()
     frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((before + count, 2), np.nan), 0
     for start, stop in pairwise(sorted({*range(0, before + count, TOGETHER), before, before + count})):
-        here = stretch(*marching, made, frame, logs[start:stop])
+        here = measure_stretches(*marching, made, frame, logs[start:stop])
         impacts += here if start >= before else 0
         if made["ending"] not in (Fate.MOVES, Fate.RESTS):
             break

@@ -178,7 +178,7 @@ class LinearBodies:
 
     def kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
         _check_model(model)
-        made = state.records(len(self), state.BLOCK)
+        made = state.new_records(len(self), state.BLOCK)
         laws = np.array([each.law for each in self.members])
         facing = np.isfinite(laws[:, 4])
         made["stiffness"] = laws[:, :1]
@@ -190,7 +190,7 @@ class LinearBodies:
         made["two_stops"] = facing
         made["next_side"][:, 1] = facing
         made["overturn_angle"] = laws[:, 4] - laws[:, 3]
-        made["limit"] = thresholds
+        made["rest_limit"] = thresholds
         return made
 
     def _pairs(self, name: str) -> Floats:

@@ -21,8 +21,8 @@ from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
-from rocking.kernels.ground import Ground, ground_of
-from rocking.kernels.periodic import TRAP, Setting, differentiate, iterate, step_rows
+from rocking.kernels.ground import Ground, build_ground
+from rocking.kernels.periodic import TRAP, PeriodicProblem, build_step_rows, differentiate, iterate
 from rocking.kernels.periodic import Fate as Fate
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
@@ -68,7 +68,7 @@ class PeriodicForcing:
                 "a map takes a state to the same one each time, but this body draws its restitution at each impact: "
                 "give it a number, or one that falls with the speed"
             )
-        rows = step_rows(self._ground, self._records[0])
+        rows = build_step_rows(self._ground, self._records[0])
         self._steps = rows if self.model == "linear" else rows[:, :0]
 
     def __repr__(self) -> str:
@@ -79,13 +79,15 @@ class PeriodicForcing:
         settings["record"] = record
         return settings
 
-    def _setting(self) -> Setting:
-        return Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
+    def _setting(self) -> PeriodicProblem:
+        return PeriodicProblem(
+            self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps
+        )
 
     def _marching(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
         """Return the arguments of the derivative kernels besides the states: the problem and workspace."""
         trail = Trail(self._ground, self._records[0], self._rules(record=True), NO_NODES)
-        return trail, state.new_scratch(), state.record(state.VARIATION), state.new_table(512)
+        return trail, state.new_scratch(), state.new_record(state.VARIATION), state.new_table(512)
 
     def checked_starts(self, given: ArrayLike, name: str) -> Floats:
         """Return initial states, shape (n, 2): finite numbers, in front of the stops."""
@@ -191,7 +193,7 @@ def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
     breakpoints = np.concatenate([breaks, period + breaks[1:], [3.0 * period, 4.0 * period]])
     coefficients = np.concatenate([motion.coefficients, sign * motion.coefficients, beyond])
     breakpoints.flags.writeable = coefficients.flags.writeable = False  # as in a motion: kernels are compiled for these
-    return ground_of(breakpoints, coefficients, 1.0 / gravity, motion.error)
+    return build_ground(breakpoints, coefficients, 1.0 / gravity, motion.error)
 
 
 def parts_of(count: int, periods: int) -> Sequence[slice]:
@@ -285,7 +287,7 @@ class StroboscopicMap(PeriodicForcing):
         for _ in range(checks.whole(n_periods, "n_periods", InvalidOption, least=1)):
             signs, before = _signs(made["side"]), made.copy()
             self._iterate(made)
-            differentiate(*self._marching(), state.attributed(before), change)
+            differentiate(*self._marching(), state.expose_fields(before), change)
             ended |= np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))
             total = (signs * _signs(made["side"]))[:, None, None] * change @ total
         found = self._coordinates(made["u"], made["v"], made["side"])

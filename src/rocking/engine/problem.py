@@ -36,13 +36,13 @@ def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Gro
     takes as long as the simulation of a block.
     """
     if motion is None:
-        return ground.ground_of(_NO_BREAKPOINTS, _NO_COEFFICIENTS, 1.0, 0.0)
+        return ground.build_ground(_NO_BREAKPOINTS, _NO_COEFFICIENTS, 1.0, 0.0)
     coefficients = motion.coefficients if factor == 1.0 else _frozen(motion.coefficients * factor)
     if motion.vertical is None:
-        return ground.ground_of(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
+        return ground.build_ground(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
     (breakpoints, pushes), (_, lifts) = _joined(motion)
     error = max(motion.error, motion.vertical.error)
-    return ground.ground_of(
+    return ground.build_ground(
         breakpoints, pushes * factor, 1.0 / gravity, error * abs(factor), vertical=lifts * abs(factor)
     )
 
@@ -192,7 +192,7 @@ def settings_of(
         duration = checks.positive(duration, "duration", InvalidOption, "s")
     stop = math.inf if duration is None else duration
     fields = (model == "nonlinear", scheme.code, scheme.bracket, stop, duration is None, record)
-    return state.attributed(np.array([fields], dtype=state.SETTINGS))[0]
+    return state.expose_fields(np.array([fields], dtype=state.SETTINGS))[0]
 
 
 @functools.lru_cache(maxsize=8)

@@ -101,7 +101,7 @@ class AsymptoticTime(ChatteringScheme):
     """Rest once the asymptotic chattering time (paper, Eq. 65) has passed since uplift (paper, Fig. 8a).
 
     Only sinusoidal motions and symmetric blocks are supported. Above the critical amplitude the block never rests. If
-    Eq. 65 exceeds the true time, the block rests once time no longer advances between impacts (counted as `stalled`).
+    Eq. 65 exceeds the true time, the block rests once time no longer advances between impacts (`rests_by_rounding`).
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class AsymptoticTime(ChatteringScheme):
 
     def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Return the chattering time of every side, s; infinite for incomplete chattering."""
-        from rocking.kernels.sine.series import eq65_sums
+        from rocking.kernels.sine.series import sum_eq65
 
         is_sine = motion is not None and motion.description.family == "sine" and motion.vertical is None
         if not (isinstance(bodies, Blocks) and not bodies.terms and bodies.is_symmetric and motion and is_sine):
@@ -166,7 +166,7 @@ class AsymptoticTime(ChatteringScheme):
         critical, lossy = np.ones(frequency.shape), eta < 1.0
         critical[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], eta[lossy])
         complete = (amplitude >= 1.0) & (amplitude < critical)
-        first, third = np.reshape([eq65_sums(e) for e in eta.flat], (*eta.shape, 2)).T
+        first, third = np.reshape([sum_eq65(e) for e in eta.flat], (*eta.shape, 2)).T
         first, third = (np.where(np.isfinite(sums), sums, 0.0) for sums in (first, third))  # infinite without losses
         excess = np.where(complete, amplitude - 1.0, 0.0).T
         times = (np.sqrt(excess) * (first + excess * third) / frequency.T).T
@@ -326,7 +326,7 @@ _EQ77: Final = np.array([[1.271], [-0.45], [0.5763], [-0.3941]])
 
 def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
     """Compute critical amplitudes, divided by g alpha, flat: "exact", or by the fits "eq76" and "eq77" of the paper."""
-    from rocking.kernels.sine.sequence import critical_amplitudes
+    from rocking.kernels.sine.sequence import write_critical_amplitudes
 
     if method != "exact":
         low, high = FITTED_FREQUENCIES
@@ -346,6 +346,6 @@ def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
     lossy = np.flatnonzero(eta < 1.0)
     for some in ranges(lossy.size, _CRITICAL_TOGETHER):
         here = np.zeros(lossy[some].size)
-        critical_amplitudes(omega[lossy[some]], eta[lossy[some]], here)
+        write_critical_amplitudes(omega[lossy[some]], eta[lossy[some]], here)
         found[lossy[some]] = here
     return found

@@ -21,24 +21,25 @@ from rocking.engine.problem import ground_of, highest, set_start, settings_of, s
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidMotion, Unfinished
 from rocking.kernels import lanes, state
-from rocking.kernels.ground import Ground, greatest_weight
+from rocking.kernels.ground import Ground, max_absolute_weight
 from rocking.kernels.lane_steps import WIDTH
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
-from rocking.kernels.uplift import note_complete
+from rocking.kernels.uplift import write_completeness
 from rocking.motion.motion import Motion
 
 #: Fields of an outcome. ``unfinished``: the step budget was exceeded. ``stopped``: the duration ended while the body
 #: moved or the motion continued. In both cases all other fields are incomplete. ``leans``: restraints hold the body in
 #: a leaning position for ever. ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
-#: rested after its first uplift before the motion exceeded a threshold again. ``stalled``: number of unproven rests.
-#: Times of events that did not occur are 0.
+#: rested after its first uplift before the motion exceeded a threshold again. ``rests_by_rounding``: number of rests
+#: because time no longer advanced. Times of events that did not occur are 0.
 OUTCOME = np.dtype(
     [
         ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("peak_rotation", "f8"),
         ("residual_rotation", "f8"), ("peak_time", "f8"),
         ("impacts", "i8"), ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("first_uplift", "f8"),
-        ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("stalled", "i8"), ("duration", "f8"),
+        ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("rests_by_rounding", "i8"),
+        ("duration", "f8"),
     ]
 )  # fmt: skip
 
@@ -179,7 +180,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
     outcomes["peak_rotation"] = highest(states, records, bodies.stops)
     known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
     stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
-    outcomes["residual_rotation"] = np.where(known, stop + (1.0 - 2.0 * side) * states["leaning"], np.nan)
+    outcomes["residual_rotation"] = np.where(known, stop + (1.0 - 2.0 * side) * states["leaning_rotation"], np.nan)
     outcomes["complete_chattering"] = complete_chattering(ground, records, states)
     return outcomes
 
@@ -188,10 +189,10 @@ def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> I
     """Yield bodies that are simulated together, with their number of substeps; -1 for bodies simulated alone."""
     substeps, step = np.full(len(records), -1), step_of(motion)
     if step is not None:
-        width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * greatest_weight(ground))
-        substeps = np.where(
-            width <= lanes.LONGEST_STEP, _substeps(width, model, motion.vertical is not None), -1.0
-        ).astype(np.int64)
+        width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * max_absolute_weight(ground))
+        substeps = np.where(width <= lanes.MAX_STEP, _substeps(width, model, motion.vertical is not None), -1.0).astype(
+            np.int64
+        )
     substeps[records["restrained"] | records["two_stops"]] = -1
     size = min(_TOGETHER, max(1, _PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
     for count in np.unique(substeps):
@@ -203,8 +204,8 @@ def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> I
 def _substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
     """Compute the substeps per sample in lanes, for each sqrt(|lam W|) h; 0 if one formula covers the sample."""
     if model == "nonlinear":
-        return np.ceil(width / lanes.LONGEST_SUBSTEP)
-    return np.ceil(width / lanes.LONGEST_WEIGHTED_SUBSTEP) if with_vertical else np.zeros(len(width))
+        return np.ceil(width / lanes.MAX_SUBSTEP)
+    return np.ceil(width / lanes.MAX_WEIGHTED_SUBSTEP) if with_vertical else np.zeros(len(width))
 
 
 def _march_together(
@@ -219,9 +220,9 @@ def _march_together(
     records, states = whole
     pieces = len(ground.pieces) - 1
     finer = max(substeps, 0) if settings["nonlinear"] else 0
-    together = lanes.pool_of(records[chosen], states[chosen], pieces, step or 1.0, finer)
+    together = lanes.build_pool(records[chosen], states[chosen], pieces, step or 1.0, finer)
     if substeps < 0:
-        lanes.march_each(ground, settings, state.new_scratch(), together)
+        lanes.march_blocks(ground, settings, state.new_scratch(), together)
     else:
         lanes.run_lanes(ground, settings, state.new_scratch(), together, substeps)
     states[chosen] = together.states
@@ -254,7 +255,7 @@ def slices(ground: Ground) -> int:
 def complete_chattering(ground: Ground, records: Records, states: Records) -> Flags:
     """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
-    note_complete(ground, records, states, state.new_scratch(), complete)
+    write_completeness(ground, records, states, state.new_scratch(), complete)
     return complete
 
 
@@ -263,15 +264,15 @@ def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     outcomes["leans"] = states["ending"] == state.Ending.LEANS
-    early = (states["side"] >= 0) | (states["end"] < motion_end)
+    early = (states["side"] >= 0) | (states["end_time"] < motion_end)
     # A body that balances for ever has no outcome either.
     undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))
     outcomes["stopped"] = undecided & early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
         ("rests", "rests"), ("time_at_rest", "time_at_rest"), ("first_uplift", "first_uplift"),
-        ("first_rest", "first_rest"), ("last_rest", "last_rest_time"), ("stalled", "rests_by_rounding"),
-        ("duration", "end"),
+        ("first_rest", "first_rest"), ("last_rest", "last_rest_time"), ("rests_by_rounding", "rests_by_rounding"),
+        ("duration", "end_time"),
     ):  # fmt: skip
         outcomes[name] = states[field]
     return outcomes

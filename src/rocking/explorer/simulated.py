@@ -54,7 +54,7 @@ class Simulated:
         if self.case.chattering.name != _FINEST.name:
             return self.response
         fine = replace(self.case, chattering=_FINEST).simulate()
-        return fine if fine.stalled == self.response.stalled else self.response
+        return fine if fine.rests_by_rounding == self.response.rests_by_rounding else self.response
 
     def resolved(self, start: float, end: float) -> Response:
         """Return the response with impacts resolved as finely as a window shows."""

@@ -11,35 +11,35 @@ import math
 from enum import IntEnum
 
 from rocking.core.arrays import Floats
-from rocking.kernels.arc import evaluate, expand, restoring, sign_of
+from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.events import middle_factor
-from rocking.kernels.ground import absolute_sums, has_vertical, vertical_of
-from rocking.kernels.restraints import apply_tendon_law, plastic_after
-from rocking.kernels.series import variation_coefficients
+from rocking.kernels.events import mean_factor
+from rocking.kernels.ground import has_vertical, sum_absolute_terms, vertical_component
+from rocking.kernels.restraints import apply_tendon_law, plastic_at_node
+from rocking.kernels.series import write_variation_coefficients
 from rocking.kernels.state import Record, Records, TendonLaw
 from rocking.kernels.trace import (
     Quantity,
     Trail,
-    elapsed,
     elongation_rate,
-    expand_free,
+    expand_unforced,
     is_impact,
     is_jump,
     plastic_by_start,
     push_rate,
     restoring_by_tendon,
     saltation,
+    step_duration,
 )
 
 #: Number of derivatives: by u, v and a plastic elongation.
-_PLAIN = 3
+_STATE_DERIVATIVES = 3
 
 #: Rounding of a step, divided by its largest terms.
 _ROUNDING = 2.0**-51
 
 
-class Ends(IntEnum):
+class AdjointEnd(IntEnum):
     """End of a backward pass."""
 
     START = 0
@@ -51,12 +51,12 @@ class Ends(IntEnum):
     #: The motion touches the threshold of a side without a rate.
     TOUCHES_THRESHOLD = 4
     #: Not ended.
-    GOES_ON = 5
+    CONTINUES = 5
 
 
 @kernel
 def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, change: Floats, out: Floats) -> int:
-    """Propagate ``change``, the derivatives of a number, back to the start of the response; return the `Ends`.
+    """Propagate ``change``, the derivatives of a number, back to the start of the response; return the `AdjointEnd`.
 
     The derivatives are by u, v and plastic elongation at ``time`` after the node of a row; if infinite, at the end of
     its step, before an impact there. On return they refer to the start, and are 0 if the body has come to rest.
@@ -64,34 +64,34 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
     scratch space (`state.VARIATION`). For two more numbers in ``change``, see `add_rounding`.
     """
     block, nodes = trail.block, trail.nodes
-    number = impacts_up_to(nodes, row)
-    plastic = plastic_at(trail, row)
+    number = count_impacts(nodes, row)
+    plastic = find_plastic(trail, row)
     for k in range(row, -1, -1):
         node = nodes[k]
         if node.side < 0 or (k < row and nodes[k + 1].side < 0):
-            ends = at_rest(nodes, k, change)
-            if ends != Ends.GOES_ON:
-                return ends
+            end = propagate_through_rest(nodes, k, change)
+            if end != AdjointEnd.CONTINUES:
+                return end
             continue
-        t = elapsed(trail, node, nodes[k + 1]) if k < row or time == math.inf else time
+        t = step_duration(trail, node, nodes[k + 1]) if k < row or time == math.inf else time
         if block.yielding:
             if k < row and turns_back(nodes, k + 1):
                 change[0] += elongation_rate(trail, node.side, nodes[k + 1].u) * change[2]
                 change[2] = 0.0
-                plastic = plastic_at(trail, k)
+                plastic = find_plastic(trail, k)
             apply_tendon_law(block, node.law, plastic)
-        order, _, degree = expand(trail.ground, block, trail.settings, scratch, node, t)
+        order, _, degree = expand_arc(trail.ground, block, trail.settings, scratch, node, t)
         if k < row and nodes[k + 1].u == 0.0 and t > 0.0:
             number -= is_impact(nodes, k)
-            _, v, _ = evaluate(scratch.rotation, order, t)
-            if not back_through_impact(trail, k, v, number, change):
-                return Ends.GRAZES
+            _, v, _ = evaluate_series(scratch.rotation, order, t)
+            if not propagate_through_impact(trail, k, v, number, change):
+                return AdjointEnd.GRAZES
         if t > 0.0:
-            if change.shape[0] > _PLAIN:
+            if change.shape[0] > _STATE_DERIVATIVES:
                 add_rounding(trail, scratch, k, order, t, change)
-            back_through(trail, scratch, work, node, (order, degree), t, change, out)
+            propagate_through_arc(trail, scratch, work, node, (order, degree), t, change, out)
     change[0] += plastic_by_start(trail) * change[2]
-    return Ends.START
+    return AdjointEnd.START
 
 
 @inlined
@@ -102,15 +102,15 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
     """
     ground, block, node = trail.ground, trail.block, trail.nodes[k]
     side, end = node.side, node.offset + t
-    u, v, w = evaluate(scratch.rotation, order, t)
+    u, v, w = evaluate_series(scratch.rotation, order, t)
     if trail.nodes[k + 1].u == 0.0:
         change[4] = max(change[4], -w / v)
     speed = max(abs(node.v), abs(v))
     height = max(node.u, u) + speed * t
-    push = 0.5 * ground.columns * absolute_sums(ground, node.piece, end)[0] + abs(block.added_push[side])
+    push = 0.5 * ground.columns * sum_absolute_terms(ground, node.piece, end)[0] + abs(block.added_push[side])
     weight = 1.0 + abs(block.added_weight[side])
     if has_vertical(ground):
-        weight += 0.5 * ground.columns * absolute_sums(vertical_of(ground), node.piece, end)[0]
+        weight += 0.5 * ground.columns * sum_absolute_terms(vertical_component(ground), node.piece, end)[0]
     force = block.threshold_slope[side] * (
         abs(block.threshold[side]) * weight + abs(block.restraint_threshold[side]) + push
     )
@@ -123,103 +123,103 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
 
 
 @inlined
-def at_rest(nodes: Records, k: int, change: Floats) -> int:
-    """Propagate ``change`` back through a rest at the node or the one before; GOES_ON if anything is left.
+def propagate_through_rest(nodes: Records, k: int, change: Floats) -> int:
+    """Propagate ``change`` back through a rest at the node or the one before; CONTINUES if a derivative remains.
 
     Impacts between the last resolved one and the rest have no effect.
     """
     if nodes[k].side >= 0:
-        return Ends.GOES_ON
-    moved = change[0] != 0.0 or change[1] != 0.0
+        return AdjointEnd.CONTINUES
+    is_nonzero = change[0] != 0.0 or change[1] != 0.0
     change[0] = change[1] = 0.0
     if k == 0:
-        return Ends.START
+        return AdjointEnd.START
     # If the ground ends the rest immediately, landing and leaving have the same time.
-    if moved and nodes[k + 1].time == nodes[k].time:
-        return Ends.LEAVES_AT_ONCE
-    return Ends.REST if change[2] == 0.0 else Ends.GOES_ON
+    if is_nonzero and nodes[k + 1].time == nodes[k].time:
+        return AdjointEnd.LEAVES_AT_ONCE
+    return AdjointEnd.REST if change[2] == 0.0 else AdjointEnd.CONTINUES
 
 
 @inlined
-def back_through_impact(trail: Trail, k: int, v: float, number: int, change: Floats) -> bool:
+def propagate_through_impact(trail: Trail, k: int, v: float, number: int, change: Floats) -> bool:
     """Propagate ``change`` back through the impact after the k-th node, at velocity v; False if the body only touches.
 
-    ``number`` of impacts came before.
+    ``number`` is the number of earlier impacts.
     """
     if change[0] == 0.0 and change[1] == 0.0:
         return True
-    node, following = trail.nodes[k], trail.nodes[k + 1]
-    away = -1.0 if trail.block.two_stops and following.side != node.side else 1.0  # the other stop
-    if not (is_impact(trail.nodes, k) and away * v < 0.0):
+    node, next_node = trail.nodes[k], trail.nodes[k + 1]
+    sign = -1.0 if trail.block.two_stops and next_node.side != node.side else 1.0  # the other stop
+    if not (is_impact(trail.nodes, k) and sign * v < 0.0):
         return False
-    by_u = saltation(trail, node, following, Quantity.ROTATION, -1.0 / v, (0.0, -away * v), number)
-    by_v = saltation(trail, node, following, Quantity.ROTATION, 0.0, (away, -away * v), number)
+    by_u = saltation(trail, node, next_node, Quantity.ROTATION, -1.0 / v, (0.0, -sign * v), number)
+    by_v = saltation(trail, node, next_node, Quantity.ROTATION, 0.0, (sign, -sign * v), number)
     change[0], change[1] = change[0] * by_u[0] + change[1] * by_u[1], change[0] * by_v[0] + change[1] * by_v[1]
     return True
 
 
 @kernel
 def adjoint_of_final_state(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
-    """Write the derivative of the time at which the step of a row ends by the state before it; return the `Ends`.
+    """Write the derivative of the time at which the step of a row ends by the state before it; return the `AdjointEnd`.
 
     That state is at the end of the step, before an impact or an overturning, otherwise at its node. For an uplift or
     rest, derivatives by the motion at that instant are added to ``out``, as in `adjoint`.
     """
     block, nodes = trail.block, trail.nodes
-    node, following = nodes[row], nodes[row + 1]
-    plastic = plastic_at(trail, row)
+    node, next_node = nodes[row], nodes[row + 1]
+    plastic = find_plastic(trail, row)
     if block.yielding:
         apply_tendon_law(block, node.law, plastic)
     if node.side < 0:
-        side, rate = following.side, -push_rate(trail.ground, block, following.side, following.piece, following.offset)
-        if row > 0 and following.time == node.time:
-            return Ends.LEAVES_AT_ONCE
-        if is_jump(trail, following):
-            return Ends.START
+        side, rate = next_node.side, -push_rate(trail.ground, block, next_node.side, next_node.piece, next_node.offset)
+        if row > 0 and next_node.time == node.time:
+            return AdjointEnd.LEAVES_AT_ONCE
+        if is_jump(trail, next_node):
+            return AdjointEnd.START
         if not rate > 0.0:
-            return Ends.TOUCHES_THRESHOLD
+            return AdjointEnd.TOUCHES_THRESHOLD
         change[2] = restoring_by_tendon(block, side, plastic, 1.0) / (block.threshold_slope[side] * rate)
-        add_instant(trail, following, (sign_of(side) / rate, block.threshold[side] / rate), out)
-    elif following.side < 0:
-        by_rest(trail, node, plastic, change, out)
+        add_instant(trail, next_node, (side_sign(side) / rate, block.threshold[side] / rate), out)
+    elif next_node.side < 0:
+        differentiate_rest_time(trail, node, plastic, change, out)
     else:
-        t = elapsed(trail, node, following)
-        order, _, _ = expand(trail.ground, block, trail.settings, scratch, node, t)
-        _, v, _ = evaluate(scratch.rotation, order, t)
+        t = step_duration(trail, node, next_node)
+        order, _, _ = expand_arc(trail.ground, block, trail.settings, scratch, node, t)
+        _, v, _ = evaluate_series(scratch.rotation, order, t)
         if v == 0.0:
-            return Ends.GRAZES
+            return AdjointEnd.GRAZES
         change[0] = -1.0 / v
-    return Ends.START
+    return AdjointEnd.START
 
 
 @inlined
-def by_rest(trail: Trail, node: Record, plastic: float, change: Floats, out: Floats) -> None:
+def differentiate_rest_time(trail: Trail, node: Record, plastic: float, change: Floats, out: Floats) -> None:
     """Write the derivatives of the time of rest after the impact of a node (see `trace.rest_shift`)."""
     block, i = trail.block, node.side
     j = block.next_side[i]
-    g_i = restoring(trail.ground, block, i, node.piece, node.offset)
-    g_j = restoring(trail.ground, block, j, node.piece, node.offset)
-    e_i, e_j = middle_factor(block, i, node.v), middle_factor(block, j, node.v)
-    share = 2.0 / (1.0 - e_i * e_j)
-    by_speed = share * (1.0 / g_i + e_i / g_j)
-    by_g_i, by_g_j = -share * node.v / (g_i * g_i), -share * node.v * e_i / (g_j * g_j)
-    later = 1.0 - by_speed * g_i  # by the shift of the impact
-    later += by_g_i * block.threshold_slope[i] * push_rate(trail.ground, block, i, node.piece, node.offset)
-    later += by_g_j * block.threshold_slope[j] * push_rate(trail.ground, block, j, node.piece, node.offset)
-    change[0], change[1] = -later / node.v, by_speed
+    g_i = restoring_acceleration(trail.ground, block, i, node.piece, node.offset)
+    g_j = restoring_acceleration(trail.ground, block, j, node.piece, node.offset)
+    e_i, e_j = mean_factor(block, i, node.v), mean_factor(block, j, node.v)
+    scale = 2.0 / (1.0 - e_i * e_j)
+    by_speed = scale * (1.0 / g_i + e_i / g_j)
+    by_g_i, by_g_j = -scale * node.v / (g_i * g_i), -scale * node.v * e_i / (g_j * g_j)
+    by_time = 1.0 - by_speed * g_i  # by the shift of the impact
+    by_time += by_g_i * block.threshold_slope[i] * push_rate(trail.ground, block, i, node.piece, node.offset)
+    by_time += by_g_j * block.threshold_slope[j] * push_rate(trail.ground, block, j, node.piece, node.offset)
+    change[0], change[1] = -by_time / node.v, by_speed
     change[2] = by_g_i * restoring_by_tendon(block, i, plastic, 1.0) + by_g_j * restoring_by_tendon(
         block, j, plastic, 1.0
     )
     by_i, by_j = by_g_i * block.threshold_slope[i], by_g_j * block.threshold_slope[j]
-    push = by_i * sign_of(i) + by_j * sign_of(j)
+    push = by_i * side_sign(i) + by_j * side_sign(j)
     add_instant(trail, node, (push, by_i * block.threshold[i] + by_j * block.threshold[j]), out)
 
 
 @inlined
-def add_instant(trail: Trail, node: Record, by: tuple[float, float], out: Floats) -> None:
-    """Add the derivatives by the coefficients of a node's piece; ``by``: derivatives by push and weight at the node."""
+def add_instant(trail: Trail, node: Record, derivatives: tuple[float, float], out: Floats) -> None:
+    """Add the derivatives by the coefficients of a node's piece from ``derivatives`` by push and weight at the node."""
     columns = trail.ground.columns
-    push, weight = by
+    push, weight = derivatives
     for j in range(columns):
         out[node.piece, j] += push
         if has_vertical(trail.ground):
@@ -235,17 +235,17 @@ def turns_back(nodes: Records, row: int) -> bool:
 
 
 @inlined
-def plastic_at(trail: Trail, row: int) -> float:
+def find_plastic(trail: Trail, row: int) -> float:
     """Return the plastic elongation at a node; 0 if no tendon yields."""
     if not trail.block.yielding:
         return 0.0
     while row > 0 and not turns_back(trail.nodes, row):
         row -= 1
-    return plastic_after(trail.block, trail.settings, trail.nodes, row, 0.0)
+    return plastic_at_node(trail.block, trail.settings, trail.nodes, row, 0.0)
 
 
 @inlined
-def impacts_up_to(nodes: Records, row: int) -> int:
+def count_impacts(nodes: Records, row: int) -> int:
     """Count the impacts up to the node of a row."""
     count = 0
     for k in range(row):
@@ -254,7 +254,7 @@ def impacts_up_to(nodes: Records, row: int) -> int:
 
 
 @shared
-def back_through(
+def propagate_through_arc(
     trail: Trail,
     scratch: Record,
     work: Record,
@@ -267,20 +267,20 @@ def back_through(
     """Propagate ``change`` back through a time t of the arc from a node, for the given order and degree."""
     order, degree = orders
     x = work.change
-    expand_free(trail, scratch, work, node.side, degree, order)
+    expand_unforced(trail, scratch, work, node.side, degree, order)
     drag = trail.block.damping[node.side]
     x[0], x[1] = 1.0, 0.0
-    variation_coefficients(work, drag, order)
-    u_by_u, v_by_u, _ = evaluate(x, order, t)
+    write_variation_coefficients(work, drag, order)
+    u_by_u, v_by_u, _ = evaluate_series(x, order, t)
     x[0], x[1] = 0.0, 1.0
-    variation_coefficients(work, drag, order)
-    u_by_v, v_by_v, _ = evaluate(x, order, t)
+    write_variation_coefficients(work, drag, order)
+    u_by_v, v_by_v, _ = evaluate_series(x, order, t)
     change[0], change[1] = change[0] * u_by_u + change[1] * v_by_u, change[0] * u_by_v + change[1] * v_by_v
     ground, block = trail.ground, trail.block
-    if change.shape[0] > _PLAIN and not block.yielding:  # only the rounding is required
+    if change.shape[0] > _STATE_DERIVATIVES and not block.yielding:  # only the rounding is required
         return
     x[0], x[1] = change[1], drag * change[1] - change[0]
-    variation_coefficients(work, -drag, order)
+    write_variation_coefficients(work, -drag, order)
     lam, gain, threshold = block.stiffness[node.side], block.threshold_slope[node.side], block.threshold[node.side]
     m = work.forcing
     for k in range(order - 1):  # times d u'' / d A, for the horizontal motion in the frame of the side
@@ -289,7 +289,7 @@ def back_through(
             m[k] = 0.0
             for j in range(k + 1):
                 m[k] -= lam * x[j] * scratch.cosine[k - j]
-    add_moments(scratch.other, m, order, node.offset, t, sign_of(node.side), out[node.piece, : ground.columns])
+    add_moments(scratch.other, m, order, node.offset, t, side_sign(node.side), out[node.piece, : ground.columns])
     if has_vertical(ground):
         for k in range(order - 1):  # times d u'' / d W
             m[k] = 0.0 if trail.settings.nonlinear else -gain * threshold * x[k]
@@ -297,14 +297,14 @@ def back_through(
                 m[k] += lam * x[j] * (-scratch.sine[k - j] if trail.settings.nonlinear else scratch.rotation[k - j])
         add_moments(scratch.other, m, order, node.offset, t, 1.0, out[node.piece, ground.columns :])
     if block.yielding and node.law == TendonLaw.ELASTIC:
-        plastic_series(trail, scratch, node.side, x, order, m)
-        add_moments(scratch.other, m, order, 0.0, t, 1.0, change[2:_PLAIN])
+        write_plastic_series(trail, scratch, node.side, x, order, m)
+        add_moments(scratch.other, m, order, 0.0, t, 1.0, change[2:_STATE_DERIVATIVES])
 
 
 @inlined
-def plastic_series(trail: Trail, scratch: Record, side: int, x: Floats, order: int, m: Floats) -> None:
+def write_plastic_series(trail: Trail, scratch: Record, side: int, x: Floats, order: int, m: Floats) -> None:
     """Write x times d u'' / d plastic into m."""
-    stiffness = trail.block.tendon[side]
+    stiffness = trail.block.tendon_stiffness[side]
     for k in range(order - 1):
         m[k] = 0.0 if trail.settings.nonlinear else stiffness * x[k]
         for j in range(k + 1 if trail.settings.nonlinear else 0):

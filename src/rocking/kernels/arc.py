@@ -9,13 +9,13 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.ground import Ground, acceleration, has_vertical, local_series, vertical_of
+from rocking.kernels.ground import Ground, acceleration, has_vertical, vertical_component, write_local_series
 from rocking.kernels.series import (
     INTEGRATED_TWICE,
-    angle_coefficients,
-    half_angle_coefficients,
-    linear_coefficients,
     next_coefficient,
+    write_angle_coefficients,
+    write_half_angle_coefficients,
+    write_linear_coefficients,
 )
 from rocking.kernels.state import ORDER, Record
 
@@ -24,91 +24,91 @@ _FIRST_STEP = 1.3
 
 
 @inlined
-def sign_of(side: int) -> float:
+def side_sign(side: int) -> float:
     """Return the sign of the rotation on a side."""
     return 1.0 - 2.0 * side
 
 
 @inlined
-def restoring(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+def restoring_acceleration(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
     """Compute the restoring acceleration of a side at zero rotation."""
-    standing = block.threshold[side] * weight_at(ground, piece, offset) + block.restraint_threshold[side]
-    return block.threshold_slope[side] * (standing + sign_of(side) * acceleration(ground, piece, offset))
+    threshold = block.threshold[side] * weight_at(ground, piece, offset) + block.restraint_threshold[side]
+    return block.threshold_slope[side] * (threshold + side_sign(side) * acceleration(ground, piece, offset))
 
 
 @inlined
 def weight_at(ground: Ground, piece: int, offset: float) -> float:
     """Compute the weight in the ground's frame, divided by the weight at rest."""
-    return 1.0 + acceleration(vertical_of(ground), piece, offset) if has_vertical(ground) else 1.0
+    return 1.0 + acceleration(vertical_component(ground), piece, offset) if has_vertical(ground) else 1.0
 
 
 @inlined
-def weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
+def write_weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
     """Write the polynomial of the weight about ``offset`` into W and return its degree."""
     W[0] = 0.0
-    degree = local_series(vertical_of(ground), piece, offset, 1.0, W) if has_vertical(ground) else 0
+    degree = write_local_series(vertical_component(ground), piece, offset, 1.0, W) if has_vertical(ground) else 0
     W[0] += 1.0
     return degree
 
 
 @shared
-def expand(
-    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, left: float
+def expand_arc(
+    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
 ) -> tuple[int, float, int]:
     """Write the series of the arc from a state into scratch; return (order, step, degree of both components).
 
-    The step is at most ``left``.
+    The step is at most ``h_max``.
     """
-    h = step_length(ground, block, state, left)
-    degree = local_series(ground, state.piece, state.offset, sign_of(state.side), scratch.ground)
+    h = step_length(ground, block, state, h_max)
+    degree = write_local_series(ground, state.piece, state.offset, side_sign(state.side), scratch.ground)
     degree = significant_degree(scratch.ground, degree, h)
-    changes = weight_series(ground, state.piece, state.offset, scratch.weight)
+    weight_degree = write_weight_series(ground, state.piece, state.offset, scratch.weight)
     if has_vertical(ground):
-        degree = raise_degree(scratch.ground, degree, scratch.weight, changes)
+        degree = pad_to_same_degree(scratch.ground, degree, scratch.weight, weight_degree)
     if block.restrained or settings.nonlinear or has_vertical(ground):
-        order, h = expand_checked(block, settings, state, scratch, (degree, changes), h)
+        order, h = expand_with_bound(block, settings, state, scratch, (degree, weight_degree), h)
         return order, h, degree
     if degree <= 1:
         order = linear_order(block.stiffness[state.side], h)
-        linear_coefficients(block, state, scratch, degree, order)
+        write_linear_coefficients(block, state, scratch, degree, order)
         return order, h, degree
-    linear_coefficients(block, state, scratch, degree, ORDER)
-    order = converged(scratch.rotation, degree, h)
+    write_linear_coefficients(block, state, scratch, degree, ORDER)
+    order = converged_order(scratch.rotation, degree, h)
     if order > ORDER:
-        return ORDER, shortened(block, settings, state.side, scratch, (degree, 0), h), degree
+        return ORDER, shorten_step(block, settings, state.side, scratch, (degree, 0), h), degree
     return order, h, degree
 
 
 @inlined
-def raise_degree(A: Floats, degree: int, W: Floats, other: int) -> int:
+def pad_to_same_degree(A: Floats, degree: int, W: Floats, weight_degree: int) -> int:
     """Return the larger degree of two polynomials, and pad both with zeros to this degree."""
-    highest = max(degree, other)
-    for k in range(degree + 1, highest + 1):
+    max_degree = max(degree, weight_degree)
+    for k in range(degree + 1, max_degree + 1):
         A[k] = 0.0
-    for k in range(other + 1, highest + 1):
+    for k in range(weight_degree + 1, max_degree + 1):
         W[k] = 0.0
-    return highest
+    return max_degree
 
 
 @inlined
-def step_length(ground: Ground, block: Record, state: Record, left: float) -> float:
+def step_length(ground: Ground, block: Record, state: Record, h_max: float) -> float:
     """Compute the length of the next Taylor step."""
-    h = min(left, 1.0 / np.sqrt(abs(block.stiffness[state.side])))
+    h = min(h_max, 1.0 / np.sqrt(abs(block.stiffness[state.side])))
     if block.restrained:
-        h = min(h, restrained_step(block, state.side))
+        h = min(h, restrained_step_length(block, state.side))
     if state.u == 0.0 and state.v > 0.0:
-        g = restoring(ground, block, state.side, state.piece, state.offset)
+        g = restoring_acceleration(ground, block, state.side, state.piece, state.offset)
         if g > 0.0:
             h = min(h, _FIRST_STEP * 2.0 * state.v / g)
     return h
 
 
 @inlined
-def restrained_step(block: Record, side: int) -> float:
+def restrained_step_length(block: Record, side: int) -> float:
     """Return the longest step: the inverse of the largest rate of motion or damping under restraints."""
     stiffness = abs(block.stiffness[side]) * (1.0 + abs(block.added_weight[side])) + abs(block.spring[side])
-    fastest = max(math.sqrt(stiffness), block.damping[side])
-    return 1.0 / fastest if fastest > 0.0 else np.inf
+    max_rate = max(math.sqrt(stiffness), block.damping[side])
+    return 1.0 / max_rate if max_rate > 0.0 else np.inf
 
 
 @inlined
@@ -126,17 +126,17 @@ def linear_order(lam: float, h: float) -> int:
     The ratio of c[k] h^k to c[2] h^2, which decreases most slowly, is known in advance, because each later coefficient
     follows from the one two before.
     """
-    squared = abs(lam) * h * h
+    squared_step = abs(lam) * h * h
     ratio = 1.0
     for k in range(2, ORDER - 2, 2):
-        ratio *= squared * INTEGRATED_TWICE[k]
+        ratio *= squared_step * INTEGRATED_TWICE[k]
         if ratio <= NEGLIGIBLE:
             return k + 1
     return ORDER
 
 
 @inlined
-def converged(c: Floats, degree: int, h: float) -> int:
+def converged_order(c: Floats, degree: int, h: float) -> int:
     """Return the order at which a full series under constant weight has converged within h, or more than `ORDER`.
 
     Beyond the motion's degree, each coefficient follows from the one two before: two negligible ones end the series.
@@ -154,7 +154,7 @@ def converged(c: Floats, degree: int, h: float) -> int:
 
 
 @shared
-def expand_checked(
+def expand_with_bound(
     block: Record, settings: Record, state: Record, scratch: Record, degrees: tuple[int, int], h: float
 ) -> tuple[int, float]:
     """Compute the series of an arc and of its sines and cosines, for the degrees of motion and weight.
@@ -180,15 +180,15 @@ def expand_checked(
         term = (k + 2) * abs(c[k + 2]) * power
         largest = max(largest, term)
         if k > degrees[0] and term + previous <= NEGLIGIBLE * largest:
-            beyond, _ = truncation(block, settings, side, scratch, degrees, k + 2, h)
-            if beyond <= TRUNCATION * largest:
+            truncated, _ = bound_truncation(block, settings, side, scratch, degrees, k + 2, h)
+            if truncated <= MAX_TRUNCATION * largest:
                 return k + 2, h
         if settings.nonlinear:
-            angle_coefficients(scratch, k)
+            write_angle_coefficients(scratch, k)
             if block.restrained:
-                half_angle_coefficients(scratch, k)
+                write_half_angle_coefficients(scratch, k)
         power *= h
-    return ORDER, shortened(block, settings, side, scratch, degrees, h)
+    return ORDER, shorten_step(block, settings, side, scratch, degrees, h)
 
 
 # ---- Bounds on all omitted terms of an arc's velocity ----
@@ -199,21 +199,23 @@ def expand_checked(
 NEGLIGIBLE = 2.0**-56
 
 #: Largest bound on the truncation of a velocity, divided by its largest term: a quarter of the last place.
-TRUNCATION = 2.0**-54
+MAX_TRUNCATION = 2.0**-54
 
 #: Smaller terms of the velocity are negligible.
-SMALLEST = 1e-290
+MIN_TERM = 1e-290
 
 #: Largest number of times that a step is shortened, each time by at least a tenth.
-SHORTENINGS = 200
+MAX_SHORTENINGS = 200
 
 
 @shared
-def shortened(block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], h: float) -> float:
+def shorten_step(
+    block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], h: float
+) -> float:
     """Return a step, at most h, within which the truncation of a full series is negligible."""
-    for _ in range(SHORTENINGS):
-        beyond, largest = truncation(block, settings, side, scratch, degrees, ORDER, h)
-        excess = beyond / max(TRUNCATION * largest, SMALLEST)
+    for _ in range(MAX_SHORTENINGS):
+        truncated, largest = bound_truncation(block, settings, side, scratch, degrees, ORDER, h)
+        excess = truncated / max(MAX_TRUNCATION * largest, MIN_TERM)
         if excess <= 1.0:
             break
         h *= max(0.5, 0.9 * excess ** (-1.0 / ORDER))
@@ -221,7 +223,7 @@ def shortened(block: Record, settings: Record, side: int, scratch: Record, degre
 
 
 @inlined
-def truncation(
+def bound_truncation(
     block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
     """Bound the truncation of an arc's velocity within h, and return its largest term, both times h.
@@ -229,15 +231,17 @@ def truncation(
     The bound is inf if h is too long. The motion's degree is below order - 1.
     """
     if block.restrained:
-        return truncation_restrained(block, settings, side, scratch, degrees, order, h)
+        return bound_restrained_truncation(block, settings, side, scratch, degrees, order, h)
     if settings.nonlinear:
-        return truncation_nonlinear(scratch, block.stiffness[side], degrees, order, h)
-    return truncation_linear(scratch, block.stiffness[side], degrees[1], order, h)
+        return bound_nonlinear_truncation(scratch, block.stiffness[side], degrees, order, h)
+    return bound_linear_truncation(scratch, block.stiffness[side], degrees[1], order, h)
 
 
 @shared
-def truncation_linear(scratch: Record, lam: float, changes: int, order: int, h: float) -> tuple[float, float]:
-    """Bound the truncation of a linear arc, for a weight of degree ``changes``.
+def bound_linear_truncation(
+    scratch: Record, lam: float, weight_degree: int, order: int, h: float
+) -> tuple[float, float]:
+    """Bound the truncation of a linear arc, for a weight of degree ``weight_degree``.
 
     With u_k = |c_k| h^k and w_j = |W_j| h^j, u'' h^2 omits the products w_j u_k with j + k >= order - 1 and all terms
     that follow from them.
@@ -249,11 +253,11 @@ def truncation_linear(scratch: Record, lam: float, changes: int, order: int, h: 
         d[k] = abs(c[k]) * power
         largest = max(largest, k * d[k])
         power *= h
-    for k in range(order - 1, order - 2 - changes, -1):  # sums of all later terms
+    for k in range(order - 1, order - 2 - weight_degree, -1):  # sums of all later terms
         d[k] += d[k + 1]
     weight = products = 0.0
     power = 1.0
-    for j in range(changes + 1):
+    for j in range(weight_degree + 1):
         weight += abs(W[j]) * power
         products += abs(W[j]) * power * d[order - 1 - j]
         power *= h
@@ -263,7 +267,7 @@ def truncation_linear(scratch: Record, lam: float, changes: int, order: int, h: 
 
 
 @shared
-def truncation_nonlinear(
+def bound_nonlinear_truncation(
     scratch: Record, lam: float, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
     """Bound the truncation of a nonlinear arc.
@@ -282,29 +286,29 @@ def truncation_nonlinear(
     for k in range(order - 2, -1, -1):  # sums of all later terms
         d[k] += d[k + 1]
     velocity = d[0]
-    angles, angle_products = angle_terms(S, C, d, order, h)
-    sums_of_terms(S, C, d, order, h)
-    degree, changes = degrees
+    angle_sum, angle_products = sum_angle_terms(S, C, d, order, h)
+    write_angle_tails(S, C, d, order, h)
+    degree, weight_degree = degrees
     strength = push_products = 0.0
     power = 1.0
-    for j in range(max(degree, changes) + 1):
-        push = ((abs(A[j]) if j <= degree else 0.0) + (abs(W[j]) if j <= changes else 0.0)) * power
+    for j in range(max(degree, weight_degree) + 1):
+        push = ((abs(A[j]) if j <= degree else 0.0) + (abs(W[j]) if j <= weight_degree else 0.0)) * power
         strength += push
         if j > 0:
             push_products += push * d[max(0, order - 1 - j)]
         power *= h
-    # The truncation of z is at most (angle_products + velocity z + (truncation of u') (angles + z))/(order - 1), with z
-    # below 1; the truncation of u' is at most stiffness (push_products + strength z)/order.
+    # The truncation of z is at most (angle_products + velocity z + (truncation of u') (angle_sum + z))/(order - 1),
+    # with z below 1; the truncation of u' is at most stiffness (push_products + strength z)/order.
     stiffness = abs(lam) * h * h
-    feedback = (velocity + stiffness * strength * (angles + 1.0) / order) / (order - 1)
+    feedback = (velocity + stiffness * strength * (angle_sum + 1.0) / order) / (order - 1)
     if not feedback < 0.5:
         return np.inf, largest
-    z = (angle_products + stiffness * push_products * (angles + 1.0) / order) / ((order - 1) * (1.0 - feedback))
+    z = (angle_products + stiffness * push_products * (angle_sum + 1.0) / order) / ((order - 1) * (1.0 - feedback))
     return (stiffness * (push_products + strength * z) / order if z < 1.0 else np.inf), largest
 
 
 @shared
-def truncation_restrained(
+def bound_restrained_truncation(
     block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
     """Bound the truncation of an arc of a restrained body.
@@ -316,42 +320,44 @@ def truncation_restrained(
     where Z, in the linear model U, bounds the omitted terms of the sine and cosine of both angles.
     """
     c, d = scratch.rotation, scratch.other
-    largest = last = 0.0
+    largest = last_term = 0.0
     power = 1.0
     for k in range(order + 1):
         d[k] = abs(c[k]) * power
-        last = k * d[k]
-        largest = max(largest, last)
+        last_term = k * d[k]
+        largest = max(largest, last_term)
         power *= h
     drag, spring = block.damping[side] * h, abs(block.spring[side]) * h * h
     stiffness = abs(block.stiffness[side]) * h * h
-    known = spring * (d[order - 1] + d[order]) + drag * last
+    known_terms = spring * (d[order - 1] + d[order]) + drag * last_term
     feedback = drag / order + spring / (order * (order + 1))
     if settings.nonlinear:
         prestress = abs(block.prestress[side]) * h * h
-        return beyond_angles(scratch, degrees, order, h, (stiffness, prestress, known, feedback)), largest
+        return bound_restrained_angles(
+            scratch, degrees, order, h, (stiffness, prestress, known_terms, feedback)
+        ), largest
     for k in range(order - 1, order - 2 - degrees[1], -1):  # sums of all later terms
         d[k] += d[k + 1]
     weight = 0.0
     power = stiffness
     for j in range(degrees[1] + 1):
         weight += abs(scratch.weight[j]) * power
-        known += abs(scratch.weight[j]) * power * d[order - 1 - j]
+        known_terms += abs(scratch.weight[j]) * power * d[order - 1 - j]
         power *= h
     feedback += weight / (order * (order + 1))
-    return (known / (order * (1.0 - feedback)) if feedback < 1.0 else np.inf), largest
+    return (known_terms / (order * (1.0 - feedback)) if feedback < 1.0 else np.inf), largest
 
 
 @inlined
-def beyond_angles(
+def bound_restrained_angles(
     scratch: Record, degrees: tuple[int, int], order: int, h: float, forces: tuple[float, float, float, float]
 ) -> float:
-    """Bound V of `truncation_restrained` in the nonlinear model; scratch.other contains the terms of the rotation.
+    """Bound V of `bound_restrained_truncation` in the nonlinear model; scratch.other contains terms of the rotation.
 
     ``forces``: stiffness and prestress times h^2, contribution of known terms, and feedback of V.
     """
     A, W, d = scratch.ground, scratch.weight, scratch.other
-    power, strength, known, feedback = forces
+    power, strength, known_terms, feedback = forces
     if not feedback < 0.5:
         return np.inf
     for k in range(1, order + 1):
@@ -359,44 +365,44 @@ def beyond_angles(
     for k in range(order - 2, -1, -1):  # sums of all later terms
         d[k] += d[k + 1]
     velocity = d[0]
-    total, products = angle_terms(scratch.sine, scratch.cosine, d, order, h)
+    angle_sum, products = sum_angle_terms(scratch.sine, scratch.cosine, d, order, h)
     if strength > 0.0:
-        of_half, products_of_half = angle_terms(scratch.half_sine, scratch.half_cosine, d, order, h)
-        total += of_half
-        products += products_of_half
-    sums_of_terms(scratch.sine, scratch.cosine, d, order, h)
+        half_sum, half_products = sum_angle_terms(scratch.half_sine, scratch.half_cosine, d, order, h)
+        angle_sum += half_sum
+        products += half_products
+    write_angle_tails(scratch.sine, scratch.cosine, d, order, h)
     for j in range(max(degrees[0], degrees[1]) + 1):
         push = ((abs(A[j]) if j <= degrees[0] else 0.0) + (abs(W[j]) if j <= degrees[1] else 0.0)) * power
         strength += push
         if j > 0:
-            known += push * d[max(0, order - 1 - j)]
+            known_terms += push * d[max(0, order - 1 - j)]
         power *= h
     per_order = 1.0 / (order * (1.0 - feedback))
-    returned = (velocity + strength * (total + 1.0) * per_order) / (order - 1)
-    if not returned < 0.5:
+    angle_feedback = (velocity + strength * (angle_sum + 1.0) * per_order) / (order - 1)
+    if not angle_feedback < 0.5:
         return np.inf
-    z = (products + known * (total + 1.0) * per_order) / ((order - 1) * (1.0 - returned))
-    return (known + strength * z) * per_order if z < 1.0 else np.inf
+    z = (products + known_terms * (angle_sum + 1.0) * per_order) / ((order - 1) * (1.0 - angle_feedback))
+    return (known_terms + strength * z) * per_order if z < 1.0 else np.inf
 
 
 @inlined
-def angle_terms(S: Floats, C: Floats, later: Floats, order: int, h: float) -> tuple[float, float]:
+def sum_angle_terms(S: Floats, C: Floats, tails: Floats, order: int, h: float) -> tuple[float, float]:
     """Sum the terms of an angle's sine and cosine up to ``order`` - 2, and the products omitted from their rates.
 
-    ``later[k]`` is the sum of the velocity's terms from k on. The first terms form a unit vector.
+    ``tails[k]`` is the sum of the velocity's terms from k on. The first terms form a unit vector.
     """
-    total, products = 1.0, later[order - 2]
+    total, products = 1.0, tails[order - 2]
     power = h
     for k in range(1, order - 1):
         term = (abs(S[k]) + abs(C[k])) * power
         total += term
-        products += term * later[order - 2 - k]
+        products += term * tails[order - 2 - k]
         power *= h
     return total, products
 
 
 @inlined
-def sums_of_terms(S: Floats, C: Floats, d: Floats, order: int, h: float) -> None:
+def write_angle_tails(S: Floats, C: Floats, d: Floats, order: int, h: float) -> None:
     """Write the sums of the terms of sine and cosine from each index on into d."""
     d[0] = 1.0
     power = h
@@ -408,7 +414,7 @@ def sums_of_terms(S: Floats, C: Floats, d: Floats, order: int, h: float) -> None
 
 
 @inlined
-def evaluate(c: Floats, order: int, t: float) -> tuple[float, float, float]:
+def evaluate_series(c: Floats, order: int, t: float) -> tuple[float, float, float]:
     """Evaluate rotation, velocity and acceleration (u, u', u'') of a series at time t after its centre."""
     u = c[order]
     v = 0.0

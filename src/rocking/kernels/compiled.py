@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rocking.kernels import library
-from rocking.kernels.sources import code_hash
+from rocking.kernels.sources import hash_code
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -27,14 +27,14 @@ UNCOMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
 
 
-def _by_numba(function: Callable[..., Any], **options: Any) -> Any:
+def _compile_with_numba(function: Callable[..., Any], **options: Any) -> Any:
     import numba
 
     return numba.njit(**options)(function)
 
 
 #: Compiler of all functions declared from now on; None if the library contains their code.
-compiler: Callable[..., Any] | None = None if os.environ.get("ROCKING_JIT", "0") in ("", "0") else _by_numba
+compiler: Callable[..., Any] | None = None if os.environ.get("ROCKING_JIT", "0") in ("", "0") else _compile_with_numba
 
 
 def kernel(function: F) -> F:
@@ -48,15 +48,15 @@ def kernel(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Declare a part of kernels that is small or called once, and always inlined."""
-    return _part(function, forceinline=True)
+    return _declare_part(function, forceinline=True)
 
 
 def shared(function: F) -> F:
     """Declare a part of kernels with several callers, where inlining would only duplicate code."""
-    return _part(function, forceinline=False)
+    return _declare_part(function, forceinline=False)
 
 
-def _part(function: F, *, forceinline: bool) -> F:
+def _declare_part(function: F, *, forceinline: bool) -> F:
     if UNCOMPILED or compiler is None:
         return function
     return compiler(function, forceinline=forceinline, **_OPTIONS)
@@ -65,15 +65,15 @@ def _part(function: F, *, forceinline: bool) -> F:
 def fingerprint() -> str:
     """Return a hash of the code of all kernels and their compiler."""
     if UNCOMPILED or compiler is not None:
-        return code_hash(Path(__file__).parent)
-    made = library.manifest()["made"]
-    return hashlib.sha256(f"{made['compiler']} {made['code']}".encode()).hexdigest()[:16]
+        return hash_code(Path(__file__).parent)
+    build = library.read_manifest()["made"]
+    return hashlib.sha256(f"{build['compiler']} {build['code']}".encode()).hexdigest()[:16]
 
 
-def state() -> str:
+def describe_mode() -> str:
     """Return a description of how the kernels run in this process."""
     if UNCOMPILED:
         return "none: NUMBA_DISABLE_JIT is set, and Python runs the kernels"
     if compiler is not None:
         return "compiled by numba when first called: ROCKING_JIT is set"
-    return f"library {library.opened().name}"
+    return f"library {library.open_library().name}"

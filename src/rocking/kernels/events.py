@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.kernels.arc import evaluate
+from rocking.kernels.arc import evaluate_series
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.ground import move
-from rocking.kernels.state import Outcome, Record
+from rocking.kernels.ground import shift_polynomial
+from rocking.kernels.state import Record, StepOutcome
 
 _EPSILON = 2.0**-53
 
@@ -21,12 +21,12 @@ _STEPS_PER_WINDOW = 8
 _WINDOW = 4.0
 
 #: About six steps find a simple root, tens to thousands a minimum near zero. A series that is still not negative after
-#: _MAXIMUM_STEPS is within 1e-10 of zero relative to its curvature, which counts as a root.
-_MAXIMUM_STEPS = 100_000
+#: _MAX_STEPS is within 1e-10 of zero relative to its curvature, which counts as a root.
+_MAX_STEPS = 100_000
 
 
 @shared
-def first_root(c: Floats, lead: int, order: int, h: float) -> float:
+def find_first_root(c: Floats, lead: int, order: int, h: float) -> float:
     """Find the first root in (0, h] of sum_k c[lead + k] t^k (Eq. 20: Eq. 15 divided by t^lead); NaN if there is none.
 
     A zero at 0 is not a root, nor is a negative value there, which is rounding. The parabola through the current value
@@ -42,15 +42,15 @@ def first_root(c: Floats, lead: int, order: int, h: float) -> float:
     if f == 0.0 and slope <= 0.0:
         return np.nan
     window = h
-    bound = curvature_bound(c, lead, order, window)
-    for n in range(1, _MAXIMUM_STEPS + 1):
-        root = math.sqrt(slope * slope + 2.0 * bound * f)
-        if root == 0.0:  # by underflow only
-            root = math.sqrt(2.0 * bound) * math.sqrt(f)
+    bound = bound_curvature(c, lead, order, window)
+    for n in range(1, _MAX_STEPS + 1):
+        radical = math.sqrt(slope * slope + 2.0 * bound * f)
+        if radical == 0.0:  # by underflow only
+            radical = math.sqrt(2.0 * bound) * math.sqrt(f)
         # The two forms of the parabola's root; neither subtracts numbers of the same sign.
-        above, below = (slope + root, bound) if slope > 0.0 else (2.0 * f, root - slope)
-        if above <= below * (window - t):
-            step = above / below
+        numerator, denominator = (slope + radical, bound) if slope > 0.0 else (2.0 * f, radical - slope)
+        if numerator <= denominator * (window - t):
+            step = numerator / denominator
             t += step
             if step <= _EPSILON * t:
                 return t
@@ -60,15 +60,15 @@ def first_root(c: Floats, lead: int, order: int, h: float) -> float:
             return np.nan
         if t == window or n % _STEPS_PER_WINDOW == 0:
             window = min(h, _WINDOW * t)
-            bound = curvature_bound(c, lead, order, window)
-        f, slope = deflated(c, lead, order, t)
+            bound = bound_curvature(c, lead, order, window)
+        f, slope = evaluate_deflated(c, lead, order, t)
         if f <= 0.0:
             return t
     return t
 
 
 @inlined
-def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
+def bound_curvature(c: Floats, lead: int, order: int, h: float) -> float:
     """Compute a bound B >= 0 with f'' >= -B on [0, h] for the deflated series f, from its negative terms."""
     lowest = 0.0
     power = 1.0
@@ -81,7 +81,7 @@ def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
 
 
 @inlined
-def deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
+def evaluate_deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
     """Compute value and slope of sum_k c[lead + k] t^k."""
     f = c[order]
     slope = 0.0
@@ -96,40 +96,37 @@ _SAME_PEAK = 2.0**-40
 
 
 class StepEnd(NamedTuple):
-    """End of a step: `Outcome`; time, u, u' there; time and value of the largest rotation during the step.
+    """End of a step."""
 
-    The last two refer to its end if no rotation exceeds the largest so far.
-    """
-
-    outcome: int
-    time: float
-    u: float
-    v: float
-    peak_time: float
-    peak: float
+    outcome: int  # a `StepOutcome`
+    time: float  # length of the step
+    u: float  # rotation at the end
+    v: float  # velocity at the end
+    peak_time: float  # time of the largest rotation; the end if none exceeds the largest so far
+    peak: float  # rotation at that time
 
 
 @shared
-def advance(state: Record, scratch: Record, order: int, h: float, fallen: float) -> StepEnd:
+def advance_to_event(state: Record, scratch: Record, order: int, h: float, overturn_angle: float) -> StepEnd:
     """Follow the series of an arc to its first event within h; the outcome is STEP, IMPACT or OVERTURN."""
     c, d = scratch.rotation, scratch.other
     lead = 0 if state.u > 0.0 else (1 if state.v > 0.0 else 2)
-    time = first_root(c, lead, order, h)
-    outcome = Outcome.IMPACT
+    time = find_first_root(c, lead, order, h)
+    outcome = StepOutcome.IMPACT
     if math.isnan(time):
         time = h
-        outcome = Outcome.STEP
-    end, speed, _ = evaluate(c, order, time)
+        outcome = StepOutcome.STEP
+    end, speed, _ = evaluate_series(c, order, time)
     if end <= 0.0:  # also without a root, which may be within rounding of the step's end
-        outcome, end = Outcome.IMPACT, 0.0
+        outcome, end = StepOutcome.IMPACT, 0.0
     peak_time, peak = time, end
-    if is_higher_between(state, end, c, order, time):
-        peak_time, peak = highest(order, time, c, d)
-    if peak >= fallen:
-        passage = first_passage(c, order, fallen, peak_time, d)
-        _, speed, _ = evaluate(c, order, passage)
-        return StepEnd(Outcome.OVERTURN, passage, fallen, speed, passage, fallen)
-    if outcome == Outcome.IMPACT:
+    if may_exceed_peak(state, end, c, order, time):
+        peak_time, peak = find_maximum(order, time, c, d)
+    if peak >= overturn_angle:
+        passage = find_first_passage(c, order, overturn_angle, peak_time, d)
+        _, speed, _ = evaluate_series(c, order, passage)
+        return StepEnd(StepOutcome.OVERTURN, passage, overturn_angle, speed, passage, overturn_angle)
+    if outcome == StepOutcome.IMPACT:
         end = 0.0
     return StepEnd(outcome, time, end, speed, peak_time, peak)
 
@@ -146,13 +143,13 @@ def raise_peak(state: Record, peak: float, time: float) -> None:
 
 
 @inlined
-def is_higher_between(state: Record, end: float, c: Floats, order: int, h: float) -> bool:
+def may_exceed_peak(state: Record, end: float, c: Floats, order: int, h: float) -> bool:
     """Return whether a series may exceed, within (0, h), its values at both ends and the largest rotation so far."""
-    bend = curvature_bound(c, 0, order, h)
-    if max(state.u, end) + 0.125 * h * h * bend <= state.peak:
+    curvature = bound_curvature(c, 0, order, h)
+    if max(state.u, end) + 0.125 * h * h * curvature <= state.peak:
         return False
     if state.v > 0.0:
-        return bool(state.v < bend * h)
+        return bool(state.v < curvature * h)
     rise = state.v
     power = h
     for k in range(2, order + 1):
@@ -162,36 +159,36 @@ def is_higher_between(state: Record, end: float, c: Floats, order: int, h: float
 
 
 @shared
-def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
+def find_maximum(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
     """Find time and value of a series' maximum on (0, h] between turning points; ``d`` is scratch space."""
-    best_time = h
-    best, _, _ = evaluate(c, order, h)
+    highest_time = h
+    highest, _, _ = evaluate_series(c, order, h)
     for k in range(order):
         d[k] = (k + 1) * c[k + 1]
     t = 0.0
-    rising = True
+    is_rising = True
     for _ in range(order):
         lead = 0
         while lead < order - 1 and d[lead] == 0.0:
             lead += 1
         if d[lead] < 0.0:
-            rising = not rising
+            is_rising = not is_rising
             for k in range(order):
                 d[k] = -d[k]
-        turn = first_root(d, lead, order - 1, h - t)
-        if not turn > 0.0:
+        step = find_first_root(d, lead, order - 1, h - t)
+        if not step > 0.0:
             break
-        t += turn
-        value, _, _ = evaluate(c, order, t)
-        if rising and value > best:
-            best_time, best = t, value
-        move(d, order - 1, turn)
+        t += step
+        value, _, _ = evaluate_series(c, order, t)
+        if is_rising and value > highest:
+            highest_time, highest = t, value
+        shift_polynomial(d, order - 1, step)
         d[0] = 0.0
-    return best_time, best
+    return highest_time, highest
 
 
 @inlined
-def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> float:
+def find_first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> float:
     """Find the first time in (0, h] at which a series that is below ``level`` at 0, but not at h, reaches it.
 
     ``d`` is scratch space.
@@ -199,22 +196,22 @@ def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> f
     d[0] = level - c[0]
     for k in range(1, order + 1):
         d[k] = -c[k]
-    time = first_root(d, 0, order, h)
+    time = find_first_root(d, 0, order, h)
     return h if math.isnan(time) else time
 
 
 @inlined
 def apply_impact(block: Record, state: Record) -> float:
     """Reduce the angular speed and change the side at an impact; return the earlier speed."""
-    left = state.side
+    left_side = state.side
     speed = max(0.0, -state.v)
-    state.side = block.next_side[left]
+    state.side = block.next_side[left_side]
     if block.two_stops and state.u > 0.0:  # at the stop on the other side
-        left = state.side = 1 - left
+        left_side = state.side = 1 - left_side
         speed = max(0.0, state.v)
         state.certificate_speed = np.inf
     state.u = 0.0
-    state.v = factor(block, left, speed, state.impacts) * speed
+    state.v = restitution_factor(block, left_side, speed, state.impacts) * speed
     state.impacts += 1
     return speed
 
@@ -231,54 +228,54 @@ _WORD = 0xFFFFFFFF
 
 
 @inlined
-def factor(block: Record, side: int, speed: float, number: int) -> float:
+def restitution_factor(block: Record, side: int, speed: float, number: int) -> float:
     """Return the factor on the speed of an impact that leaves a side, after ``number`` others."""
     if block.variable_restitution:
-        return varying_factor(block, side, speed, number)
+        return variable_factor(block, side, speed, number)
     return float(block.restitution[side])
 
 
 @shared
-def varying_factor(block: Record, side: int, speed: float, number: int) -> float:
-    """Compute a variable factor; see `factor`."""
-    least, largest = block.min_restitution[side], block.restitution[side]
-    if is_drawn(block):
-        return min(largest, least + (largest - least) * uniform(int(block.seed), int(number)))
-    return max(least, largest - block.restitution_slope[side] * speed)
+def variable_factor(block: Record, side: int, speed: float, number: int) -> float:
+    """Compute a variable factor; see `restitution_factor`."""
+    lowest, highest = block.min_restitution[side], block.restitution[side]
+    if is_factor_random(block):
+        return min(highest, lowest + (highest - lowest) * draw_uniform(int(block.seed), int(number)))
+    return max(lowest, highest - block.restitution_slope[side] * speed)
 
 
 @inlined
-def is_drawn(block: Record) -> bool:
+def is_factor_random(block: Record) -> bool:
     """Return whether the factor is drawn at each impact."""
     return bool(block.variable_restitution and block.seed >= 0)
 
 
 @inlined
-def relative_slope(block: Record, side: int, speed: float, e: float) -> float:
-    """Return d(speed after)/d(speed before) of an impact, divided by the factor e (1 if the factor is constant)."""
+def relative_speed_slope(block: Record, side: int, speed: float, e: float) -> float:
+    """Compute d(speed after)/d(speed before) of an impact, divided by the factor e (1 if the factor is constant)."""
     if block.variable_restitution and block.seed < 0 and e > block.min_restitution[side]:
         return 1.0 - block.restitution_slope[side] * speed / e
     return 1.0
 
 
 @inlined
-def least_factor(block: Record, side: int, fastest: float) -> float:
+def min_factor(block: Record, side: int, max_speed: float) -> float:
     """Return the smallest factor up to a speed; the largest is ``block.restitution``."""
     if not block.variable_restitution:
         return float(block.restitution[side])
     if block.seed >= 0:
         return float(block.min_restitution[side])
-    return max(block.min_restitution[side], block.restitution[side] - block.restitution_slope[side] * fastest)
+    return max(block.min_restitution[side], block.restitution[side] - block.restitution_slope[side] * max_speed)
 
 
 @inlined
-def middle_factor(block: Record, side: int, fastest: float) -> float:
+def mean_factor(block: Record, side: int, max_speed: float) -> float:
     """Return the midpoint of all factors up to a speed."""
-    return 0.5 * (least_factor(block, side, fastest) + block.restitution[side])
+    return 0.5 * (min_factor(block, side, max_speed) + block.restitution[side])
 
 
 @shared
-def uniform(seed: int, number: int) -> float:
+def draw_uniform(seed: int, number: int) -> float:
     """Draw from [0, 1) a multiple of 2^-53 that depends only on a seed below 2^63 and a number below 2^32.
 
     Only lower halves of sums and products matter, except for one product, whose upper half of 64 bits is the same for

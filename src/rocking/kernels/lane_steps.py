@@ -9,7 +9,13 @@ from typing import TypeVar
 import numpy as np
 
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.series import Line, nonlinear_rates, strength_of, truncation_is_negligible, weighted_rates
+from rocking.kernels.series import (
+    Line,
+    has_negligible_truncation,
+    nonlinear_velocity_terms,
+    sum_forcing,
+    weighted_velocity_terms,
+)
 from rocking.kernels.state import Record
 
 #: Number of lanes that step together, a constant so that their loops have a fixed length.
@@ -48,7 +54,7 @@ _NEXT_TERMS = 2.0**-46
 
 @inlined
 def is_event_free(
-    ends: Line, rate: float, below: float, above: float, change: Line, peak: float, fallen: float
+    ends: Line, rate: float, below: float, above: float, change: Line, peak: float, overturn_angle: float
 ) -> bool:
     """Return whether a step certainly contains no impact, new peak or overturning; False for NaN.
 
@@ -57,21 +63,26 @@ def is_event_free(
     the end, which the next step compares; a falling one has it at the start, which must not exceed the peak so far.
     """
     u, u1 = ends
-    least, most = change
+    lower, upper = change
     highest = max(u, u1)
-    rises = rate + least > 0.0
-    falls = (rate + most < 0.0) & (u <= peak)
+    is_rising = rate + lower > 0.0
+    is_falling = (rate + upper < 0.0) & (u <= peak)
     # The comparisons are separate because a minimum may ignore a NaN.
-    return (u > below) & (u1 > below) & ((highest + above <= peak) | rises | falls) & (highest + above < fallen)
+    return (
+        (u > below)
+        & (u1 > below)
+        & ((highest + above <= peak) | is_rising | is_falling)
+        & (highest + above < overturn_angle)
+    )
 
 
 @shared
-def step_linear(group: Record, push: Line, h: float, longer: float, fallen: float) -> int:
+def step_linear(group: Record, push: Line, h: float, excess: float, overturn_angle: float) -> int:
     """Step a group through one sample by Stumpff's functions (exact for any lam and h); return the number of events.
 
     ``push`` is the ground acceleration and its slope. Because w = u'' then satisfies w'' = lam w, its extrema are at
     the ends of the step (except for ``curve``). Rounding of sample times makes the sample longer than ``h`` by
-    ``longer``.
+    ``excess``.
     """
     start, slope = push
     end = start + slope * h
@@ -84,17 +95,19 @@ def step_linear(group: Record, push: Line, h: float, longer: float, fallen: floa
         u1 = u + (h * v + (group.second[lane] * w + group.third[lane] * j))
         v1 = v + (group.first[lane] * w + group.second[lane] * j)
         w1 = lam * u1 - (group.pull[lane] + push_gain * end)
-        u1 += longer * v1
-        v1 += longer * w1
-        least, most = min(min(w, w1), 0.0), max(max(w, w1), 0.0)
+        u1 += excess * v1
+        v1 += excess * w1
+        min_w, max_w = min(min(w, w1), 0.0), max(max(w, w1), 0.0)
         curve = group.curve[lane]
         # Eight times ``curve`` is h^2; its product with the smallest w is h times the smallest change of the rate.
-        change = (8.0 * curve * least, 8.0 * curve * most)
-        free = is_event_free((u, u1), h * v, curve * most, -(curve * least), change, group.peak[lane], fallen)
-        group.u[lane] = u1 if free else u
-        group.v[lane] = v1 if free else v
-        group.event[lane] = not free
-        events += not free
+        change = (8.0 * curve * min_w, 8.0 * curve * max_w)
+        is_free = is_event_free(
+            (u, u1), h * v, curve * max_w, -(curve * min_w), change, group.peak[lane], overturn_angle
+        )
+        group.u[lane] = u1 if is_free else u
+        group.v[lane] = v1 if is_free else v
+        group.event[lane] = not is_free
+        events += not is_free
     return events
 
 
@@ -113,7 +126,7 @@ def copy_states(group: Record, h: float) -> None:
 
 
 @inlined
-def over_substep(line: MaybeLine, k: int, h: float) -> MaybeLine:
+def line_during(line: MaybeLine, k: int, h: float) -> MaybeLine:
     """Return the value at the start of the k-th substep of length h and the change during it, or None for None."""
     if line is None:
         return line
@@ -126,17 +139,17 @@ def accept_states(group: Record, rate: float) -> int:
     """Copy the new states of lanes without an event, and return the number of the other lanes."""
     events = 0
     for lane in range(WIDTH):
-        event = group.event[lane]
-        group.u[lane] = group.u[lane] if event else group.next_u[lane]
-        group.v[lane] = group.v[lane] if event else group.next_v[lane] * rate
-        group.sine[lane] = group.sine[lane] if event else group.next_sine[lane]
-        group.cosine[lane] = group.cosine[lane] if event else group.next_cosine[lane]
-        events += event
+        has_event = group.event[lane]
+        group.u[lane] = group.u[lane] if has_event else group.next_u[lane]
+        group.v[lane] = group.v[lane] if has_event else group.next_v[lane] * rate
+        group.sine[lane] = group.sine[lane] if has_event else group.next_sine[lane]
+        group.cosine[lane] = group.cosine[lane] if has_event else group.next_cosine[lane]
+        events += has_event
     return events
 
 
 @shared
-def step_weighted(group: Record, push: Line, weight: Line, length: float, substeps: int, fallen: float) -> int:
+def step_weighted(group: Record, push: Line, weight: Line, length: float, substeps: int, overturn_angle: float) -> int:
     """Step a group of the linear model through one sample under varying weight; return the number of events.
 
     ``push`` is the ground acceleration.
@@ -144,12 +157,12 @@ def step_weighted(group: Record, push: Line, weight: Line, length: float, subste
     h = length / substeps
     copy_states(group, 1.0)
     for k in range(substeps):
-        weighted_substep(group, over_substep(push, k, h), over_substep(weight, k, h), h, fallen)
+        take_weighted_substep(group, line_during(push, k, h), line_during(weight, k, h), h, overturn_angle)
     return accept_states(group, 1.0)
 
 
 @shared
-def weighted_substep(group: Record, push: Line, weight: Line, h: float, fallen: float) -> None:
+def take_weighted_substep(group: Record, push: Line, weight: Line, h: float, overturn_angle: float) -> None:
     """Move the copies through a substep of length h and mark the lanes in which an event may occur.
 
     With z = h^2 (lam u - pull), r' = weight z - h^2 push. A term contributes to the second next and, as the weight
@@ -161,42 +174,44 @@ def weighted_substep(group: Record, push: Line, weight: Line, h: float, fallen: 
         u, v = group.next_u[lane], group.next_v[lane]
         q, gain = group.stiffness[lane] * square, group.push[lane] * square
         z0 = q * u - group.pull[lane] * square
-        terms, r10, r11 = weighted_rates(v * h, z0, q, (gain * push[0], gain * push[1]), weight)
+        terms, r10, r11 = weighted_velocity_terms(v * h, z0, q, (gain * push[0], gain * push[1]), weight)
         r1, r2, r3, r4, r5, r6, r7, r8, r9 = terms
         high = 0.125 * r8 + ((1.0 / 9.0) * r9 + (0.1 * r10 + (1.0 / 11.0) * r11))
         low = (1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + ((1.0 / 7.0) * r7 + high))))
         u1 = u + (r1 + (0.5 * r2 + low))
         v1 = v + rate * (r2 + (r3 + (r4 + (r5 + (r6 + (r7 + (r8 + (r9 + (r10 + r11)))))))))
-        later = 3.0 * abs(r4) + (4.0 * abs(r5) + (5.0 * abs(r6) + (6.0 * abs(r7) + 7.0 * abs(r8))))
-        later += 8.0 * abs(r9) + (9.0 * abs(r10) + 10.0 * abs(r11))
-        least, most = min(r2 + 2.0 * min(r3, 0.0) - later, 0.0), max(r2 + 2.0 * max(r3, 0.0) + later, 0.0)
-        free = is_event_free((u, u1), r1, 0.125 * most, -0.125 * least, (least, most), group.peak[lane], fallen)
-        last = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
-        free &= abs(q) * last <= _NEXT_TERMS * (abs(r1) + abs(r2))
-        group.event[lane] |= not free
+        tail = 3.0 * abs(r4) + (4.0 * abs(r5) + (5.0 * abs(r6) + (6.0 * abs(r7) + 7.0 * abs(r8))))
+        tail += 8.0 * abs(r9) + (9.0 * abs(r10) + 10.0 * abs(r11))
+        lower, upper = min(r2 + 2.0 * min(r3, 0.0) - tail, 0.0), max(r2 + 2.0 * max(r3, 0.0) + tail, 0.0)
+        is_free = is_event_free(
+            (u, u1), r1, 0.125 * upper, -0.125 * lower, (lower, upper), group.peak[lane], overturn_angle
+        )
+        last_terms = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
+        is_free &= abs(q) * last_terms <= _NEXT_TERMS * (abs(r1) + abs(r2))
+        group.event[lane] |= not is_free
         group.next_u[lane] = u1
         group.next_v[lane] = v1
 
 
 @shared
 def step_nonlinear(
-    group: Record, push: Line, weight: Line | None, length: float, h: float, substeps: int, fallen: float
+    group: Record, push: Line, weight: Line | None, length: float, h: float, substeps: int, overturn_angle: float
 ) -> int:
     """Step a group of the nonlinear model through one sample and return the number of events.
 
     ``push`` is the ground acceleration; a weight of None is constant. Due to rounded sample times, the sample has
     ``length``, but the constants of the lanes are for ``h``.
     """
-    share = length / substeps
-    copy_states(group, share)
+    span = length / substeps
+    copy_states(group, span)
     for k in range(substeps):
         scale = (length / h) ** 2
-        nonlinear_substep(group, over_substep(push, k, share), over_substep(weight, k, share), scale, fallen)
-    return accept_states(group, 1.0 / share)
+        take_nonlinear_substep(group, line_during(push, k, span), line_during(weight, k, span), scale, overturn_angle)
+    return accept_states(group, 1.0 / span)
 
 
 @shared
-def nonlinear_substep(group: Record, push: Line, weight: Line | None, scale: float, fallen: float) -> None:
+def take_nonlinear_substep(group: Record, push: Line, weight: Line | None, scale: float, overturn_angle: float) -> None:
     """Move the copies through one substep and mark the lanes in which an event may occur.
 
     ``push`` and ``weight`` include their changes. ``scale`` is the squared ratio of its length to the usual one. The
@@ -207,19 +222,21 @@ def nonlinear_substep(group: Record, push: Line, weight: Line | None, scale: flo
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
         side_push = (group.push[lane] * push[0], group.push[lane] * push[1])
         l2 = group.stiffness[lane] * scale
-        terms, angles = nonlinear_rates(r1, (s0, c0), l2, side_push, weight)
+        terms, angles = nonlinear_velocity_terms(r1, (s0, c0), l2, side_push, weight)
         _, r2, r3, r4, r5, r6, r7, r8, r9 = terms
-        last = (1.0 / 7.0) * r7 + (0.125 * r8 + (1.0 / 9.0) * r9)
-        change = r1 + (0.5 * r2 + ((1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + last)))))
+        last_terms = (1.0 / 7.0) * r7 + (0.125 * r8 + (1.0 / 9.0) * r9)
+        change = r1 + (0.5 * r2 + ((1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + last_terms)))))
         u1 = u + change
         v1 = r1 + (r2 + (r3 + (r4 + (r5 + (r6 + (r7 + (r8 + r9)))))))
         sizes = (abs(r1), abs(r2), abs(r3), abs(r4), abs(r5), abs(r6), abs(r7), abs(r8), abs(r9))
-        strength = strength_of(weight, side_push, 1.0)
-        converged, later = truncation_is_negligible(sizes, angles, -2.0 * l2, strength)
-        least, most = min(r2 - later, 0.0), max(r2 + later, 0.0)
-        free = is_event_free((u, u1), r1, 0.125 * most, -0.125 * least, (least, most), group.peak[lane], fallen)
-        free &= converged
-        group.event[lane] |= not free
+        strength = sum_forcing(weight, side_push, 1.0)
+        is_converged, tail = has_negligible_truncation(sizes, angles, -2.0 * l2, strength)
+        lower, upper = min(r2 - tail, 0.0), max(r2 + tail, 0.0)
+        is_free = is_event_free(
+            (u, u1), r1, 0.125 * upper, -0.125 * lower, (lower, upper), group.peak[lane], overturn_angle
+        )
+        is_free &= is_converged
+        group.event[lane] |= not is_free
         # sine and 1 - cosine of the change of the rotation
         square = change * change
         higher = 1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0))

@@ -14,7 +14,15 @@ import numpy as np
 from rocking.core.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel
 from rocking.kernels.events import raise_peak
-from rocking.kernels.ground import Ground, coefficient, has_vertical, last_piece, length_of, start_of, vertical_of
+from rocking.kernels.ground import (
+    Ground,
+    coefficient,
+    has_vertical,
+    last_piece,
+    piece_length,
+    piece_start,
+    vertical_component,
+)
 from rocking.kernels.lane_steps import GROUP, STEP_CONSTANTS, WIDTH, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.march import march
 from rocking.kernels.state import (
@@ -22,17 +30,17 @@ from rocking.kernels.state import (
     Ending,
     Record,
     Records,
-    attributed,
+    expose_fields,
+    new_record,
+    new_records,
     new_table,
-    record,
-    records,
 )
 
-#: Largest sqrt(|lam W|) h of a block in lanes, where W is its weight divided by the weight at rest; of a substep of the
-#: nonlinear model; and of a substep of the linear model under varying weight.
-LONGEST_STEP = 1.0
-LONGEST_SUBSTEP = 0.04
-LONGEST_WEIGHTED_SUBSTEP = 0.125
+#: Largest sqrt(|lam W|) h in lanes, where W is the weight divided by the weight at rest: of a step, of a substep of the
+#: nonlinear model, and of a substep of the linear model under varying weight.
+MAX_STEP = 1.0
+MAX_SUBSTEP = 0.04
+MAX_WEIGHTED_SUBSTEP = 0.125
 
 #: Rotation of a lane without a block.
 EMPTY_ROTATION = 1e-300
@@ -42,53 +50,49 @@ COUNTS = np.dtype([("active", "i8"), ("free", "i8"), ("waiting", "i8")], align=T
 
 
 class Pool(NamedTuple):
-    """Blocks, their states and step constants, groups of lanes, and queues of blocks that wait for a piece.
+    """Blocks, groups of lanes, and queues of blocks that wait for a piece."""
 
-    ``first[piece]`` is the first block that waits for a piece, ``following[block]`` the next one (-1: none), and
-    ``free`` the lanes that have become free. ``table`` has no rows.
-    """
-
-    blocks: Records
-    states: Records
-    steps: Records
-    groups: Records
-    first: Integers
-    following: Integers
-    free: Integers
-    counts: Record
-    table: Records
-    fallen: float
+    blocks: Records  # bodies
+    states: Records  # state of each block
+    steps: Records  # step constants of each block
+    groups: Records  # groups of lanes
+    first_waiting: Integers  # for each piece, the first block that waits for it; -1: none
+    next_waiting: Integers  # for each block, the next one that waits for the same piece; -1: none
+    free_lanes: Integers  # lanes that have become free
+    counts: Record  # `COUNTS`
+    table: Records  # table without rows
+    overturn_angle: float  # smallest rotation at which a block overturns
 
 
-def pool_of(blocks: Records, states: Records, pieces: int, h: float, substeps: int) -> Pool:
+def build_pool(blocks: Records, states: Records, pieces: int, h: float, substeps: int) -> Pool:
     """Return a pool in which every block waits for the first piece; ``substeps`` is 0 in the linear model."""
     count = len(blocks)
-    groups = _on_cache_lines(-(-count // WIDTH), GROUP)
+    groups = _allocate_aligned(-(-count // WIDTH), GROUP)
     groups["block"] = -1
     groups["u"] = EMPTY_ROTATION
     groups["peak"] = np.inf
-    first = np.full(pieces + 1, -1, dtype=np.int64)
-    following = np.arange(1, count + 1, dtype=np.int64)
-    following[-1] = -1
-    first[0] = 0
+    first_waiting = np.full(pieces + 1, -1, dtype=np.int64)
+    next_waiting = np.arange(1, count + 1, dtype=np.int64)
+    next_waiting[-1] = -1
+    first_waiting[0] = 0
     return Pool(
-        blocks, states, step_constants(blocks, h, substeps), groups, first, following,
-        np.zeros(count, dtype=np.int64), record(COUNTS, waiting=count), new_table(0),
+        blocks, states, compute_step_constants(blocks, h, substeps), groups, first_waiting, next_waiting,
+        np.zeros(count, dtype=np.int64), new_record(COUNTS, waiting=count), new_table(0),
         float(blocks["overturn_angle"].min()),
     )  # fmt: skip
 
 
-def _on_cache_lines(count: int, kind: np.dtype[np.void]) -> Records:
+def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Records:
     """Return zeroed records that start on a cache line (vectors across two lines are read at half the speed)."""
-    line = 64
-    space = np.zeros(count * kind.itemsize + line, dtype=np.uint8)
-    skip = -space.ctypes.data % line
-    return attributed(space[skip : skip + count * kind.itemsize].view(kind))
+    line_size = 64
+    buffer = np.zeros(count * kind.itemsize + line_size, dtype=np.uint8)
+    skip = -buffer.ctypes.data % line_size
+    return expose_fields(buffer[skip : skip + count * kind.itemsize].view(kind))
 
 
-def step_constants(blocks: Records, h: float, substeps: int) -> Records:
+def compute_step_constants(blocks: Records, h: float, substeps: int) -> Records:
     """Compute the constants of a step of length h for every block (`STEP_CONSTANTS`)."""
-    steps = records(len(blocks), STEP_CONSTANTS)
+    steps = new_records(len(blocks), STEP_CONSTANTS)
     lam = blocks["stiffness"]
     sign = np.array([1.0, -1.0])
     if substeps > 0:
@@ -159,12 +163,12 @@ def write_lane(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
     state.u = group.u[slot]
     state.v = group.v[slot]
     if state.u > state.peak:
-        raise_peak(state, state.u, start_of(ground, piece))
+        raise_peak(state, state.u, piece_start(ground, piece))
     return index
 
 
 @inlined
-def empty(pool: Pool, lane: int) -> None:
+def clear_lane(pool: Pool, lane: int) -> None:
     """Remove the block of a lane; no step then changes the lane or detects an event."""
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     group.block[slot] = -1
@@ -176,10 +180,10 @@ def empty(pool: Pool, lane: int) -> None:
 
 
 @inlined
-def move_block(pool: Pool, lane: int, to: int) -> None:
+def move_block(pool: Pool, lane: int, target_lane: int) -> None:
     """Move a block from one lane to another."""
     source, i = pool.groups[lane // WIDTH], lane % WIDTH
-    target, j = pool.groups[to // WIDTH], to % WIDTH
+    target, j = pool.groups[target_lane // WIDTH], target_lane % WIDTH
     index = source.block[i]
     state = pool.states[index]
     state.u = source.u[i]
@@ -187,9 +191,9 @@ def move_block(pool: Pool, lane: int, to: int) -> None:
     peak = source.peak[i]
     target.sine[j] = source.sine[i]
     target.cosine[j] = source.cosine[i]
-    fill_lane(pool, to, index)
+    fill_lane(pool, target_lane, index)
     target.peak[j] = peak
-    empty(pool, lane)
+    clear_lane(pool, lane)
 
 
 # ---- The loop over the samples of a record ----
@@ -202,8 +206,8 @@ def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, sub
     ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``ending`` of every state is an
     `Ending`; RUNNING and PAUSED states can be continued individually.
     """
-    piece = next_waited_for(pool, 0)
-    while piece < last_piece(ground) and start_of(ground, piece + 1) <= settings.stop:
+    piece = next_waiting_piece(pool, 0)
+    while piece < last_piece(ground) and piece_start(ground, piece + 1) <= settings.stop:
         step_groups(ground, settings, scratch, pool, piece, substeps)
         drop_finished(pool)
         admit_waiting(ground, settings, scratch, pool, piece)
@@ -211,7 +215,7 @@ def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, sub
         if pool.counts.active == 0:
             if pool.counts.waiting == 0:
                 return
-            piece = next_waited_for(pool, piece)
+            piece = next_waiting_piece(pool, piece)
     for lane in range(pool.counts.active):
         write_lane(ground, pool, lane, piece)
     for index in range(pool.blocks.shape[0]):
@@ -220,16 +224,16 @@ def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, sub
 
 
 @kernel
-def march_each(ground: Ground, settings: Record, scratch: Record, pool: Pool) -> None:
+def march_blocks(ground: Ground, settings: Record, scratch: Record, pool: Pool) -> None:
     """Simulate every block of a pool to its end, one by one; ``ending`` of every state is then an `Ending`."""
     for index in range(pool.blocks.shape[0]):
         march_until(ground, settings, scratch, pool, index, TO_THE_END)
 
 
 @inlined
-def next_waited_for(pool: Pool, piece: int) -> int:
+def next_waiting_piece(pool: Pool, piece: int) -> int:
     """Return the first piece from ``piece`` on with a waiting block, or the end of the motion."""
-    while piece < pool.first.shape[0] - 1 and pool.first[piece] < 0:
+    while piece < pool.first_waiting.shape[0] - 1 and pool.first_waiting[piece] < 0:
         piece += 1
     return piece
 
@@ -239,7 +243,7 @@ def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, p
     """Move all lanes through one sample: together, or by a march if an event may occur."""
     for first in range(0, pool.counts.active, WIDTH):
         group = pool.groups[first // WIDTH]
-        events = step_group(ground, settings, group, piece, substeps, pool.fallen)
+        events = step_group(ground, settings, group, piece, substeps, pool.overturn_angle)
         slot = 0
         while events > 0:
             if group.event[slot] != 0:
@@ -249,30 +253,32 @@ def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, p
 
 
 @inlined
-def step_group(ground: Ground, settings: Record, group: Record, piece: int, substeps: int, fallen: float) -> int:
+def step_group(
+    ground: Ground, settings: Record, group: Record, piece: int, substeps: int, overturn_angle: float
+) -> int:
     """Step a group through one sample and return the number of lanes with possible events."""
     push = (coefficient(ground, piece, 0), coefficient(ground, piece, 1))
-    length, h = length_of(ground, piece), length_of(ground, 0)
+    length, h = piece_length(ground, piece), piece_length(ground, 0)
     if has_vertical(ground):
-        lift = vertical_of(ground)
-        weight = (1.0 + coefficient(lift, piece, 0), coefficient(lift, piece, 1))
+        vertical = vertical_component(ground)
+        weight = (1.0 + coefficient(vertical, piece, 0), coefficient(vertical, piece, 1))
         if settings.nonlinear:
-            return step_nonlinear(group, push, weight, length, h, substeps, fallen)
-        return step_weighted(group, push, weight, length, substeps, fallen)
+            return step_nonlinear(group, push, weight, length, h, substeps, overturn_angle)
+        return step_weighted(group, push, weight, length, substeps, overturn_angle)
     if settings.nonlinear:
-        return step_nonlinear(group, push, None, length, h, substeps, fallen)
-    return step_linear(group, push, h, length - h, fallen)
+        return step_nonlinear(group, push, None, length, h, substeps, overturn_angle)
+    return step_linear(group, push, h, length - h, overturn_angle)
 
 
 @inlined
 def march_sample(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int, lane: int) -> None:
-    """March the block of a lane through one sample; it keeps its lane if still rocking."""
+    """March the block of a lane through one sample, and free the lane unless the block still rocks."""
     index = write_lane(ground, pool, lane, piece)
     if march_until(ground, settings, scratch, pool, index, piece + 1):
         start_lane(settings, pool, lane, index)
     else:
-        empty(pool, lane)
-        pool.free[pool.counts.free] = lane
+        clear_lane(pool, lane)
+        pool.free_lanes[pool.counts.free] = lane
         pool.counts.free += 1
 
 
@@ -285,28 +291,28 @@ def start_lane(settings: Record, pool: Pool, lane: int, index: int) -> None:
 
 
 @inlined
-def march_until(ground: Ground, settings: Record, scratch: Record, pool: Pool, index: int, until: int) -> bool:
-    """March a block up to a piece and return whether it rocks there; if not, queue it for the piece where it will."""
+def march_until(ground: Ground, settings: Record, scratch: Record, pool: Pool, index: int, stop_piece: int) -> bool:
+    """March a block up to a piece and return whether it rocks at its start; if not, queue it for its next uplift."""
     state = pool.states[index]
-    state.stop_piece = until
+    state.stop_piece = stop_piece
     state.ending = march(ground, pool.blocks[index], settings, pool.table, scratch, state)
     if state.ending != Ending.RUNNING:
         return False
-    if state.side >= 0 and state.piece == until and state.offset == 0.0:
+    if state.side >= 0 and state.piece == stop_piece and state.offset == 0.0:
         return True
-    pool.following[index] = pool.first[state.piece]
-    pool.first[state.piece] = index
+    pool.next_waiting[index] = pool.first_waiting[state.piece]
+    pool.first_waiting[state.piece] = index
     pool.counts.waiting += 1
     return False
 
 
 @inlined
 def drop_finished(pool: Pool) -> None:
-    """Fill the lanes that have become free with the last ones."""
+    """Move the blocks of the last lanes into the lanes that have become free."""
     while pool.counts.free > 0:
         pool.counts.free -= 1
         pool.counts.active -= 1
-        lane = pool.free[pool.counts.free]
+        lane = pool.free_lanes[pool.counts.free]
         if lane != pool.counts.active:
             move_block(pool, pool.counts.active, lane)
 
@@ -314,11 +320,11 @@ def drop_finished(pool: Pool) -> None:
 @inlined
 def admit_waiting(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int) -> None:
     """March the blocks that wait for a piece through it, and admit those that rock at its end."""
-    index = pool.first[piece]
+    index = pool.first_waiting[piece]
     while index >= 0:
-        following = pool.following[index]
+        next_index = pool.next_waiting[index]
         pool.counts.waiting -= 1
         if march_until(ground, settings, scratch, pool, index, piece + 1):
             start_lane(settings, pool, pool.counts.active, index)
             pool.counts.active += 1
-        index = following
+        index = next_index

@@ -4,20 +4,20 @@ import math
 
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.events import deflated
-from rocking.kernels.ground import move
+from rocking.kernels.events import evaluate_deflated
+from rocking.kernels.ground import shift_polynomial
 
 #: Length of the work array in excess of the motion's columns: 0.25**16 / 16! = 1e-23.
 TERMS = 18
 _RADIANS_PER_STEP = 0.25
 
 #: Largest number of parts of a step, and relative error of a peak: some units in its last place.
-_FINEST = 2**30
-_ROUNDED_UP = 1.0 + 2.0**-50
+_MAX_PARTS = 2**30
+_ROUNDING_FACTOR = 1.0 + 2.0**-50
 
 
 @kernel
-def peak_displacements(
+def write_peak_displacements(
     breakpoints: Floats,
     coefficients: Floats,
     frequencies: Floats,
@@ -33,11 +33,11 @@ def peak_displacements(
     """
     columns = coefficients.shape[1]
     for i in range(len(frequencies)):
-        peaks[i] = _peak(breakpoints, coefficients, frequencies[i], damping, work[:columns], work[columns:])
+        peaks[i] = _find_peak(breakpoints, coefficients, frequencies[i], damping, work[:columns], work[columns:])
 
 
 @shared
-def _peak(
+def _find_peak(
     breakpoints: Floats,
     coefficients: Floats,
     frequency: float,
@@ -54,17 +54,17 @@ def _peak(
         for j in range(len(force)):
             force[j] = coefficients[k, j]
         for _ in range(steps):
-            peak = _advance(series, force, width / steps, frequency, damping, peak)
-            _move(force, width / steps)
+            peak = _step_oscillator(series, force, width / steps, frequency, damping, peak)
+            _shift_force(force, width / steps)
     force[:] = 0.0
     half_period = math.pi / math.sqrt(1.0 - damping * damping)
     for _ in range(math.ceil(half_period / _RADIANS_PER_STEP)):
-        peak = _advance(series, force, _RADIANS_PER_STEP / frequency, frequency, damping, peak)
+        peak = _step_oscillator(series, force, _RADIANS_PER_STEP / frequency, frequency, damping, peak)
     return peak
 
 
 @shared
-def _advance(series: Floats, force: Floats, h: float, frequency: float, damping: float, peak: float) -> float:
+def _step_oscillator(series: Floats, force: Floats, h: float, frequency: float, damping: float, peak: float) -> float:
     """Expand the solution about the start of a step, and move ``series[:2]`` to its end.
 
     Returns the largest displacement of the step, or ``peak`` if larger.
@@ -73,46 +73,50 @@ def _advance(series: Floats, force: Floats, h: float, frequency: float, damping:
         acceleration = force[k] if k < len(force) else 0.0
         restoring = 2.0 * damping * frequency * (k + 1) * series[k + 1] + frequency * frequency * series[k]
         series[k + 2] = -(acceleration + restoring) / ((k + 1) * (k + 2))
-    peak = _larger(series, h, peak)
-    series[0], series[1] = deflated(series, 0, len(series) - 1, h)[0], _slope(series, h)
+    peak = _raise_peak(series, h, peak)
+    series[0], series[1] = evaluate_deflated(series, 0, len(series) - 1, h)[0], _evaluate_slope(series, h)
     return peak
 
 
 @shared
-def _larger(series: Floats, h: float, peak: float) -> float:
+def _raise_peak(series: Floats, h: float, peak: float) -> float:
     """Return the largest absolute value of a series from 0 to h, or ``peak`` if larger, except for rounding.
 
     Between two points a distance d apart, the series exceeds both values by at most d^2/8 times its second derivative.
     The step is halved if the largest value could be there.
     """
-    bend = 0.0
+    max_curvature = 0.0
     for k in range(len(series) - 1, 1, -1):
-        bend = bend * h + k * (k - 1) * abs(series[k])
-    at, width = 0, _FINEST
+        max_curvature = max_curvature * h + k * (k - 1) * abs(series[k])
+    position, width = 0, _MAX_PARTS
     left = abs(series[0])
-    while at < _FINEST:
-        right = abs(deflated(series, 0, len(series) - 1, h * ((at + width) / _FINEST))[0])
+    while position < _MAX_PARTS:
+        right = abs(evaluate_deflated(series, 0, len(series) - 1, h * ((position + width) / _MAX_PARTS))[0])
         peak = max(peak, right)
-        d = h * (width / _FINEST)
-        if width > 1 and max(left, right) + 0.125 * bend * d * d > peak * _ROUNDED_UP and bend < math.inf:
+        d = h * (width / _MAX_PARTS)
+        if (
+            width > 1
+            and max(left, right) + 0.125 * max_curvature * d * d > peak * _ROUNDING_FACTOR
+            and max_curvature < math.inf
+        ):
             width //= 2
             continue
-        at, left = at + width, right
-        while at % (2 * width) == 0 and at < _FINEST:
+        position, left = position + width, right
+        while position % (2 * width) == 0 and position < _MAX_PARTS:
             width *= 2
     return peak
 
 
 @inlined
-def _slope(series: Floats, x: float) -> float:
+def _evaluate_slope(series: Floats, x: float) -> float:
     """Compute the slope of a series at x."""
-    result = 0.0
+    slope = 0.0
     for k in range(len(series) - 1, 0, -1):
-        result = result * x + k * series[k]
-    return result
+        slope = slope * x + k * series[k]
+    return slope
 
 
 @shared
-def _move(force: Floats, shift: float) -> None:
+def _shift_force(force: Floats, shift: float) -> None:
     """Expand a polynomial about ``shift`` in place; inlined, it would slow the loop over the steps."""
-    move(force, len(force) - 1, shift)
+    shift_polynomial(force, len(force) - 1, shift)

@@ -12,20 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats, Integers
-from rocking.kernels.arc import evaluate, expand, restoring, sign_of
+from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.events import factor, relative_slope
-from rocking.kernels.ground import ROUNDING, Ground, length_of, start_of
+from rocking.kernels.events import relative_speed_slope, restitution_factor
+from rocking.kernels.ground import ROUNDING, Ground, piece_length, piece_start
 from rocking.kernels.march import march
-from rocking.kernels.series import variation_coefficients
+from rocking.kernels.series import write_variation_coefficients
 from rocking.kernels.state import AT_REST, Ending, Record, Records
-from rocking.kernels.trace import Trail, expand_free
-from rocking.kernels.uplift import next_uplift
+from rocking.kernels.trace import Trail, expand_unforced
+from rocking.kernels.uplift import find_next_uplift
 
 #: Largest number of march iterations for one period or impact, and the coordinate and speed from which none is allowed:
 #: absurd states and NaN would require all of them.
-TURNS = 100_000
-BEYOND = 1e100
+MAX_ITERATIONS = 100_000
+MAX_STATE = 1e100
 
 
 class Fate(IntEnum):
@@ -40,17 +40,14 @@ class Fate(IntEnum):
     RESTS_FOR_EVER = 4
 
 
-class Setting(NamedTuple):
-    """Body under a periodic motion, and the data that the march of its states requires.
+class PeriodicProblem(NamedTuple):
+    """Body under a periodic motion, and the data that the march of its states requires."""
 
-    ``table`` has no rows. ``steps[side, piece]`` is a row of `step_rows`; without rows, every step is marched.
-    """
-
-    ground: Ground
-    block: Record
-    settings: Record
-    table: Records
-    steps: Floats
+    ground: Ground  # motion
+    block: Record  # body
+    settings: Record  # settings of the computation
+    table: Records  # table without rows
+    steps: Floats  # `build_step_rows`; without rows, every step is marched
 
 
 #: Columns of a trap: side (negative at rest), middle (u, v), and a, b, c of a du^2 + 2 b du dv + c dv^2 <= 1.
@@ -59,48 +56,48 @@ TRAP = 6
 
 @kernel
 def iterate(
-    setting: Setting,
+    problem: PeriodicProblem,
     scratch: Record,
     states: Records,
     periods: int,
     orbit: Floats,
     traps: Floats,
-    found: Integers,
-    taken: Integers,
+    trap_rows: Integers,
+    period_counts: Integers,
 ) -> None:
     """Take each state through at most ``periods`` periods, until it enters a trap, overturns or rests forever.
 
-    ``ending`` is then its `Fate`, ``found[k]`` the row of its trap in ``traps``, shape (n, `TRAP`), or -1, and
-    ``taken[k]`` the number of periods. Row n of ``orbit[k]``, if any, is (u, v, side) after n + 1 periods, unchanged
-    after the last known state.
+    ``ending`` is then its `Fate`, ``trap_rows[k]`` the row of its trap in ``traps``, shape (n, `TRAP`), or -1, and
+    ``period_counts[k]`` the number of periods. Row n of ``orbit[k]``, if any, is (u, v, side) after n + 1 periods,
+    unchanged after the last known state.
     """
     for k in range(states.shape[0]):
         state = states[k]
-        fate = Fate.RESTS.value if state.side < 0 else Fate.MOVES.value
-        found[k] = -1
-        taken[k] = periods
+        outcome = Fate.RESTS.value if state.side < 0 else Fate.MOVES.value
+        trap_rows[k] = -1
+        period_counts[k] = periods
         for n in range(periods):
-            fate = pass_period(setting, scratch, state)
-            known = fate != Fate.OVERTURNED and fate != Fate.UNFINISHED
-            if known:
-                rests = fate == Fate.RESTS or fate == Fate.RESTS_FOR_EVER
-                found[k] = trap_of(traps, state, rests, setting.block.two_stops)
-                for later in range(n, orbit.shape[1] if fate == Fate.RESTS_FOR_EVER else min(n + 1, orbit.shape[1])):
+            outcome = advance_period(problem, scratch, state)
+            is_known = outcome != Fate.OVERTURNED and outcome != Fate.UNFINISHED
+            if is_known:
+                is_at_rest = outcome == Fate.RESTS or outcome == Fate.RESTS_FOR_EVER
+                trap_rows[k] = find_trap(traps, state, is_at_rest, problem.block.two_stops)
+                for later in range(n, orbit.shape[1] if outcome == Fate.RESTS_FOR_EVER else min(n + 1, orbit.shape[1])):
                     write_state(orbit[k, later], state)
-            if found[k] >= 0 or fate == Fate.RESTS_FOR_EVER or not known:
-                taken[k] = n + 1
+            if trap_rows[k] >= 0 or outcome == Fate.RESTS_FOR_EVER or not is_known:
+                period_counts[k] = n + 1
                 break
-        state.ending = fate
+        state.ending = outcome
 
 
 @inlined
-def trap_of(traps: Floats, state: Record, rests: bool, facing: bool) -> int:
+def find_trap(traps: Floats, state: Record, rests: bool, two_stops: bool) -> int:
     """Return the row of the first trap that contains a state, or -1."""
     for j in range(traps.shape[0]):
         row = traps[j]
         if row[0] < 0.0:
             # At rest, on the same stop. The march may have moved the state to its next uplift and assigned a side.
-            if rests and (not facing or row[0] == min(state.side, -1 - state.side)):
+            if rests and (not two_stops or row[0] == min(state.side, -1 - state.side)):
                 return j
             continue
         du, dv = state.u - row[1], state.v - row[2]
@@ -116,60 +113,60 @@ def write_state(row: Floats, state: Record) -> None:
 
 
 @shared
-def pass_period(setting: Setting, scratch: Record, state: Record) -> int:
-    """Take a state through one period and return its `Fate`."""
-    ground, block, settings, table, steps = setting
-    pieces = pieces_of(ground)
-    state.budget = turns_from(state)
+def advance_period(problem: PeriodicProblem, scratch: Record, state: Record) -> int:
+    """Advance a state by one period and return its `Fate`."""
+    ground, block, settings, table, steps = problem
+    pieces = count_pieces(ground)
+    state.budget = iteration_budget(state)
     ending = Ending.RUNNING.value
     while ending == Ending.RUNNING and state.piece < pieces:
         state.stop_piece = pieces
         if state.side >= 0 and state.offset == 0.0 and steps.shape[1] > 0:
-            if not state.continuous_uplift and steps_over(steps[state.side, state.piece], block.overturn_angle, state):
+            if not state.continuous_uplift and skip_piece(steps[state.side, state.piece], block.overturn_angle, state):
                 continue
             state.stop_piece = state.piece + 1
         ending = march(ground, block, settings, table, scratch, state)
-    return put_back(ground, block, state, ending)
+    return shift_back(ground, block, state, ending)
 
 
 @inlined
-def turns_from(state: Record) -> int:
+def iteration_budget(state: Record) -> int:
     """Return the number of march iterations allowed from a state."""
-    return TURNS if state.u < BEYOND and abs(state.v) < BEYOND else 0
+    return MAX_ITERATIONS if state.u < MAX_STATE and abs(state.v) < MAX_STATE else 0
 
 
 # ---- Pieces of a linear body's motion without events, in closed form ----
 
 #: Columns of a row of steps: derivatives of (u, v) after a piece by those before it, row by row; (u, v) after the piece
 #: from (0, 0); largest |u''| by motion and weight; sqrt(|lam|), and sqrt(|lam|) + c; length of the piece.
-_FROM, _ADDED, _FORCE, _ROOT, _RATE, _LENGTH, _COLUMNS = 0, 4, 6, 7, 8, 9, 10
+_MATRIX, _OFFSET, _FORCE, _ROOT, _RATE, _LENGTH, _COLUMNS = 0, 4, 6, 7, 8, 9, 10
 
 #: Largest (sqrt(|lam|) + c) L of a piece of length L with a row, and its exponential, rounded up.
-_LONGEST = 0.75
+_MAX_GROWTH_RATE = 0.75
 _GROWTH = 2.118
 
 
 @inlined
-def steps_over(row: Floats, fallen: float, state: Record) -> bool:
-    """Step over a whole piece in closed form if bounds exclude an event; return whether the step was taken.
+def skip_piece(row: Floats, overturn_angle: float, state: Record) -> bool:
+    """Advance a state by a piece in closed form if bounds exclude an event, and return whether they do.
 
     N = sqrt(|lam|) |u| + |v| grows at a rate of at most (sqrt(|lam|) + c) N + F under a force F, and |u''| is at most
     that rate. Therefore the rotation is within L^2/8 times that rate of the line between both ends.
     """
     u, v, h = state.u, state.v, row[_LENGTH]
-    size = _GROWTH * (row[_ROOT] * u + abs(v) + h * row[_FORCE])
-    reach = 0.125 * h * h * (row[_FORCE] + row[_RATE] * size)
-    after = row[_FROM] * u + row[_FROM + 1] * v + row[_ADDED]
-    if not ((u > reach) & (after > reach) & (max(u, after) + reach < fallen)):
+    magnitude = _GROWTH * (row[_ROOT] * u + abs(v) + h * row[_FORCE])
+    margin = 0.125 * h * h * (row[_FORCE] + row[_RATE] * magnitude)
+    next_u = row[_MATRIX] * u + row[_MATRIX + 1] * v + row[_OFFSET]
+    if not ((u > margin) & (next_u > margin) & (max(u, next_u) + margin < overturn_angle)):
         return False
-    state.v = row[_FROM + 2] * u + row[_FROM + 3] * v + row[_ADDED + 1]
-    state.u = after
+    state.v = row[_MATRIX + 2] * u + row[_MATRIX + 3] * v + row[_OFFSET + 1]
+    state.u = next_u
     state.piece += 1
     return True
 
 
-def step_rows(ground: Ground, block: Record) -> Floats:
-    """Compute rows for `steps_over` for each side and piece of the first period, shape (2, pieces, columns).
+def build_step_rows(ground: Ground, block: Record) -> Floats:
+    """Compute rows for `skip_piece` for each side and piece of the first period, shape (2, pieces, columns).
 
     There are none if a piece is too long for the bounds or the body has no such side.
     """
@@ -183,7 +180,7 @@ def step_rows(ground: Ground, block: Record) -> Floats:
         if not np.isfinite(threshold):
             continue
         root, drag = np.sqrt(abs(lam)), float(block["damping"][side])
-        if length.max() * (root + drag) > _LONGEST:
+        if length.max() * (root + drag) > _MAX_GROWTH_RATE:
             return np.zeros((2, 0, _COLUMNS))
         force = -gain * (1.0 - 2.0 * side) * coefficients
         force[:, 0] -= gain * threshold
@@ -197,8 +194,8 @@ def step_rows(ground: Ground, block: Record) -> Floats:
         powers = length[:, None] ** np.arange(_TERMS + 2)
         values = np.sum((series * powers)[..., ::-1], axis=-1)
         rates = np.sum((series[..., 1:] * np.arange(1, _TERMS + 2) * powers[:, :-1])[..., ::-1], axis=-1)
-        rows[side, :, :_ADDED] = np.stack([values[0], values[1], rates[0], rates[1]], axis=-1)
-        rows[side, :, _ADDED], rows[side, :, _ADDED + 1] = values[2], rates[2]
+        rows[side, :, :_OFFSET] = np.stack([values[0], values[1], rates[0], rates[1]], axis=-1)
+        rows[side, :, _OFFSET], rows[side, :, _OFFSET + 1] = values[2], rates[2]
         rows[side, :, _FORCE] = np.sum(np.abs(force) * powers[:, : ground.columns], axis=-1) * (1.0 + ROUNDING)
         rows[side, :, _ROOT], rows[side, :, _RATE], rows[side, :, _LENGTH] = root, root + drag, length
     return rows
@@ -209,15 +206,15 @@ _TERMS = 40
 
 
 @inlined
-def pieces_of(ground: Ground) -> int:
+def count_pieces(ground: Ground) -> int:
     """Count the pieces of one period."""
     return (ground.pieces.shape[0] - 3) // 2
 
 
 @inlined
-def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
+def shift_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
     """Move a state back by the period that it has passed, and return its `Fate`."""
-    pieces = pieces_of(ground)
+    pieces = count_pieces(ground)
     if ending == Ending.OVERTURNED:
         return Fate.OVERTURNED
     if ending == Ending.DONE or (ending == Ending.RUNNING and state.piece >= 2 * pieces):
@@ -231,11 +228,11 @@ def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
         return Fate.MOVES
     if ending != Ending.RUNNING or not (state.u >= 0.0 and abs(state.v) < np.inf):
         return Fate.UNFINISHED
-    period = start_of(ground, pieces)
+    period = piece_start(ground, pieces)
     state.piece -= pieces
     state.last_uplift_time -= period
     state.last_rest_time -= period
-    state.run_start -= period
+    state.sequence_start -= period
     state.last_impact_time -= period
     return Fate.RESTS if state.side < 0 or (state.u == 0.0 and state.v == 0.0) else Fate.MOVES
 
@@ -265,15 +262,15 @@ def differentiate_period(
     because the columns of the derivative become parallel to rounding.
     """
     ground, block, settings, _ = trail
-    one = 1.0
+    initial = 1.0
     if state.side < 0:
-        lifted = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
-        held = lifted.side < 0 or lifted.piece > state.piece or lifted.offset > state.offset
+        uplift = find_next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
+        is_held = uplift.side < 0 or uplift.piece > state.piece or uplift.offset > state.offset
         # The state at rest is independent of the past; the frame of a body that leaves immediately belongs to no side.
-        one = 0.0 if held else sign_of(lifted.side)
-    M[0, 0], M[0, 1], M[1, 0], M[1, 1] = one, 0.0, 0.0, one
-    state.stop_piece = pieces_of(ground)
-    state.budget = turns_from(state)
+        initial = 0.0 if is_held else side_sign(uplift.side)
+    M[0, 0], M[0, 1], M[1, 0], M[1, 1] = initial, 0.0, 0.0, initial
+    state.stop_piece = count_pieces(ground)
+    state.budget = iteration_budget(state)
     ending = Ending.FULL.value
     impacts, area = 0, 0.0
     while ending == Ending.FULL:
@@ -281,10 +278,10 @@ def differentiate_period(
         ending = march(ground, block, settings, table, scratch, state)
         impacts += state.impacts
         for n in range(state.nodes - 1):
-            area += carry_on(trail, scratch, work, table[n].node, table[n + 1].node, M)
+            area += apply_step(trail, scratch, work, table[n].node, table[n + 1].node, M)
         if state.nodes > 0:
-            area += carry_on(trail, scratch, work, table[state.nodes - 1].node, state, M)
-    state.ending = put_back(ground, block, state, ending)
+            area += apply_step(trail, scratch, work, table[state.nodes - 1].node, state, M)
+    state.ending = shift_back(ground, block, state, ending)
     if state.ending == Fate.RESTS or state.ending == Fate.RESTS_FOR_EVER:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
     elif state.ending != Fate.MOVES:
@@ -293,7 +290,7 @@ def differentiate_period(
 
 
 @kernel
-def stretch(
+def measure_stretches(
     trail: Trail, scratch: Record, work: Record, table: Records, state: Record, frame: Floats, logs: Floats
 ) -> int:
     """Take a state through one period per row of ``logs``, and write the stretches of a frame of directions.
@@ -307,8 +304,8 @@ def stretch(
     M = frame[:2]
     impacts = 0
     for n in range(logs.shape[0]):
-        more, area = differentiate_period(trail, scratch, work, table, state, M)
-        impacts += more
+        new_impacts, area = differentiate_period(trail, scratch, work, table, state, M)
+        impacts += new_impacts
         if state.ending != Fate.MOVES and state.ending != Fate.RESTS:
             break
         c, s = frame[2, 0], frame[2, 1]
@@ -324,74 +321,76 @@ def stretch(
 
 
 @shared
-def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, following: Record, M: Floats) -> float:
-    """Multiply a derivative by the derivative of the step from a node to ``following``, with any impact at its end.
+def apply_step(trail: Trail, scratch: Record, work: Record, node: Record, next_node: Record, M: Floats) -> float:
+    """Multiply a derivative by the derivative of the step from a node to ``next_node``, with any impact at its end.
 
     Returns the logarithm of the |determinant| of the step.
     """
     ground, block, settings, _ = trail
     if node.side < 0:  # the derivative since coming to rest
         return 0.0
-    if following.side < 0:
-        return come_to_rest(ground, block, node, following, M)
-    h = following.offset - node.offset
-    if following.piece > node.piece:
-        h = length_of(ground, node.piece) - node.offset
-        for piece in range(node.piece + 1, following.piece):
-            h += length_of(ground, piece)
-        h += following.offset
-    order, _, degree = expand(ground, block, settings, scratch, node, h)
-    expand_free(trail, scratch, work, node.side, degree, order)
+    if next_node.side < 0:
+        return apply_rest_derivative(ground, block, node, next_node, M)
+    h = next_node.offset - node.offset
+    if next_node.piece > node.piece:
+        h = piece_length(ground, node.piece) - node.offset
+        for piece in range(node.piece + 1, next_node.piece):
+            h += piece_length(ground, piece)
+        h += next_node.offset
+    order, _, degree = expand_arc(ground, block, settings, scratch, node, h)
+    expand_unforced(trail, scratch, work, node.side, degree, order)
     for column in range(2):
         work.change[0], work.change[1] = M[0, column], M[1, column]
-        variation_coefficients(work, block.damping[node.side], order)
-        M[0, column], M[1, column], _ = evaluate(work.change, order, h)
+        write_variation_coefficients(work, block.damping[node.side], order)
+        M[0, column], M[1, column], _ = evaluate_series(work.change, order, h)
     area = -block.damping[node.side] * h
-    if following.u == 0.0 and h > 0.0:
-        _, v, _ = evaluate(scratch.rotation, order, h)
-        area += apply_saltation(ground, block, node.side, following, v, M)
+    if next_node.u == 0.0 and h > 0.0:
+        _, v, _ = evaluate_series(scratch.rotation, order, h)
+        area += apply_saltation(ground, block, node.side, next_node, v, M)
     return area
 
 
 @inlined
-def come_to_rest(ground: Ground, block: Record, node: Record, following: Record, M: Floats) -> float:
+def apply_rest_derivative(ground: Ground, block: Record, node: Record, next_node: Record, M: Floats) -> float:
     """Multiply a derivative by the derivative until a rest: zero, unless the ground ends the rest immediately.
 
     No speed is left then, and the time of leaving depends on the time of impact. Returns the logarithm of the
     |determinant|.
     """
     side = node.side
-    after = restoring(ground, block, side, following.piece, following.offset)
-    if after >= 0.0 and not block.two_stops:
-        after = restoring(ground, block, block.next_side[side], following.piece, following.offset)
-    if after >= 0.0 or node.u > 0.0:
+    acceleration = restoring_acceleration(ground, block, side, next_node.piece, next_node.offset)
+    if acceleration >= 0.0 and not block.two_stops:
+        acceleration = restoring_acceleration(ground, block, block.next_side[side], next_node.piece, next_node.offset)
+    if acceleration >= 0.0 or node.u > 0.0:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
     elif node.v > 0.0:
         for column in range(2):
-            M[0, column], M[1, column] = 0.0, -after / node.v * M[0, column]
+            M[0, column], M[1, column] = 0.0, -acceleration / node.v * M[0, column]
     else:
         return 0.0
     return -np.inf
 
 
 @inlined
-def apply_saltation(ground: Ground, block: Record, left: int, following: Record, v: float, M: Floats) -> float:
+def apply_saltation(ground: Ground, block: Record, left_side: int, next_node: Record, v: float, M: Floats) -> float:
     """Multiply a derivative by the saltation of an impact, before which the velocity was v.
 
     Returns the logarithm of its |determinant|.
     """
-    across = block.two_stops and following.side != left  # at the other stop, in whose frame all signs change
-    hit, sign = (following.side, -1.0) if across else (left, 1.0)
+    changes_stop = block.two_stops and next_node.side != left_side  # at the other stop, in whose frame all signs change
+    hit, sign = (next_node.side, -1.0) if changes_stop else (left_side, 1.0)
     speed = -sign * v
-    e = factor(block, hit, speed, 0)  # not drawn
-    rate = e * relative_slope(block, hit, speed, e)
-    before = restoring(ground, block, hit, following.piece, following.offset) - block.damping[hit] * speed
-    after = restoring(ground, block, following.side, following.piece, following.offset) + block.damping[
-        following.side
+    e = restitution_factor(block, hit, speed, 0)  # not drawn
+    rate = e * relative_speed_slope(block, hit, speed, e)
+    g_before = (
+        restoring_acceleration(ground, block, hit, next_node.piece, next_node.offset) - block.damping[hit] * speed
+    )
+    g_after = restoring_acceleration(ground, block, next_node.side, next_node.piece, next_node.offset) + block.damping[
+        next_node.side
     ] * (e * speed)
-    coupling = (rate * before + after) / speed
+    coupling = (rate * g_before + g_after) / speed
     for column in range(2):
         du, dv = sign * M[0, column], sign * M[1, column]
         M[0, column], M[1, column] = -e * du, coupling * du - rate * dv
-    shrunk = abs(e * rate)
-    return math.log(shrunk) if shrunk > 0.0 else -np.inf
+    determinant = abs(e * rate)
+    return math.log(determinant) if determinant > 0.0 else -np.inf

@@ -17,69 +17,69 @@ _NEGLIGIBLE: Final = 40.0
 
 
 @kernel
-def shares(
+def write_overturned_fractions(
     factors: Singles,
     powers: Singles,
     overturned: Singles,
     exponents: Singles,
-    found: Singles,
+    fractions: Singles,
     effective: NDArray[np.float64],
 ) -> None:
-    """Write the fraction of each population that overturns into ``found``, shape (populations, motions).
+    """Write the fraction of each population that overturns into ``fractions``, shape (populations, motions).
 
     Block j has the weight exp(factors[c] @ powers[:, j]) in population c. ``overturned``, shape (blocks, motions), is 1
     if it overturns, else 0. The effective number of blocks of each population is written into ``effective``;
     ``exponents``, with a number per block, is scratch space. All numbers must be finite.
     """
     for c in range(factors.shape[0]):
-        _exponents(factors[c], powers, exponents)
-        highest = _largest(exponents)
-        total, squares = 0.0, 0.0
-        found[c] = np.float32(0.0)
+        _write_exponents(factors[c], powers, exponents)
+        max_exponent = _find_max(exponents)
+        total, total_squares = 0.0, 0.0
+        fractions[c] = np.float32(0.0)
         for j in range(exponents.shape[0]):
-            below = highest - exponents[j]
-            if below < _NEGLIGIBLE_SINGLE:
-                weight = np.float32(math.exp(-below))
+            deficit = max_exponent - exponents[j]
+            if deficit < _NEGLIGIBLE_SINGLE:
+                weight = np.float32(math.exp(-deficit))
                 total += float(weight)
-                squares += float(weight) ** 2
-                _add(weight, overturned[j], found[c])
-        for m in range(found.shape[1]):
-            found[c, m] /= np.float32(total)
-        effective[c] = total * total / squares
+                total_squares += float(weight) ** 2
+                _add_multiple(weight, overturned[j], fractions[c])
+        for m in range(fractions.shape[1]):
+            fractions[c, m] /= np.float32(total)
+        effective[c] = total * total / total_squares
 
 
 @kernel
-def log_density(
+def write_log_sums(
     factors: NDArray[np.float64],
     powers: NDArray[np.float64],
     exponents: NDArray[np.float64],
-    found: NDArray[np.float64],
+    sums: NDArray[np.float64],
 ) -> None:
-    """Write the logarithm of the sum over j of exp(factors[c] @ powers[:, j]) into ``found``, for each c.
+    """Write the logarithm of the sum over j of exp(factors[c] @ powers[:, j]) into ``sums``, for each c.
 
     ``exponents``, with a number per j, is scratch space. All numbers must be finite.
     """
     for c in range(factors.shape[0]):
-        _exponents(factors[c], powers, exponents)
-        highest = _largest(exponents)
+        _write_exponents(factors[c], powers, exponents)
+        max_exponent = _find_max(exponents)
         total = 0.0
         for j in range(exponents.shape[0]):
-            if highest - exponents[j] < _NEGLIGIBLE:
-                total += math.exp(exponents[j] - highest)
-        found[c] = highest + math.log(total)
+            if max_exponent - exponents[j] < _NEGLIGIBLE:
+                total += math.exp(exponents[j] - max_exponent)
+        sums[c] = max_exponent + math.log(total)
 
 
 @inlined
-def _exponents(factors: Reals, powers: Reals, exponents: Reals) -> None:
+def _write_exponents(factors: Reals, powers: Reals, exponents: Reals) -> None:
     """Write factors @ powers."""
     for j in range(exponents.shape[0]):
         exponents[j] = factors[0] * powers[0, j]
     for k in range(1, powers.shape[0]):
-        _add(factors[k], powers[k], exponents)
+        _add_multiple(factors[k], powers[k], exponents)
 
 
 @inlined
-def _largest(values: Reals) -> Any:
+def _find_max(values: Reals) -> Any:
     """Return the largest of some numbers."""
     largest = values[0]
     for i in range(1, values.shape[0]):
@@ -89,7 +89,7 @@ def _largest(values: Reals) -> Any:
 
 
 @inlined
-def _add(weight: Any, row: Reals, total: Reals) -> None:
+def _add_multiple(weight: Any, row: Reals, total: Reals) -> None:
     """Add a multiple of a row."""
     for i in range(row.shape[0]):
         total[i] += weight * row[i]

@@ -18,7 +18,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.events import first_root
+from rocking.kernels.events import find_first_root
 from rocking.kernels.state import Record, Records, TendonLaw
 
 #: Distance from a level, relative to it, that is rounding.
@@ -29,12 +29,13 @@ _ROUNDING = 2.0**-44
 def apply_tendon_law(block: Record, law: int, plastic: float) -> None:
     """Write a law and its quantities at a plastic elongation into the record of a block."""
     for side in range(2):
-        force = -block.tendon[side] * (plastic + block.slack)  # at zero elongation, divided by inertia and lever arm
+        # Force at zero elongation, divided by inertia and lever arm.
+        force = -block.tendon_stiffness[side] * (plastic + block.slack_elongation)
         weight = push = prestress = 0.0
         if law == TendonLaw.ELASTIC:
             weight, push, prestress = block.tendon_weight[side], block.tendon_push[side], force
         elif law == TendonLaw.PLASTIC:
-            prestress = block.tendon[side] * (block.yields - block.slack)
+            prestress = block.tendon_stiffness[side] * (block.yield_elongation - block.slack_elongation)
         block.added_weight[side] = block.base_weight[side] + weight
         block.added_push[side] = block.base_push[side] + push
         block.prestress[side] = block.base_prestress[side] + prestress
@@ -44,7 +45,7 @@ def apply_tendon_law(block: Record, law: int, plastic: float) -> None:
 
 
 @inlined
-def rotation_at(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
+def rotation_from_elongation(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
     """Compute the rotation for an elongation of the tendon, or an infinity of the same sign if there is none."""
     x = block.lever_arm[side]
     if x <= 0.0 or (nonlinear and abs(elongation) >= 2.0 * x):
@@ -53,28 +54,28 @@ def rotation_at(block: Record, nonlinear: bool, side: int, elongation: float) ->
 
 
 @inlined
-def elongation_at(block: Record, nonlinear: bool, side: int, u: float) -> float:
+def elongation_from_rotation(block: Record, nonlinear: bool, side: int, u: float) -> float:
     """Compute the elongation of the tendon at a rotation."""
     return block.lever_arm[side] * (2.0 * math.sin(0.5 * u) if nonlinear else u)
 
 
 @inlined
-def law_of_standing(block: Record, plastic: float) -> int:
+def law_at_rest(block: Record, plastic: float) -> int:
     """Return the law while the block stands."""
-    return TendonLaw.ELASTIC if plastic + block.slack <= 0.0 else TendonLaw.SLACK
+    return TendonLaw.ELASTIC if plastic + block.slack_elongation <= 0.0 else TendonLaw.SLACK
 
 
 @inlined
-def may_change_below(block: Record, settings: Record, plastic: float, height: float) -> bool:
+def may_law_change_below(block: Record, settings: Record, plastic: float, height: float) -> bool:
     """Return whether the law of a standing block changes below a height on one of its sides."""
-    level = block.slack if law_of_standing(block, plastic) == TendonLaw.SLACK else block.yields
-    plus = rotation_at(block, settings.nonlinear, 0, plastic + level)
-    minus = rotation_at(block, settings.nonlinear, 1, plastic + level)
+    level = block.slack_elongation if law_at_rest(block, plastic) == TendonLaw.SLACK else block.yield_elongation
+    plus = rotation_from_elongation(block, settings.nonlinear, 0, plastic + level)
+    minus = rotation_from_elongation(block, settings.nonlinear, 1, plastic + level)
     return bool(not height < min(plus, minus))
 
 
 @shared
-def next_law(
+def find_law_change(
     block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float
 ) -> tuple[float, int]:
     """Find the time of the first change of the law along an arc, inf if none within h, and the law after it."""
@@ -82,20 +83,20 @@ def next_law(
     if state.law == TendonLaw.PLASTIC:
         for k in range(order):
             d[k] = (k + 1) * c[k + 1]
-        return first_of(d, order - 1, h), TendonLaw.ELASTIC
-    slack = rotation_at(block, settings.nonlinear, side, state.plastic + block.slack)
+        return find_first_negative(d, order - 1, h), TendonLaw.ELASTIC
+    slack_rotation = rotation_from_elongation(block, settings.nonlinear, side, state.plastic + block.slack_elongation)
     if state.law == TendonLaw.SLACK:
-        return time_to_level(c, order, h, slack, 1.0, d), TendonLaw.ELASTIC
-    top = rotation_at(block, settings.nonlinear, side, state.plastic + block.yields)
-    yielding = time_to_level(c, order, h, top, 1.0, d)
-    slackening = time_to_level(c, order, h, slack, -1.0, d) if slack > 0.0 else np.inf
-    if slackening < yielding:
-        return slackening, TendonLaw.SLACK
-    return yielding, TendonLaw.PLASTIC
+        return find_level_passage(c, order, h, slack_rotation, 1.0, d), TendonLaw.ELASTIC
+    yield_rotation = rotation_from_elongation(block, settings.nonlinear, side, state.plastic + block.yield_elongation)
+    yield_time = find_level_passage(c, order, h, yield_rotation, 1.0, d)
+    slack_time = find_level_passage(c, order, h, slack_rotation, -1.0, d) if slack_rotation > 0.0 else np.inf
+    if slack_time < yield_time:
+        return slack_time, TendonLaw.SLACK
+    return yield_time, TendonLaw.PLASTIC
 
 
 @inlined
-def time_to_level(c: Floats, order: int, h: float, level: float, sign: float, d: Floats) -> float:
+def find_level_passage(c: Floats, order: int, h: float, level: float, sign: float, d: Floats) -> float:
     """Find the first time within h at which a series passes a level from below (sign 1) or above (-1); else inf."""
     if level == np.inf:
         return np.inf
@@ -104,36 +105,38 @@ def time_to_level(c: Floats, order: int, h: float, level: float, sign: float, d:
         d[0] = 0.0
     for k in range(1, order + 1):
         d[k] = -sign * c[k]
-    return first_of(d, order, h)
+    return find_first_negative(d, order, h)
 
 
 @inlined
-def first_of(d: Floats, order: int, h: float) -> float:
+def find_first_negative(d: Floats, order: int, h: float) -> float:
     """Find the first time from which a series is negative: 0 if immediately, inf if not within h."""
     lead = 0
     while lead < order and d[lead] == 0.0:
         lead += 1
     if d[lead] < 0.0:
         return 0.0
-    time = first_root(d, lead, order, h)
+    time = find_first_root(d, lead, order, h)
     return time if time <= h else np.inf
 
 
 @inlined
-def plastic_after(block: Record, settings: Record, nodes: Records, row: int, before: float) -> float:
-    """Return the plastic elongation at a node, from the node itself or from its value ``before``."""
+def plastic_at_node(block: Record, settings: Record, nodes: Records, row: int, previous: float) -> float:
+    """Return the plastic elongation at a node, from the node itself or from its value ``previous``."""
     node = nodes[row]
-    turns = row > 0 and node.law == TendonLaw.ELASTIC and nodes[row - 1].law == TendonLaw.PLASTIC
-    if turns or (row == 0 and node.side >= 0):
-        return max(0.0, elongation_at(block, settings.nonlinear, node.side, node.u) - block.yields)
-    return before
+    turns_back = row > 0 and node.law == TendonLaw.ELASTIC and nodes[row - 1].law == TendonLaw.PLASTIC
+    if turns_back or (row == 0 and node.side >= 0):
+        return max(0.0, elongation_from_rotation(block, settings.nonlinear, node.side, node.u) - block.yield_elongation)
+    return previous
 
 
 @inlined
 def change_law(block: Record, settings: Record, state: Record, law: int, u: float) -> None:
     """Change the law of a block at a rotation."""
     if state.law == TendonLaw.PLASTIC:
-        state.plastic = max(0.0, elongation_at(block, settings.nonlinear, state.side, u) - block.yields)
+        state.plastic = max(
+            0.0, elongation_from_rotation(block, settings.nonlinear, state.side, u) - block.yield_elongation
+        )
     state.law = law
     apply_tendon_law(block, law, state.plastic)
 
@@ -146,110 +149,114 @@ def change_law(block: Record, settings: Record, state: Record, law: int, u: floa
 # yield.
 
 #: Largest fraction of the peak by which a leaning body may still exceed it.
-PEAK = 2.0**-30
+PEAK_MARGIN = 2.0**-30
 
 #: Bound on the rounding of the moment divided by the sum of the sizes of its terms, with allowance for the integral.
 _ROUNDING_OF_MOMENT = 2.0**-45
 
 #: Places of a search, as fractions of its path, and number of bisections of an interval.
-_PLACES = np.concatenate([np.zeros(1), 2.0 ** np.arange(-40.0, 1.0)])
-_HALVINGS = 60
+_SEARCH_FRACTIONS = np.concatenate([np.zeros(1), 2.0 ** np.arange(-40.0, 1.0)])
+_BISECTIONS = 60
 
 #: Positive nodes and weights of the Gauss-Legendre rule of eight points.
-_RULE = (
+_GAUSS_LEGENDRE = (
     (0.1834346424956498, 0.362683783378362), (0.525532409916329, 0.3137066458778873),
     (0.7966664774136267, 0.2223810344533745), (0.9602898564975363, 0.1012285362903763),
 )  # fmt: skip
 
 
 @shared
-def leaning_at(block: Record, settings: Record, state: Record, rate: float) -> float:
-    """Return the rotation without moment about which a body leans forever; NaN if this is not proven.
+def find_leaning_rotation(block: Record, settings: Record, state: Record, rate: float) -> float:
+    """Find the rotation without moment about which a body leans forever; NaN if this is not proven.
 
-    The largest rotation so far will not be exceeded by more than the fraction `PEAK`. Either the body, with the
+    The largest rotation so far will not be exceeded by more than the fraction `PEAK_MARGIN`. Either the body, with the
     acceleration ``rate``, moves and is pushed outwards, as after turning back before the ground, which no rocking body
-    does below its balance. Or it has crept back to within `PEAK` of the rotation, at the corresponding speed.
+    does below its balance. Or it has crept back to within `PEAK_MARGIN` of the rotation, at the corresponding speed.
     """
     side, u, nonlinear = state.side, state.u, settings.nonlinear
     drag = block.damping[side]
-    if rate + drag * state.v <= 0.0 if state.v > 0.0 else rate < 0.0 or -state.v > PEAK * drag * u:
+    if rate + drag * state.v <= 0.0 if state.v > 0.0 else rate < 0.0 or -state.v > PEAK_MARGIN * drag * u:
         return np.nan
     plastic = state.plastic
     if block.yielding:
-        plastic = max(plastic, elongation_at(block, nonlinear, side, u) - block.yields)
-    body = (nonlinear, side, plastic)
-    highest = min(state.peak, rotation_at(block, nonlinear, side, plastic + block.yields)) * (1.0 + PEAK)
-    below, low = barrier(block, body, u, 0.0)
-    above, high = barrier(block, body, u, highest)
-    least = min(rise(block, body, u, low), rise(block, body, u, high))
-    if math.isnan(below + above) or not (high < block.overturn_angle and 0.5 * state.v * state.v < least):
+        plastic = max(plastic, elongation_from_rotation(block, nonlinear, side, u) - block.yield_elongation)
+    tendon_state = (nonlinear, side, plastic)
+    max_rotation = min(
+        state.peak, rotation_from_elongation(block, nonlinear, side, plastic + block.yield_elongation)
+    ) * (1.0 + PEAK_MARGIN)
+    inner, inner_end = find_barrier(block, tendon_state, u, 0.0)
+    outer, outer_end = find_barrier(block, tendon_state, u, max_rotation)
+    min_rise = min(
+        bound_energy_rise(block, tendon_state, u, inner_end), bound_energy_rise(block, tendon_state, u, outer_end)
+    )
+    if math.isnan(inner + outer) or not (outer_end < block.overturn_angle and 0.5 * state.v * state.v < min_rise):
         return np.nan
-    middle = last_before(block, body, below, above)
-    return np.nan if state.v < 0.0 and u > middle * (1.0 + PEAK) else middle
+    middle = bisect_moment(block, tendon_state, inner, outer)
+    return np.nan if state.v < 0.0 and u > middle * (1.0 + PEAK_MARGIN) else middle
 
 
 @shared
-def barrier(block: Record, body: tuple[bool, int, float], start: float, end: float) -> tuple[float, float]:
-    """Find the first rotation between two that turns a body back, and the end of the interval that does so.
+def find_barrier(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> tuple[float, float]:
+    """Find the first interval of rotations between two that turns a body back; NaN: none.
 
-    The interval ends at ``end`` if all later places turn the body back. NaN: no such place.
+    It ends at ``end`` if all later rotations turn the body back.
     """
     first = last = np.nan
-    for share in _PLACES:
-        at = start + (end - start) * share
-        if moment_at(block, body, at) * (end - start) > 0.0:
-            first, last = (at if math.isnan(first) else first), at
+    for fraction in _SEARCH_FRACTIONS:
+        rotation = start + (end - start) * fraction
+        if static_restoring(block, tendon_state, rotation) * (end - start) > 0.0:
+            first, last = (rotation if math.isnan(first) else first), rotation
         elif not math.isnan(first):
-            return first, last_before(block, body, last, at)
+            return first, bisect_moment(block, tendon_state, last, rotation)
     return first, end
 
 
 @inlined
-def last_before(block: Record, body: tuple[bool, int, float], one: float, other: float) -> float:
+def bisect_moment(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> float:
     """Find the rotation at which the moment changes its sign between two rotations, by bisection."""
-    sign = moment_at(block, body, one)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (one + other)
-        if moment_at(block, body, middle) * sign > 0.0:
-            one = middle
+    sign = static_restoring(block, tendon_state, start)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (start + end)
+        if static_restoring(block, tendon_state, middle) * sign > 0.0:
+            start = middle
         else:
-            other = middle
-    return one
+            end = middle
+    return start
 
 
 @shared
-def rise(block: Record, body: tuple[bool, int, float], start: float, end: float) -> float:
+def bound_energy_rise(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> float:
     """Compute a lower bound on the change of potential energy along a path, divided by inertia, law by law."""
-    nonlinear, side, plastic = body
+    nonlinear, side, plastic = tendon_state
     low, high, total = min(start, end), max(start, end), 0.0
-    slack = rotation_at(block, nonlinear, side, plastic + block.slack)
-    yields = rotation_at(block, nonlinear, side, plastic + block.yields)
-    for upper in (min(max(slack, low), high), min(max(yields, low), high), high):
+    slack_rotation = rotation_from_elongation(block, nonlinear, side, plastic + block.slack_elongation)
+    yield_rotation = rotation_from_elongation(block, nonlinear, side, plastic + block.yield_elongation)
+    for upper in (min(max(slack_rotation, low), high), min(max(yield_rotation, low), high), high):
         half, middle = 0.5 * (upper - low), 0.5 * (upper + low)
-        for node, weight in _RULE:
-            total += half * weight * moment_at(block, body, middle - half * node)
-            total += half * weight * moment_at(block, body, middle + half * node)
+        for node, weight in _GAUSS_LEGENDRE:
+            total += half * weight * static_restoring(block, tendon_state, middle - half * node)
+            total += half * weight * static_restoring(block, tendon_state, middle + half * node)
         low = upper
     size = abs(block.spring[side]) + abs(block.prestress[side]) + abs(block.base_prestress[side])
-    size += block.tendon[side] * (block.lever_arm[side] + plastic + abs(block.slack))
+    size += block.tendon_stiffness[side] * (block.lever_arm[side] + plastic + abs(block.slack_elongation))
     weight = 1.0 + abs(block.added_weight[side]) + abs(block.base_weight[side])
     size += block.stiffness[side] * (weight + abs(block.added_push[side]) + abs(block.base_push[side]))
     return math.copysign(1.0, end - start) * total - _ROUNDING_OF_MOMENT * size * abs(end - start)
 
 
 @inlined
-def moment_at(block: Record, body: tuple[bool, int, float], u: float) -> float:
+def static_restoring(block: Record, tendon_state: tuple[bool, int, float], u: float) -> float:
     """Compute the restoring acceleration at a rotation without ground motion and damping."""
-    nonlinear, side, plastic = body
+    nonlinear, side, plastic = tendon_state
     weight, push, pull = block.added_weight[side], block.added_push[side], block.prestress[side]
     if block.yielding:
-        taut = max(elongation_at(block, nonlinear, side, u) - plastic - block.slack, 0.0)
+        stretch = max(elongation_from_rotation(block, nonlinear, side, u) - plastic - block.slack_elongation, 0.0)
         weight, push, pull = block.base_weight[side], block.base_push[side], block.base_prestress[side]
-        pull += block.tendon[side] * min(taut, block.yields - block.slack)
+        pull += block.tendon_stiffness[side] * min(stretch, block.yield_elongation - block.slack_elongation)
     if nonlinear:
         psi, pull = block.slenderness[side] - u, pull * math.cos(0.5 * u)
-        own = block.stiffness[side] * ((1.0 + weight) * math.sin(psi) + push * math.cos(psi))
+        gravity = block.stiffness[side] * ((1.0 + weight) * math.sin(psi) + push * math.cos(psi))
     else:
         standing = block.threshold_slope[side] * (block.threshold[side] * (1.0 + weight) + push)
-        own = standing - block.stiffness[side] * (1.0 + weight) * u
-    return own + pull + block.spring[side] * u
+        gravity = standing - block.stiffness[side] * (1.0 + weight) * u
+    return gravity + pull + block.spring[side] * u

@@ -42,16 +42,16 @@ _INTEGRATED = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 
 @inlined
-def times_weight(weight: Line | None, this: float, before: float) -> float:
+def weighted_term(weight: Line | None, current: float, previous: float) -> float:
     """Compute a coefficient of weight times series from two neighbouring ones of the series; None: weight 1."""
-    return this if weight is None else weight[0] * this + weight[1] * before
+    return current if weight is None else weight[0] * current + weight[1] * previous
 
 
 # ---- Series to any order: scratch.ground and scratch.weight contain the polynomials of motion and weight ----
 
 
 @inlined
-def linear_coefficients(block: Record, state: Record, scratch: Record, degree: int, order: int) -> None:
+def write_linear_coefficients(block: Record, state: Record, scratch: Record, degree: int, order: int) -> None:
     """Write c[0] to c[order] of a linear arc under constant weight and a motion of ``degree`` into scratch.rotation."""
     c, A, side = scratch.rotation, scratch.ground, state.side
     lam, gain = block.stiffness[side], block.threshold_slope[side]
@@ -82,9 +82,9 @@ def weighted_coefficient(block: Record, side: int, scratch: Record, degree: int,
 def nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[int, int], k: int) -> float:
     """Compute c[k + 2] of a nonlinear arc from sin and cos(alpha - u) up to k, for the degrees of motion and weight."""
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
-    degree, changes = degrees
+    degree, weight_degree = degrees
     value = W[0] * S[k]
-    for j in range(1, min(k, changes) + 1):
+    for j in range(1, min(k, weight_degree) + 1):
         value += W[j] * S[k - j]
     for j in range(min(k, degree) + 1):
         value += A[j] * C[k - j]
@@ -93,7 +93,7 @@ def nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[int, int],
 
 
 @inlined
-def angle_coefficients(scratch: Record, k: int) -> None:
+def write_angle_coefficients(scratch: Record, k: int) -> None:
     """Write the coefficients k + 1 of sin and cos(alpha - u) from the earlier ones and c[1] to c[k + 1]."""
     c, S, C = scratch.rotation, scratch.sine, scratch.cosine
     sine = 0.0
@@ -129,7 +129,7 @@ def restrained_force(
 
 
 @inlined
-def half_angle_coefficients(scratch: Record, k: int) -> None:
+def write_half_angle_coefficients(scratch: Record, k: int) -> None:
     """Write the coefficients k + 1 of sin and cos(u/2) from the earlier ones and c[1] to c[k + 1]."""
     c, S, C = scratch.rotation, scratch.half_sine, scratch.half_cosine
     sine = 0.0
@@ -156,7 +156,7 @@ def next_coefficient(
 
 
 @inlined
-def variation_coefficients(work: Record, damping: float, order: int) -> None:
+def write_variation_coefficients(work: Record, damping: float, order: int) -> None:
     """Write the coefficients 2 to ``order`` of x'' = stiffness x - damping x' + forcing into work.change.
 
     The first two must be set beforehand.
@@ -175,7 +175,7 @@ def variation_coefficients(work: Record, damping: float, order: int) -> None:
 
 
 @inlined
-def linear_ten(u: float, v: float, lam: float, pull: float, rate: float) -> Ten:
+def expand_linear(u: float, v: float, lam: float, pull: float, rate: float) -> Ten:
     """Compute the coefficients of u'' = lam u - pull - rate t."""
     c2, c3 = 0.5 * (lam * u - pull), (lam * v - rate) * (1.0 / 6.0)
     c4, c5 = lam * c2 * (1.0 / 12.0), lam * c3 * (1.0 / 20.0)
@@ -185,19 +185,19 @@ def linear_ten(u: float, v: float, lam: float, pull: float, rate: float) -> Ten:
 
 
 @inlined
-def weighted_ten(u: float, v: float, lam: float, at_rest: float, push: Line, weight: Line) -> Ten:
+def expand_weighted(u: float, v: float, lam: float, pull: float, push: Line, weight: Line) -> Ten:
     """Compute the coefficients of u'' = weight (lam u - at_rest) - push, with weight and push linear in time."""
-    z = lam * u - at_rest
-    c2 = 0.5 * (times_weight(weight, z, 0.0) - push[0])
-    c3 = (1.0 / 6.0) * (times_weight(weight, lam * v, z) - push[1])
-    c4, c5 = lam * times_weight(weight, c2, v) * (1.0 / 12.0), lam * times_weight(weight, c3, c2) * (1.0 / 20.0)
-    c6, c7 = lam * times_weight(weight, c4, c3) * (1.0 / 30.0), lam * times_weight(weight, c5, c4) * (1.0 / 42.0)
-    c8, c9 = lam * times_weight(weight, c6, c5) * (1.0 / 56.0), lam * times_weight(weight, c7, c6) * (1.0 / 72.0)
+    z = lam * u - pull
+    c2 = 0.5 * (weighted_term(weight, z, 0.0) - push[0])
+    c3 = (1.0 / 6.0) * (weighted_term(weight, lam * v, z) - push[1])
+    c4, c5 = lam * weighted_term(weight, c2, v) * (1.0 / 12.0), lam * weighted_term(weight, c3, c2) * (1.0 / 20.0)
+    c6, c7 = lam * weighted_term(weight, c4, c3) * (1.0 / 30.0), lam * weighted_term(weight, c5, c4) * (1.0 / 42.0)
+    c8, c9 = lam * weighted_term(weight, c6, c5) * (1.0 / 56.0), lam * weighted_term(weight, c7, c6) * (1.0 / 72.0)
     return u, v, c2, c3, c4, c5, c6, c7, c8, c9
 
 
 @inlined
-def nonlinear_ten(start: Line, angle: Line, lam: float, push: Line, weight: Line | None) -> tuple[Ten, Seven]:
+def expand_nonlinear(start: Line, angle: Line, lam: float, push: Line, weight: Line | None) -> tuple[Ten, Seven]:
     """Compute the coefficients of u'' = -lam (weight sin(alpha - u) + push cos(alpha - u)).
 
     Weight (None: 1) and push are linear in time. ``start`` is (u, v) and ``angle`` the sine and cosine of alpha - u
@@ -207,40 +207,45 @@ def nonlinear_ten(start: Line, angle: Line, lam: float, push: Line, weight: Line
     s0, c0 = angle
     a, b = push
     l2 = -0.5 * lam
-    u2 = l2 * (times_weight(weight, s0, 0.0) + a * c0)
+    u2 = l2 * (weighted_term(weight, s0, 0.0) + a * c0)
     s1, c1 = -(v * c0), v * s0
-    u3 = l2 * (times_weight(weight, s1, s0) + (a * c1 + b * c0)) * (1.0 / 3.0)
+    u3 = l2 * (weighted_term(weight, s1, s0) + (a * c1 + b * c0)) * (1.0 / 3.0)
     r2 = 2.0 * u2
     s2, c2 = -0.5 * (v * c1 + r2 * c0), 0.5 * (v * s1 + r2 * s0)
-    u4 = l2 * (times_weight(weight, s2, s1) + (a * c2 + b * c1)) * (1.0 / 6.0)
+    u4 = l2 * (weighted_term(weight, s2, s1) + (a * c2 + b * c1)) * (1.0 / 6.0)
     r3 = 3.0 * u3
     s3, c3 = -(v * c2 + r2 * c1 + r3 * c0) * (1.0 / 3.0), (v * s2 + r2 * s1 + r3 * s0) * (1.0 / 3.0)
-    u5 = l2 * (times_weight(weight, s3, s2) + (a * c3 + b * c2)) * (1.0 / 10.0)
+    u5 = l2 * (weighted_term(weight, s3, s2) + (a * c3 + b * c2)) * (1.0 / 10.0)
     r4 = 4.0 * u4
     s4 = -0.25 * ((v * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
     c4 = 0.25 * ((v * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
-    u6 = l2 * (times_weight(weight, s4, s3) + (a * c4 + b * c3)) * (1.0 / 15.0)
+    u6 = l2 * (weighted_term(weight, s4, s3) + (a * c4 + b * c3)) * (1.0 / 15.0)
     r5 = 5.0 * u5
     s5 = -0.2 * ((v * c4 + r2 * c3) + (r3 * c2 + r4 * c1) + r5 * c0)
     c5 = 0.2 * ((v * s4 + r2 * s3) + (r3 * s2 + r4 * s1) + r5 * s0)
-    u7 = l2 * (times_weight(weight, s5, s4) + (a * c5 + b * c4)) * (1.0 / 21.0)
+    u7 = l2 * (weighted_term(weight, s5, s4) + (a * c5 + b * c4)) * (1.0 / 21.0)
     r6 = 6.0 * u6
     s6 = -(1.0 / 6.0) * ((v * c5 + r2 * c4) + (r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0))
     c6 = (1.0 / 6.0) * ((v * s5 + r2 * s4) + (r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0))
-    u8 = l2 * (times_weight(weight, s6, s5) + (a * c6 + b * c5)) * (1.0 / 28.0)
+    u8 = l2 * (weighted_term(weight, s6, s5) + (a * c6 + b * c5)) * (1.0 / 28.0)
     r7 = 7.0 * u7
     s7 = -(1.0 / 7.0) * ((v * c6 + r2 * c5) + (r3 * c4 + r4 * c3) + ((r5 * c2 + r6 * c1) + r7 * c0))
     c7 = (1.0 / 7.0) * ((v * s6 + r2 * s5) + (r3 * s4 + r4 * s3) + ((r5 * s2 + r6 * s1) + r7 * s0))
-    u9 = l2 * (times_weight(weight, s7, s6) + (a * c7 + b * c6)) * (1.0 / 36.0)
-    low = (abs(v), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
-    return (u, v, u2, u3, u4, u5, u6, u7, u8, u9), (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
+    u9 = l2 * (weighted_term(weight, s7, s6) + (a * c7 + b * c6)) * (1.0 / 36.0)
+    lowest_sums = (abs(v), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
+    return (u, v, u2, u3, u4, u5, u6, u7, u8, u9), (
+        *lowest_sums,
+        abs(s5) + abs(c5),
+        abs(s6) + abs(c6),
+        abs(s7) + abs(c7),
+    )
 
 
 # ---- Terms of the velocity in lanes, in units of substeps, so that their sum is the change during one ----
 
 
 @inlined
-def weighted_rates(r1: float, z0: float, q: float, push: Line, weight: Line) -> tuple[Nine, float, float]:
+def weighted_velocity_terms(r1: float, z0: float, q: float, push: Line, weight: Line) -> tuple[Nine, float, float]:
     """Compute the terms r1 to r9, r10 and r11 of the velocity of a linear arc under varying weight.
 
     u'' = weight z - push, where z is q u minus a constant and z0 is its initial value.
@@ -260,35 +265,35 @@ def weighted_rates(r1: float, z0: float, q: float, push: Line, weight: Line) -> 
 
 
 @inlined
-def nonlinear_rates(r1: float, angle: Line, l2: float, push: Line, weight: Line | None) -> tuple[Nine, Seven]:
+def nonlinear_velocity_terms(r1: float, angle: Line, l2: float, push: Line, weight: Line | None) -> tuple[Nine, Seven]:
     """Compute the terms r1 to r9 of the velocity of a nonlinear arc.
 
     ``l2`` is -lam/2, ``angle`` the initial sine and cosine of alpha - u; a weight of None is 1. The second tuple is as
-    in `nonlinear_ten`.
+    in `expand_nonlinear`.
     """
     s0, c0 = angle
     a, b = push
-    r2 = 2.0 * (l2 * (times_weight(weight, s0, 0.0) + a * c0))
+    r2 = 2.0 * (l2 * (weighted_term(weight, s0, 0.0) + a * c0))
     s1, c1 = -(r1 * c0), r1 * s0
-    r3 = l2 * (times_weight(weight, s1, s0) + (a * c1 + b * c0))
+    r3 = l2 * (weighted_term(weight, s1, s0) + (a * c1 + b * c0))
     s2, c2 = -0.5 * (r1 * c1 + r2 * c0), 0.5 * (r1 * s1 + r2 * s0)
-    r4 = (2.0 / 3.0) * (l2 * (times_weight(weight, s2, s1) + (a * c2 + b * c1)))
+    r4 = (2.0 / 3.0) * (l2 * (weighted_term(weight, s2, s1) + (a * c2 + b * c1)))
     s3, c3 = -(1.0 / 3.0) * (r1 * c2 + (r2 * c1 + r3 * c0)), (1.0 / 3.0) * (r1 * s2 + (r2 * s1 + r3 * s0))
-    r5 = 0.5 * (l2 * (times_weight(weight, s3, s2) + (a * c3 + b * c2)))
+    r5 = 0.5 * (l2 * (weighted_term(weight, s3, s2) + (a * c3 + b * c2)))
     s4 = -0.25 * ((r1 * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
     c4 = 0.25 * ((r1 * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
-    r6 = 0.4 * (l2 * (times_weight(weight, s4, s3) + (a * c4 + b * c3)))
+    r6 = 0.4 * (l2 * (weighted_term(weight, s4, s3) + (a * c4 + b * c3)))
     s5 = -0.2 * ((r1 * c4 + r2 * c3) + (r3 * c2 + (r4 * c1 + r5 * c0)))
     c5 = 0.2 * ((r1 * s4 + r2 * s3) + (r3 * s2 + (r4 * s1 + r5 * s0)))
-    r7 = (1.0 / 3.0) * (l2 * (times_weight(weight, s5, s4) + (a * c5 + b * c4)))
+    r7 = (1.0 / 3.0) * (l2 * (weighted_term(weight, s5, s4) + (a * c5 + b * c4)))
     s6 = -(1.0 / 6.0) * ((r1 * c5 + r2 * c4) + ((r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0)))
     c6 = (1.0 / 6.0) * ((r1 * s5 + r2 * s4) + ((r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0)))
-    r8 = (2.0 / 7.0) * (l2 * (times_weight(weight, s6, s5) + (a * c6 + b * c5)))
+    r8 = (2.0 / 7.0) * (l2 * (weighted_term(weight, s6, s5) + (a * c6 + b * c5)))
     s7 = -(1.0 / 7.0) * (((r1 * c6 + r2 * c5) + (r3 * c4 + r4 * c3)) + ((r5 * c2 + r6 * c1) + r7 * c0))
     c7 = (1.0 / 7.0) * (((r1 * s6 + r2 * s5) + (r3 * s4 + r4 * s3)) + ((r5 * s2 + r6 * s1) + r7 * s0))
-    r9 = 0.25 * (l2 * (times_weight(weight, s7, s6) + (a * c7 + b * c6)))
-    low = (abs(r1), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
-    angles = (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
+    r9 = 0.25 * (l2 * (weighted_term(weight, s7, s6) + (a * c7 + b * c6)))
+    lowest_sums = (abs(r1), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
+    angles = (*lowest_sums, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
     return (r1, r2, r3, r4, r5, r6, r7, r8, r9), angles
 
 
@@ -296,12 +301,12 @@ def nonlinear_rates(r1: float, angle: Line, l2: float, push: Line, weight: Line 
 
 #: Nine times the largest bound on the truncation of a nonlinear velocity after nine terms, divided by the sum of their
 #: absolute values. The bound, a few times the truncation, is valid if two sums are below a quarter.
-_TRUNCATION_OF_NINE = 9.0 * 2.0**-52
+_MAX_TRUNCATION = 9.0 * 2.0**-52
 _QUARTER = 0.25
 
 
 @inlined
-def strength_of(weight: Line | None, push: Line, t: float) -> Line:
+def sum_forcing(weight: Line | None, push: Line, t: float) -> Line:
     """Compute the sum of |weight| and |push| within t, and of their changes; lines are values and slopes."""
     if weight is None:
         return 1.0 + abs(push[0]) + abs(push[1]) * t, abs(push[1]) * t
@@ -310,10 +315,10 @@ def strength_of(weight: Line | None, push: Line, t: float) -> Line:
 
 
 @inlined
-def truncation_is_negligible(r: Nine, z: Seven, stiffness: float, strength: Line) -> tuple[bool, float]:
+def has_negligible_truncation(r: Nine, z: Seven, stiffness: float, strength: Line) -> tuple[bool, float]:
     """Return whether the truncation after nine terms is below 2^-52, and a bound on all terms of u'' after the first.
 
-    Special case of `truncation_nonlinear` for motion and weight linear in time, with steps of length h as the unit of
+    Special case of `bound_nonlinear_truncation` for motion and weight linear in time, with the step h as the unit of
     time and ``stiffness`` = lam h^2. False for NaN.
     """
     t8 = r[7] + r[8]  # sums of all later terms
@@ -325,8 +330,8 @@ def truncation_is_negligible(r: Nine, z: Seven, stiffness: float, strength: Line
     t2 = r[1] + t3
     velocity = r[0] + t2
     products = (t8 + z[0] * t7) + (z[1] * t6 + z[2] * t5) + ((z[3] * t4 + z[4] * t3) + (z[5] * t2 + z[6] * velocity))
-    most, change = stiffness * strength[0], stiffness * strength[1]
-    # The factors include the feedback if velocity and most are below a quarter.
-    beyond = 1.01 * change * z[6] + 0.131 * (most * products)
-    negligible = (beyond <= _TRUNCATION_OF_NINE * velocity) & (velocity <= _QUARTER) & (most <= _QUARTER)
-    return negligible, (t3 + t3) + ((t4 + t5) + (t6 + t7) + (t8 + r[8]))
+    max_forcing, change = stiffness * strength[0], stiffness * strength[1]
+    # The factors include the feedback if velocity and max_forcing are below a quarter.
+    truncation = 1.01 * change * z[6] + 0.131 * (max_forcing * products)
+    is_negligible = (truncation <= _MAX_TRUNCATION * velocity) & (velocity <= _QUARTER) & (max_forcing <= _QUARTER)
+    return is_negligible, (t3 + t3) + ((t4 + t5) + (t6 + t7) + (t8 + r[8]))

@@ -1,28 +1,35 @@
 """Steps so short that nine terms of the series suffice, in registers, with one bound on possible events.
 
 The outcome is UNDECIDED for NaN and if the bound is inconclusive (two close impacts, a rotation near the largest so
-far, overturning). `expand` and `advance` then compute the step from the same series.
+far, overturning). `expand_arc` and `advance_to_event` then compute the step from the same series.
 """
 
 import math
 
 import numpy as np
 
-from rocking.kernels.arc import sign_of, weight_at
+from rocking.kernels.arc import side_sign, weight_at
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import StepEnd
-from rocking.kernels.ground import Ground, acceleration, coefficient, has_vertical, is_straight, vertical_of
+from rocking.kernels.ground import (
+    Ground,
+    acceleration,
+    coefficient,
+    has_vertical,
+    is_piecewise_linear,
+    vertical_component,
+)
 from rocking.kernels.series import (
     Line,
     Seven,
     Ten,
-    linear_ten,
-    nonlinear_ten,
-    strength_of,
-    truncation_is_negligible,
-    weighted_ten,
+    expand_linear,
+    expand_nonlinear,
+    expand_weighted,
+    has_negligible_truncation,
+    sum_forcing,
 )
-from rocking.kernels.state import Outcome, Record
+from rocking.kernels.state import Record, StepOutcome
 
 #: Largest lam t^2 of a linear step, lam |W| t^2 under a varying weight W, and (lam (|W| + |a|/g) + v^2) t^2 of a
 #: nonlinear step.
@@ -31,13 +38,13 @@ SHORT_WEIGHTED = 2e-3
 SHORT_NONLINEAR = 1.2e-3
 
 #: Smallest fraction of the remaining time for which a short step pays: full series reach further with less rounding.
-_WORTH = 0.125
+_MIN_FRACTION = 0.125
 
 #: Largest sum of the last two terms of a linear velocity, divided by the first two. For small lam t^2, the truncation
 #: is smaller by a factor of at least 18,000.
 _LAST_TERMS = 2.0**-40
 
-#: Largest quantity tested by `is_complete_weighted`, divided by the first two terms; the truncation is 1/60 of it.
+#: Largest quantity tested by `is_sufficient_weighted`, divided by the first two terms; the truncation is 1/60 of it.
 _NEXT_TERMS = 2.0**-46
 
 #: Largest number of Newton steps, and relative size of the last, whose square is the order of the error.
@@ -46,53 +53,55 @@ _CONVERGED = 1e-8
 
 
 @inlined
-def short_step(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
-    """Step to the next impact, over ``left``, or part of it; UNDECIDED if the step is small or not simple."""
-    end = short_part(ground, block, settings, state, left)
-    return undecided() if end.outcome == Outcome.STEP and end.time < _WORTH * left else end
+def short_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
+    """Step to the next impact or by at most ``h_max``; UNDECIDED if the step is small or not simple."""
+    end = partial_step(ground, block, settings, state, h_max)
+    return undecided_step() if end.outcome == StepOutcome.STEP and end.time < _MIN_FRACTION * h_max else end
 
 
 @inlined
-def short_part(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
-    """Step to the next impact, over ``left``, or over the part of it that is short."""
-    if not is_straight(ground) or block.restrained:
-        return undecided()
+def partial_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
+    """Step to the next impact or by at most ``h_max``, as far as nine terms suffice."""
+    if not is_piecewise_linear(ground) or block.restrained:
+        return undecided_step()
     if has_vertical(ground):
-        return short_weighted_step(ground, block, settings, state, left)
+        return short_weighted_step(ground, block, settings, state, h_max)
     if settings.nonlinear:
-        return short_nonlinear_step(ground, block, state, left, None)
+        return short_nonlinear_step(ground, block, state, h_max, None)
     c = linear_series(ground, block, state)
-    end = resolve_step(c, reach(abs(block.stiffness[state.side]), SHORT_LINEAR, left), state, block.overturn_angle)
-    return end if is_complete(c, end.time) else undecided()
+    end = resolve_step(c, reach(abs(block.stiffness[state.side]), SHORT_LINEAR, h_max), state, block.overturn_angle)
+    return end if is_sufficient_linear(c, end.time) else undecided_step()
 
 
 @shared
-def short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
+def short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
     """Compute a short step under varying weight."""
     lam = block.stiffness[state.side]
-    weight = weight_at(ground, state.piece, state.offset), coefficient(vertical_of(ground), state.piece, 1)
+    weight = weight_at(ground, state.piece, state.offset), coefficient(vertical_component(ground), state.piece, 1)
     if settings.nonlinear:
-        return short_nonlinear_step(ground, block, state, left, weight)
+        return short_nonlinear_step(ground, block, state, h_max, weight)
     c = weighted_series(ground, block, state, weight)
-    end = resolve_step(c, reach(abs(lam) * greatest(weight, left), SHORT_WEIGHTED, left), state, block.overturn_angle)
-    return end if is_complete_weighted(c, lam, weight, end.time) else undecided()
+    end = resolve_step(
+        c, reach(abs(lam) * largest_weight(weight, h_max), SHORT_WEIGHTED, h_max), state, block.overturn_angle
+    )
+    return end if is_sufficient_weighted(c, lam, weight, end.time) else undecided_step()
 
 
 @inlined
-def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> StepEnd:
+def short_nonlinear_step(ground: Ground, block: Record, state: Record, h_max: float, weight: Line | None) -> StepEnd:
     """Compute a short step in the nonlinear model."""
     c, angles = nonlinear_series(ground, block, state, weight)
     lam, slope = block.stiffness[state.side], coefficient(ground, state.piece, 1)
     start = coefficient(ground, state.piece, 0) + slope * state.offset
-    size = lam * (greatest(weight, left) + max(abs(start), abs(start + slope * left))) + state.v * state.v
-    end = resolve_step(c, reach(size, SHORT_NONLINEAR, left), state, block.overturn_angle)
+    size = lam * (largest_weight(weight, h_max) + max(abs(start), abs(start + slope * h_max))) + state.v * state.v
+    end = resolve_step(c, reach(size, SHORT_NONLINEAR, h_max), state, block.overturn_angle)
     push = (acceleration(ground, state.piece, state.offset), slope)
-    complete = is_complete_nonlinear(c, angles, lam, push, weight, end.time)
-    return end if complete else undecided()
+    is_sufficient = is_sufficient_nonlinear(c, angles, lam, push, weight, end.time)
+    return end if is_sufficient else undecided_step()
 
 
 @inlined
-def is_complete_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
+def is_sufficient_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
     """Return whether nine terms of a linear series are sufficient at t under varying weight.
 
     Each coefficient follows from those two and, by the change of weight, three before. Therefore the last three bound
@@ -101,12 +110,12 @@ def is_complete_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
     t2, change = t * t, abs(weight[1]) * t
     t6 = t2 * t2 * t2
     eighth, ninth = 8.0 * abs(c[8]) * t2, 9.0 * abs(c[9]) * (t2 * t)
-    last = (abs(weight[0]) + change) * (eighth + ninth) + change * (7.0 * abs(c[7]) * t)
-    return abs(lam) * t2 * (last * t6) <= _NEXT_TERMS * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
+    last_terms = (abs(weight[0]) + change) * (eighth + ninth) + change * (7.0 * abs(c[7]) * t)
+    return abs(lam) * t2 * (last_terms * t6) <= _NEXT_TERMS * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
 
 
 @inlined
-def is_complete_nonlinear(c: Ten, z: Seven, lam: float, push: Line, weight: Line | None, t: float) -> bool:
+def is_sufficient_nonlinear(c: Ten, z: Seven, lam: float, push: Line, weight: Line | None, t: float) -> bool:
     """Return whether nine terms of a nonlinear series are sufficient at t."""
     t2 = t * t
     t3, t4 = t2 * t, t2 * t2
@@ -114,26 +123,26 @@ def is_complete_nonlinear(c: Ten, z: Seven, lam: float, push: Line, weight: Line
     low = (abs(c[1]) * t, 2.0 * abs(c[2]) * t2, 3.0 * abs(c[3]) * t3, 4.0 * abs(c[4]) * t4, 5.0 * abs(c[5]) * t5)
     sizes = (*low, 6.0 * abs(c[6]) * t6, 7.0 * abs(c[7]) * t7, 8.0 * abs(c[8]) * (t4 * t4), 9.0 * abs(c[9]) * (t4 * t5))
     angles = (z[0] * t, z[1] * t2, z[2] * t3, z[3] * t4, z[4] * t5, z[5] * t6, z[6] * t7)
-    negligible, _ = truncation_is_negligible(sizes, angles, lam * t2, strength_of(weight, push, t))
-    return negligible
+    is_negligible, _ = has_negligible_truncation(sizes, angles, lam * t2, sum_forcing(weight, push, t))
+    return is_negligible
 
 
 @inlined
-def undecided() -> StepEnd:
+def undecided_step() -> StepEnd:
     """Return an UNDECIDED step."""
-    return StepEnd(Outcome.UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return StepEnd(StepOutcome.UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
-def reach(size: float, limit: float, left: float) -> float:
-    """Return the time t, at most ``left``, up to which size t^2 is within a limit."""
-    return left if size * left * left <= limit else min(left, math.sqrt(limit / size))
+def reach(size: float, limit: float, max_time: float) -> float:
+    """Return the time t, at most ``max_time``, up to which size t^2 is within a limit."""
+    return max_time if size * max_time * max_time <= limit else min(max_time, math.sqrt(limit / size))
 
 
 @inlined
-def greatest(weight: Line | None, left: float) -> float:
+def largest_weight(weight: Line | None, duration: float) -> float:
     """Return the largest absolute weight during a time; 1 if constant."""
-    return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * left))
+    return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * duration))
 
 
 @inlined
@@ -142,7 +151,9 @@ def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
     side = state.side
     gain = block.threshold_slope[side]
     push = push_line(ground, state)
-    return linear_ten(state.u, state.v, block.stiffness[side], gain * (block.threshold[side] + push[0]), gain * push[1])
+    return expand_linear(
+        state.u, state.v, block.stiffness[side], gain * (block.threshold[side] + push[0]), gain * push[1]
+    )
 
 
 @inlined
@@ -151,63 +162,63 @@ def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) 
     side, gain = state.side, block.threshold_slope[state.side]
     push = push_line(ground, state)
     pushes = (gain * push[0], gain * push[1])
-    return weighted_ten(state.u, state.v, block.stiffness[side], gain * block.threshold[side], pushes, weight)
+    return expand_weighted(state.u, state.v, block.stiffness[side], gain * block.threshold[side], pushes, weight)
 
 
 @inlined
 def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> tuple[Ten, Seven]:
-    """Compute the series of a nonlinear arc under ground accelerations that are linear in time; see `nonlinear_ten`."""
+    """Compute the series of a nonlinear arc under ground accelerations that are linear in time."""
     side, u = state.side, state.u
     angle = (block.sine[side], block.cosine[side])
     if u != 0.0:
         psi = block.slenderness[side] - u
         angle = (math.sin(psi), math.cos(psi))
-    return nonlinear_ten((u, state.v), angle, block.stiffness[side], push_line(ground, state), weight)
+    return expand_nonlinear((u, state.v), angle, block.stiffness[side], push_line(ground, state), weight)
 
 
 @inlined
 def push_line(ground: Ground, state: Record) -> Line:
     """Return the ground acceleration (linear in time) in the frame of the state's side, and its slope."""
-    sign = sign_of(state.side)
+    sign = side_sign(state.side)
     return sign * acceleration(ground, state.piece, state.offset), sign * coefficient(ground, state.piece, 1)
 
 
 @inlined
-def resolve_step(c: Ten, t: float, state: Record, fallen: float) -> StepEnd:
+def resolve_step(c: Ten, t: float, state: Record, overturn_angle: float) -> StepEnd:
     """Return the end of a step of duration t, or its first impact; UNDECIDED if the bounds are inconclusive."""
     if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps forever
-        return undecided()
-    outcome = Outcome.STEP
-    rest = later_curvature(c, t)
-    most = 2.0 * c[2] + 6.0 * max(c[3], 0.0) * t + rest
-    least = 2.0 * c[2] + 6.0 * min(c[3], 0.0) * t - rest
+        return undecided_step()
+    outcome = StepOutcome.STEP
+    higher_terms = bound_higher_curvature(c, t)
+    max_curvature = 2.0 * c[2] + 6.0 * max(c[3], 0.0) * t + higher_terms
+    min_curvature = 2.0 * c[2] + 6.0 * min(c[3], 0.0) * t - higher_terms
     if c[0] == 0.0:
         # u/t > v + min(u'')/2 t: no impact while the right side is positive.
-        if not c[1] + 0.5 * min(least, 0.0) * t > 0.0:
-            t, outcome = impact_from_ground(c, t), Outcome.IMPACT
+        if not c[1] + 0.5 * min(min_curvature, 0.0) * t > 0.0:
+            t, outcome = find_impact_from_ground(c, t), StepOutcome.IMPACT
     else:
-        end = rotation(c, t)
+        end = evaluate_rotation(c, t)
         # The rotation is at most t^2/8 times the curvature below the lower of both ends.
-        if not min(c[0], end) > 0.125 * t * t * max(most, 0.0):
-            falls = most < 0.0 or c[1] + max(most, 0.0) * t < 0.0
-            t, outcome = impact_from_above(c, t) if end < 0.0 and falls else np.nan, Outcome.IMPACT
+        if not min(c[0], end) > 0.125 * t * t * max(max_curvature, 0.0):
+            is_falling = max_curvature < 0.0 or c[1] + max(max_curvature, 0.0) * t < 0.0
+            t, outcome = find_impact_from_above(c, t) if end < 0.0 and is_falling else np.nan, StepOutcome.IMPACT
     if math.isnan(t):
-        return undecided()
-    end, speed = (rotation(c, t) if outcome == Outcome.STEP else 0.0), velocity(c, t)
+        return undecided_step()
+    end, speed = (evaluate_rotation(c, t) if outcome == StepOutcome.STEP else 0.0), evaluate_velocity(c, t)
     peak_time, peak = t, end
-    rises = c[1] + min(least, 0.0) * t > 0.0
-    if not rises and max(c[0], end) - 0.125 * t * t * min(least, 0.0) > state.peak:
-        if not (most < 0.0 and c[1] > 0.0 and speed < 0.0):
-            return undecided()
-        peak_time = highest_time(c, t)
-        peak = rotation(c, peak_time)
-    if not max(c[0], peak) < fallen:
-        return undecided()
+    is_rising = c[1] + min(min_curvature, 0.0) * t > 0.0
+    if not is_rising and max(c[0], end) - 0.125 * t * t * min(min_curvature, 0.0) > state.peak:
+        if not (max_curvature < 0.0 and c[1] > 0.0 and speed < 0.0):
+            return undecided_step()
+        peak_time = find_peak_time(c, t)
+        peak = evaluate_rotation(c, peak_time)
+    if not max(c[0], peak) < overturn_angle:
+        return undecided_step()
     return StepEnd(outcome, t, end, speed, peak_time, peak)
 
 
 @inlined
-def later_curvature(c: Ten, t: float) -> float:
+def bound_higher_curvature(c: Ten, t: float) -> float:
     """Bound the contribution of the terms from the fourth power on to |u''| within t."""
     high = 56.0 * abs(c[8]) + 72.0 * abs(c[9]) * t
     middle = 30.0 * abs(c[6]) + 42.0 * abs(c[7]) * t
@@ -217,7 +228,7 @@ def later_curvature(c: Ten, t: float) -> float:
 
 
 @inlined
-def is_complete(c: Ten, t: float) -> bool:
+def is_sufficient_linear(c: Ten, t: float) -> bool:
     """Return whether nine terms of a linear series are sufficient at t for the velocity to its last place."""
     t2 = t * t
     t4 = t2 * t2
@@ -225,7 +236,7 @@ def is_complete(c: Ten, t: float) -> bool:
 
 
 @inlined
-def rotation(c: Ten, t: float) -> float:
+def evaluate_rotation(c: Ten, t: float) -> float:
     """Evaluate a series in pairs, a shorter chain of operations than Horner's rule."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
@@ -234,7 +245,7 @@ def rotation(c: Ten, t: float) -> float:
 
 
 @inlined
-def velocity(c: Ten, t: float) -> float:
+def evaluate_velocity(c: Ten, t: float) -> float:
     """Evaluate the derivative of a series."""
     t2 = t * t
     low = (2.0 * c[2] + 3.0 * c[3] * t) + (4.0 * c[4] + 5.0 * c[5] * t) * t2
@@ -243,7 +254,7 @@ def velocity(c: Ten, t: float) -> float:
 
 
 @inlined
-def over_time(c: Ten, t: float) -> tuple[float, float]:
+def evaluate_divided_by_time(c: Ten, t: float) -> tuple[float, float]:
     """Compute value and slope of a series without constant term, divided by t."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
@@ -254,49 +265,49 @@ def over_time(c: Ten, t: float) -> tuple[float, float]:
 
 
 @inlined
-def highest_time(c: Ten, left: float) -> float:
-    """Find the time of the peak of a concave arc that rises first and falls at ``left``; NaN if not found."""
-    t = min(left, -0.5 * c[1] / c[2])
+def find_peak_time(c: Ten, duration: float) -> float:
+    """Find the time of the peak of a concave arc that rises first and falls after ``duration``; NaN if not found."""
+    t = min(duration, -0.5 * c[1] / c[2])
     for _ in range(_NEWTON_STEPS):
         t2 = t * t
         low = (2.0 * c[2] + 6.0 * c[3] * t) + (12.0 * c[4] + 20.0 * c[5] * t) * t2
         high = (30.0 * c[6] + 42.0 * c[7] * t) + (56.0 * c[8] + 72.0 * c[9] * t) * t2
-        step = velocity(c, t) / (low + high * (t2 * t2))
+        step = evaluate_velocity(c, t) / (low + high * (t2 * t2))
         t -= step
         if abs(step) <= _CONVERGED * t:
-            return t if 0.0 < t < left else np.nan
+            return t if 0.0 < t < duration else np.nan
     return np.nan
 
 
 @inlined
-def impact_from_ground(c: Ten, left: float) -> float:
-    """Find the duration of an arc from an impact if it ends before ``left`` and u/t decreases throughout; else NaN."""
-    root = c[2] * c[2] - 4.0 * c[3] * c[1]
-    if not (c[2] < 0.0 and root > 0.0):
+def find_impact_from_ground(c: Ten, duration: float) -> float:
+    """Find the time of the next impact within a duration if u/t decreases until then; else NaN."""
+    discriminant = c[2] * c[2] - 4.0 * c[3] * c[1]
+    if not (c[2] < 0.0 and discriminant > 0.0):
         return np.nan
-    t = 2.0 * c[1] / (math.sqrt(root) - c[2])
-    if not t < left:
+    t = 2.0 * c[1] / (math.sqrt(discriminant) - c[2])
+    if not t < duration:
         return np.nan
     for _ in range(_NEWTON_STEPS):
-        f, slope = over_time(c, t)
+        f, slope = evaluate_divided_by_time(c, t)
         step = f / slope
         t -= step
         if abs(step) <= _CONVERGED * t:
-            falls = c[2] + 2.0 * max(c[3], 0.0) * t + 0.25 * later_curvature(c, t) < 0.0
-            return t if falls and t < left else np.nan
+            is_decreasing = c[2] + 2.0 * max(c[3], 0.0) * t + 0.25 * bound_higher_curvature(c, t) < 0.0
+            return t if is_decreasing and t < duration else np.nan
     return np.nan
 
 
 @inlined
-def impact_from_above(c: Ten, left: float) -> float:
-    """Find the time of the only root of an arc that is above ground now and below at ``left``; NaN if not found."""
-    square = c[1] * c[1] - 4.0 * c[2] * c[0]
-    if not square > 0.0:
+def find_impact_from_above(c: Ten, duration: float) -> float:
+    """Find the only root of an arc that is above ground now and below after ``duration``; NaN if not found."""
+    discriminant = c[1] * c[1] - 4.0 * c[2] * c[0]
+    if not discriminant > 0.0:
         return np.nan
-    t = min(left, 2.0 * c[0] / (math.sqrt(square) - c[1]))
+    t = min(duration, 2.0 * c[0] / (math.sqrt(discriminant) - c[1]))
     for _ in range(_NEWTON_STEPS):
-        step = rotation(c, t) / velocity(c, t)
+        step = evaluate_rotation(c, t) / evaluate_velocity(c, t)
         t -= step
         if abs(step) <= _CONVERGED * t:
-            return t if 0.0 < t < left else np.nan
+            return t if 0.0 < t < duration else np.nan
     return np.nan

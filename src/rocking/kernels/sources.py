@@ -6,25 +6,25 @@ from collections.abc import Callable
 from pathlib import Path
 
 
-def text_hash(folder: Path) -> str:
+def hash_text(folder: Path) -> str:
     """Hash the text of all kernels."""
-    return _hash(folder, lambda text: text)
+    return _hash_files(folder, lambda text: text)
 
 
-def code_hash(folder: Path) -> str:
-    """Hash the code of all kernels without comments and docstrings, slower than `text_hash`."""
-    return _hash(folder, _code)
+def hash_code(folder: Path) -> str:
+    """Hash the code of all kernels without comments and docstrings, slower than `hash_text`."""
+    return _hash_files(folder, _strip_docstrings)
 
 
-def _hash(folder: Path, content: Callable[[bytes], bytes]) -> str:
+def _hash_files(folder: Path, extract: Callable[[bytes], bytes]) -> str:
     digest = hashlib.sha256()
-    for source in sorted(folder.rglob("*.py")):
-        name = source.relative_to(folder).as_posix()
-        digest.update(name.encode() + b"\0" + content(source.read_bytes()) + b"\0")
+    for path in sorted(folder.rglob("*.py")):
+        name = path.relative_to(folder).as_posix()
+        digest.update(name.encode() + b"\0" + extract(path.read_bytes()) + b"\0")
     return digest.hexdigest()[:16]
 
 
-def _code(text: bytes) -> bytes:
+def _strip_docstrings(text: bytes) -> bytes:
     tree = ast.parse(text)
     for node in ast.walk(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node, clean=False):

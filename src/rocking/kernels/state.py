@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.kernels.compiled import UNCOMPILED, inlined
-from rocking.kernels.ground import Ground, start_of
+from rocking.kernels.ground import Ground, piece_start
 
 Records = NDArray[np.void]
 
@@ -27,7 +27,7 @@ AT_REST = -1
 TO_THE_END = 2**62
 
 
-class Outcome(IntEnum):
+class StepOutcome(IntEnum):
     """Event that ended one Taylor step."""
 
     STEP = 0
@@ -44,7 +44,7 @@ class Outcome(IntEnum):
 
 
 class TendonLaw(IntEnum):
-    """Present law of a tendon that yields; see `tendon`."""
+    """Present law of a tendon that yields; see `restraints`."""
 
     ELASTIC = 0
     SLACK = 1
@@ -88,7 +88,7 @@ class Ending(IntEnum):
     LEANS = 7
 
 
-def _record(**fields: Any) -> np.dtype[np.void]:
+def _define_record(**fields: Any) -> np.dtype[np.void]:
     """Return the type of a record with these fields, at the offsets of a C struct."""
     return np.dtype(
         [(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, kind in fields.items()], align=True
@@ -98,9 +98,9 @@ def _record(**fields: Any) -> np.dtype[np.void]:
 _SIDES = ("f8", (2,))
 _SERIES = ("f8", (ORDER + 2,))
 
-#: Body. Fields of two numbers refer to side + and side -; accelerations are in units of g. Here and below, the most
-#: used fields come first, so that fewer cache lines are read.
-BLOCK = _record(
+#: Body. Fields of two numbers refer to side + and side -; accelerations are in units of g. In all records the most used
+#: fields come first, so that fewer cache lines are read.
+BLOCK = _define_record(
     stiffness=_SIDES,  # lambda in u'' = lambda u - ..., 1/s^2
     threshold_slope=_SIDES,  # restoring acceleration at zero rotation per acceleration above the threshold
     threshold=_SIDES,  # ground acceleration at uplift without restraints
@@ -113,23 +113,23 @@ BLOCK = _record(
     slenderness=_SIDES,  # alpha, rad
     sine=_SIDES,  # of alpha
     cosine=_SIDES,  # of alpha
-    limit=_SIDES,  # limit of a `RestRule`
+    rest_limit=_SIDES,  # limit of a `RestRule`
     added_weight=_SIDES,  # added to the weight by restraints
     added_push=_SIDES,  # added to the push by restraints
     prestress=_SIDES,  # restraining force of cos(u/2) divided by inertia, 1/s^2
     spring=_SIDES,  # restraining force of u divided by inertia, 1/s^2
     damping=_SIDES,  # c in u'' = ... - c u', 1/s
     yielding="?",  # whether a tendon yields
-    tendon=_SIDES,  # stiffness times lever arm divided by inertia
-    lever_arm=_SIDES,  # distance from the pivot, m
+    tendon_stiffness=_SIDES,  # stiffness of the tendon times its lever arm divided by inertia
+    lever_arm=_SIDES,  # distance of the tendon from the pivot, m
     tendon_weight=_SIDES,  # added to the weight by the elastic tendon
     tendon_push=_SIDES,  # added to the push by the elastic tendon
-    yields="f8",  # elongation at yield, m
-    slack="f8",  # elongation below which the tendon is slack, m
-    base_weight=_SIDES,  # without the tendon
-    base_push=_SIDES,  # without the tendon
-    base_prestress=_SIDES,  # without the tendon
-    base_restraint_threshold=_SIDES,  # without the tendon
+    yield_elongation="f8",  # elongation at which the tendon yields, m
+    slack_elongation="f8",  # elongation below which the tendon is slack, m
+    base_weight=_SIDES,  # added_weight without the tendon
+    base_push=_SIDES,  # added_push without the tendon
+    base_prestress=_SIDES,  # prestress without the tendon
+    base_restraint_threshold=_SIDES,  # restraint_threshold without the tendon
     variable_restitution="?",  # whether the restitution varies
     seed="i8",  # seed of the draws; -1 if the restitution decreases with the speed
     min_restitution=_SIDES,  # smallest restitution
@@ -137,98 +137,104 @@ BLOCK = _record(
 )
 
 #: Settings of the computation.
-SETTINGS = _record(
-    nonlinear="?",  # model
+SETTINGS = _define_record(
+    nonlinear="?",  # whether the model is nonlinear
     rest_rule="i8",  # `RestRule` that ends chattering
     tolerance="f8",  # largest accepted width of a bracket on the time of rest, s
     stop="f8",  # time at which to stop, s
-    no_end_time="?",  # whether stop is infinite
+    no_end_time="?",  # whether the stop time is infinite
     record="?",  # whether to write the tables, or only the state
 )
 
 #: State of a march.
-STATE = _record(
-    piece="i8",  # present piece
-    offset="f8",  # time since its start, s
-    side="i8",  # 0 is side +, 1 side -; negative at rest
+STATE = _define_record(
+    piece="i8",  # present piece of the motion
+    offset="f8",  # time since the start of the piece, s
+    side="i8",  # 0 for side +, 1 for side -; negative at rest
     u="f8",  # rotation in the frame of the side
     v="f8",  # rate of u
     peak="f8",  # largest rotation so far
     stop_piece="i8",  # first piece beyond the march
-    budget="i8",  # iterations left
+    budget="i8",  # remaining iterations
     proven_impacts="i8",  # impacts since chattering was proven
     certificate_speed="f8",  # speed below which another proof is attempted
-    last_impact_time="f8",  # time of the last impact or uplift
-    impacts="i8",  # number so far
+    last_impact_time="f8",  # time of the last impact or uplift, s
+    impacts="i8",  # number of impacts so far
     ending="i8",  # an `Ending`
     continuous_uplift="?",  # whether the body has just been lifted without a jump
-    peak_time="f8",  # time of the peak
-    run_start="f8",  # time at which chattering was proven
-    last_uplift_time="f8",
-    last_rest_time="f8",
-    first_uplift="f8",  # times; 0 if none
-    first_rest="f8",
-    time_at_rest="f8",  # total
-    end="f8",  # time at which the march ended
-    nodes="i8",  # number of rows written to the table
-    events="i8",
-    sequences="i8",
-    uplifts="i8",  # number so far
-    rests="i8",
-    rests_by_rounding="i8",  # rests because time hardly advanced between impacts
-    rounding_decisions="i8",  # contacts, or sides of uplift without weight, decided by rounding
+    peak_time="f8",  # time of the largest rotation, s
+    sequence_start="f8",  # time since which chattering is proven, s
+    last_uplift_time="f8",  # time of the last uplift, s
+    last_rest_time="f8",  # time of the last rest, s
+    first_uplift="f8",  # time of the first uplift, s; 0 without one
+    first_rest="f8",  # time of the first rest, s; 0 without one
+    time_at_rest="f8",  # total time at rest, s
+    end_time="f8",  # time at which the march ended, s
+    nodes="i8",  # number of nodes written to the table
+    events="i8",  # number of events written to the table
+    sequences="i8",  # number of sequences written to the table
+    uplifts="i8",  # number of uplifts so far
+    rests="i8",  # number of rests so far
+    rests_by_rounding="i8",  # number of rests because time hardly advanced between impacts
+    rounding_decisions="i8",  # number of contacts, or sides of uplift without weight, decided by rounding
     law="i8",  # `TendonLaw` of a tendon that yields
-    plastic="f8",  # its plastic elongation, m
-    leaning="f8",  # rotation about which the body leans at the end
+    plastic="f8",  # plastic elongation of the tendon, m
+    leaning_rotation="f8",  # rotation about which the body leans at the end
 )
 
-#: Step of a response: state at its start, for `expand`. Elsewhere a side is +1 or -1, and 0 at rest.
-NODE_ROW = _record(time="f8", piece="i8", offset="f8", side="i4", law="i4", u="f8", v="f8")
-IMPACT_ROW = _record(time="f8", side="i8", speed_before="f8", speed_after="f8")
-EVENT_ROW = _record(time="f8", kind="i8", side="i8")
-SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
+#: Step of a response: state at its start (see `STATE`) and time, for `expand_arc`.
+NODE_ROW = _define_record(time="f8", piece="i8", offset="f8", side="i4", law="i4", u="f8", v="f8")
+
+#: Impact: time, side entered (+1 or -1), speeds before and after.
+IMPACT_ROW = _define_record(time="f8", side="i8", speed_before="f8", speed_after="f8")
+
+#: Event: time, `EventKind`, side (+1 or -1; 0 at rest).
+EVENT_ROW = _define_record(time="f8", kind="i8", side="i8")
+
+#: Chattering sequence: time since which it is proven, time of rest with bounds, number of impacts in between.
+SEQUENCE_ROW = _define_record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
 
 #: Row k contains the k-th node, impact, event and chattering sequence of a march: one array, because kernels pass
 #: arrays by value.
-TABLE = _record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
+TABLE = _define_record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
 
 #: Scratch space: series of one step about its start.
-SCRATCH = _record(
-    rotation=_SERIES,
-    ground=_SERIES,  # acceleration of the ground
-    weight=_SERIES,
-    sine=_SERIES,  # of alpha - u
-    cosine=_SERIES,
+SCRATCH = _define_record(
+    rotation=_SERIES,  # u
+    ground=_SERIES,  # push: acceleration of the ground in the frame of the side, in units of g
+    weight=_SERIES,  # weight divided by the weight at rest
+    sine=_SERIES,  # sin(alpha - u)
+    cosine=_SERIES,  # cos(alpha - u)
     other=_SERIES,  # space for another series
-    half_sine=_SERIES,  # of u/2
-    half_cosine=_SERIES,
+    half_sine=_SERIES,  # sin(u/2)
+    half_cosine=_SERIES,  # cos(u/2)
 )
 
 #: Scratch space of a variation: series of the stiffness, the forcing and the variation itself.
-VARIATION = _record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
+VARIATION = _define_record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
 
 
-def records(count: int, kind: np.dtype[np.void]) -> Records:
+def new_records(count: int, kind: np.dtype[np.void]) -> Records:
     """Return zeroed records."""
-    return attributed(np.zeros(count, dtype=kind))
+    return expose_fields(np.zeros(count, dtype=kind))
 
 
-def attributed(array: Records) -> Records:
-    """Convert records for kernels; uncompiled ones read fields as attributes, which is slow elsewhere."""
+def expose_fields(array: Records) -> Records:
+    """Let kernels that Python runs read fields as attributes, which is slow elsewhere."""
     return array.view(np.recarray) if UNCOMPILED else array
 
 
-def record(kind: np.dtype[np.void], **values: Any) -> Record:
+def new_record(kind: np.dtype[np.void], **values: Any) -> Record:
     """Return one record with these values."""
-    made = records(1, kind)[0]
+    row = new_records(1, kind)[0]
     for name, value in values.items():
-        made[name] = value
-    return made
+        row[name] = value
+    return row
 
 
 def new_states(count: int, budget: int) -> Records:
     """Return states of blocks at rest at time zero that march to the end of the motion."""
-    states = records(count, STATE)
+    states = new_records(count, STATE)
     states["side"] = AT_REST
     states["stop_piece"] = TO_THE_END
     states["ending"] = Ending.RUNNING.value
@@ -236,28 +242,28 @@ def new_states(count: int, budget: int) -> Records:
     return states
 
 
-def state_at(node: Record, plastic: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
+def state_at_node(node: Record, plastic: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
     """Return the state of a march that starts at a node, with the plastic elongation of a tendon there."""
-    made = new_states(1, budget)[0]
+    state = new_states(1, budget)[0]
     for name in ("piece", "offset", "side", "u", "v", "law"):
-        made[name] = node[name]
-    made["peak"], made["plastic"] = node["u"], plastic
-    return made
+        state[name] = node[name]
+    state["peak"], state["plastic"] = node["u"], plastic
+    return state
 
 
 def new_scratch() -> Record:
     """Return scratch space for one march at a time."""
-    return record(SCRATCH)
+    return new_record(SCRATCH)
 
 
 def new_table(rows: int) -> Records:
-    """Return an empty table for a first attempt."""
-    return records(rows, TABLE)
+    """Return a table with empty rows."""
+    return new_records(rows, TABLE)
 
 
-def grown(table: Records) -> Records:
-    """Return a table with the same rows and as many empty ones."""
-    return attributed(np.concatenate([table, np.zeros_like(table)]))
+def enlarge_table(table: Records) -> Records:
+    """Return a table with the same rows followed by as many empty ones."""
+    return expose_fields(np.concatenate([table, np.zeros_like(table)]))
 
 
 # ---- Rows of a table, which are written only if the settings require them ----
@@ -270,25 +276,25 @@ _ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
 @inlined
 def has_space(settings: Record, table: Records, state: Record) -> bool:
     """Return whether the table has space for one iteration of the march."""
-    most = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
-    return not settings.record or most + _ROWS_PER_ITERATION <= table.shape[0]
+    max_rows = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
+    return not settings.record or max_rows + _ROWS_PER_ITERATION <= table.shape[0]
 
 
 @inlined
-def signed(side: int) -> int:
+def signed_side(side: int) -> int:
     """Return the sign of the rotation on a side: +1, -1, or 0 at rest."""
     return 0 if side < 0 else 1 - 2 * side
 
 
 @inlined
 def resting_side(block: Record, side: int) -> int:
-    """Return the side of a body at rest on a side, which identifies one of two facing stops (see `stop_of`)."""
+    """Return the side of a body at rest on a side, which identifies one of two facing stops (see `stop_at_rest`)."""
     return -1 - side if block.two_stops else AT_REST
 
 
 @inlined
-def stop_of(resting: int) -> int:
-    """Return the stop at which a body rests whose side is ``resting``; 0 without two stops."""
+def stop_at_rest(resting: int) -> int:
+    """Return the stop at which a body rests (0 without two stops); ``resting`` is its `resting_side`."""
     return -1 - resting
 
 
@@ -298,7 +304,7 @@ def write_node(ground: Ground, settings: Record, table: Records, state: Record) 
     if not settings.record:
         return
     row = table[state.nodes].node
-    row.time = start_of(ground, state.piece) + state.offset
+    row.time = piece_start(ground, state.piece) + state.offset
     row.piece = state.piece
     row.offset = state.offset
     row.side = state.side
@@ -315,7 +321,7 @@ def write_event(settings: Record, table: Records, state: Record, time: float, ki
         row = table[state.events].event
         row.time = time
         row.kind = kind
-        row.side = signed(state.side)
+        row.side = signed_side(state.side)
     state.events += 1
 
 
@@ -326,24 +332,24 @@ def write_impact(settings: Record, table: Records, state: Record, time: float, s
         return
     row = table[state.impacts - 1].impact
     row.time = time
-    row.side = signed(state.side)
+    row.side = signed_side(state.side)
     row.speed_before = speed
     row.speed_after = state.v
 
 
 @inlined
 def write_sequence(
-    settings: Record, table: Records, state: Record, time: float, rest: tuple[float, float, float]
+    settings: Record, table: Records, state: Record, time: float, bounds: tuple[float, float, float]
 ) -> None:
     """Write a finished chattering sequence.
 
-    ``time``: last impact; ``rest``: (lower, upper, time) to rest.
+    ``time``: last impact; ``bounds``: (lower, upper, time) to rest.
     """
-    lower, upper, to_rest = rest
+    lower, upper, time_to_rest = bounds
     if settings.record:
         row = table[state.sequences].sequence
-        row.start = state.run_start
-        row.end = time + to_rest
+        row.start = state.sequence_start
+        row.end = time + time_to_rest
         row.lower = time + lower
         row.upper = time + upper
         row.impacts = state.proven_impacts

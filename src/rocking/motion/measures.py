@@ -174,7 +174,7 @@ class Measured:
         frequencies = np.ravel(2.0 * np.pi / periods)
         peaks = np.empty_like(frequencies)
         work = np.empty(2 * self.coefficients.shape[1] + oscillator.TERMS)
-        oscillator.peak_displacements(self.breakpoints, self.coefficients, frequencies, ratio, work, peaks)
+        oscillator.write_peak_displacements(self.breakpoints, self.coefficients, frequencies, ratio, work, peaks)
         result = (frequencies**2 * peaks).reshape(periods.shape)
         return result if result.ndim else float(result)
 

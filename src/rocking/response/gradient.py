@@ -12,7 +12,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.adjoint import Ends, adjoint, adjoint_of_final_state
+from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, copy_trail
@@ -32,9 +32,13 @@ _AT_STOP: Final = "the body reaches its second stop: its peak is there, whatever
 _UNFINISHED: Final = "the simulation was not finished: its derivatives are not known"
 _FROM_REST: Final = "the response starts on the ground: a start to the other side changes it otherwise"
 _REASONS: Final = {
-    Ends.GRAZES: "the block touches the ground without speed: with a little less motion it does not, or it hits it",
-    Ends.LEAVES_AT_ONCE: "the block leaves the ground at the instant at which it comes to rest",
-    Ends.TOUCHES_THRESHOLD: "the motion touches the threshold of uplift: with a little less of it there is no uplift",
+    AdjointEnd.GRAZES: (
+        "the block touches the ground without speed: with a little less motion it does not, or it hits it"
+    ),
+    AdjointEnd.LEAVES_AT_ONCE: "the block leaves the ground at the instant at which it comes to rest",
+    AdjointEnd.TOUCHES_THRESHOLD: (
+        "the motion touches the threshold of uplift: with a little less of it there is no uplift"
+    ),
 }
 
 
@@ -158,8 +162,8 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     out = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
     change = np.zeros(3)
     reason = _UNFINISHED if response.unfinished else target.reason
-    if response.near_ties and not reason and _ties_before(trail, target.instant):
-        reason = _REASONS[Ends.GRAZES]
+    if response.rounding_decisions and not reason and _ties_before(trail, target.instant):
+        reason = _REASONS[AdjointEnd.GRAZES]
     reason = reason or _by_adjoint(target, change, out)
     if reason and reason != _FROM_REST:
         change[:] = math.nan
@@ -217,7 +221,7 @@ def _state(response: Response, of: Quantity, at: float | None) -> _Target:
     trail, history = response.solution.trail, response._history
     found = history.states(time)
     row = int(np.searchsorted(trail.nodes["time"], time, side="right")) - 1
-    nodes = state.attributed(np.concatenate([trail.nodes[: row + 1], _later(response, row, time)]))
+    nodes = state.expose_fields(np.concatenate([trail.nodes[: row + 1], _later(response, row, time)]))
     row = len(nodes) - 1
     sign = _sign(int(nodes["side"][row])) if np.any(found) or time == 0.0 else 0.0
     by_state = (sign, 0.0) if of == "rotation" else (0.0, sign)
@@ -241,7 +245,7 @@ def _time(response: Response, of: Quantity, at: float | None) -> _Target:
     if nodes["side"][row] >= 0 and nodes["side"][row + 1] < 0:
         later = _later(response, row, instant - _CLOSE)
         later = later[: int(np.max(np.flatnonzero(later["u"] == 0.0), initial=-1)) + 1]
-        trail = trail._replace(nodes=state.attributed(np.concatenate([nodes[: row + 1], later, nodes[row + 1 :]])))
+        trail = trail._replace(nodes=state.expose_fields(np.concatenate([nodes[: row + 1], later, nodes[row + 1 :]])))
         row += len(later)
     return _Target(instant, instant, trail, row, since)
 
@@ -255,7 +259,7 @@ def _later(response: Response, row: int, until: float) -> Records:
 
 def _ties_before(trail: Trail, instant: float) -> bool:
     """Return whether rounding determined a touch up to an instant, by integrating again."""
-    rules, start = trail.settings.copy(), state.state_at(trail.nodes[0])
+    rules, start = trail.settings.copy(), state.state_at_node(trail.nodes[0])
     rules["stop"], rules["no_end_time"], rules["record"] = math.nextafter(instant, math.inf), False, False
     march(trail.ground, copy_trail(trail).block, rules, state.new_table(0), state.new_scratch(), start)
     return bool(start["rounding_decisions"] > 0)
@@ -265,9 +269,9 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
     """Write derivatives by the initial state and by pieces of the motion; return the reason if there are none."""
     nodes, scratch = target.trail.nodes, state.new_scratch()
     starts_at_rest, begin = int(nodes["side"][0]) < 0, float(nodes["time"][0])
-    ends = Ends.START
+    ends = AdjointEnd.START
     if target.by_state is None:
-        ends = Ends(adjoint_of_final_state(copy_trail(target.trail), scratch, target.row, change, out))
+        ends = AdjointEnd(adjoint_of_final_state(copy_trail(target.trail), scratch, target.row, change, out))
     else:
         change[:2] = target.by_state
         if not np.any(change) or (target.instant == begin and not target.is_height):
@@ -275,12 +279,12 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
     if ends in _REASONS:
         return _REASONS[ends]
     if target.instant > begin:
-        work = state.record(state.VARIATION)
-        ends = Ends(adjoint(copy_trail(target.trail), scratch, work, target.row, target.since, change, out))
+        work = state.new_record(state.VARIATION)
+        ends = AdjointEnd(adjoint(copy_trail(target.trail), scratch, work, target.row, target.since, change, out))
         if ends in _REASONS:
             return _REASONS[ends]
         waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)
-        if ends == Ends.REST or waits:
+        if ends == AdjointEnd.REST or waits:
             return ""  # a new rest before any uplift removes all dependence
         if not starts_at_rest:
             change[0] = math.nan if nodes["u"][0] == 0.0 else change[0]

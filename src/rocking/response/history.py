@@ -179,16 +179,16 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     table = state.new_table(1024)
     parts, done, plastic = [], 0, plastic_elongations(trail)
     for row in closing:
-        start = state.state_at(nodes[row], plastic[row], _MOST_IMPACTS)
-        body["limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
+        start = state.state_at_node(nodes[row], plastic[row], _MOST_IMPACTS)
+        body["rest_limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
         start["peak"] = math.inf  # the peak is not needed, and weight is positive at a proven rest
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
         while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
-            table = state.grown(table)
+            table = state.enlarge_table(table)
         found = table["node"][1 : start["nodes"]]
         parts += [nodes[done : row + 1], found[(found["side"] >= 0) & (found["time"] < rules["stop"])]]
         done = row + 1
-    return trail._replace(nodes=state.attributed(np.concatenate([*parts, nodes[done:]])))
+    return trail._replace(nodes=state.expose_fields(np.concatenate([*parts, nodes[done:]])))
 
 
 def elongation(trail: Trail, rotations: Floats, side: Integers) -> Floats:
@@ -198,12 +198,12 @@ def elongation(trail: Trail, rotations: Floats, side: Integers) -> Floats:
 
 
 def plastic_elongations(trail: Trail) -> Floats:
-    """Return the plastic elongation of a tendon from each node on, m, as `tendon.plastic_after`."""
+    """Return the plastic elongation of a tendon from each node on, m, as `restraints.plastic_at_node`."""
     nodes = trail.nodes
     if not trail.block["yielding"]:
         return np.zeros(len(nodes))
     law, side = nodes["law"], nodes["side"]
     turns = np.append(side[:1] >= 0, (law[1:] == state.TendonLaw.ELASTIC) & (law[:-1] == state.TendonLaw.PLASTIC))
-    after = np.maximum(0.0, elongation(trail, nodes["u"], side) - trail.block["yields"])
+    after = np.maximum(0.0, elongation(trail, nodes["u"], side) - trail.block["yield_elongation"])
     last = np.maximum.accumulate(np.where(turns, np.arange(len(nodes)), -1))
     return np.where(last >= 0, after[last], 0.0)

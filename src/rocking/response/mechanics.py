@@ -21,7 +21,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisected
 from rocking.errors import InvalidOption
-from rocking.kernels.ground import components
+from rocking.kernels.ground import component_coefficients
 from rocking.kernels.state import Record
 from rocking.motion import piecewise
 from rocking.response.history import History, elongation, plastic_elongations
@@ -159,7 +159,7 @@ class Contact:
         anywhere = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
         piece = np.where(at_rest, anywhere, self.history.trail.nodes["piece"][rows])
         elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
-        push, *lift = (piecewise.value(coefficients, elapsed) for coefficients in components(ground, piece))
+        push, *lift = (piecewise.value(coefficients, elapsed) for coefficients in component_coefficients(ground, piece))
         return push, lift[0] if lift else np.zeros_like(push)
 
     def _samples(self) -> tuple[Floats, Integers]:
@@ -303,7 +303,7 @@ def linear_balance(body: Block | RestrainedBlock) -> Floats:
     elastic = _balance_on_a_line(made, made["added_weight"], made["added_push"], made["prestress"])
     if not made["yielding"]:
         return elastic
-    pull = made["base_prestress"] + made["tendon"] * (made["yields"] - made["slack"])
+    pull = made["base_prestress"] + made["tendon_stiffness"] * (made["yield_elongation"] - made["slack_elongation"])
     return np.minimum(elastic, _balance_on_a_line(made, made["base_weight"], made["base_push"], pull))
 
 

@@ -70,9 +70,9 @@ class Response(Simulated):
     tendons : structured array
         One row for each tendon of a restrained block: largest elongation (m) and force (N), and the plastic_elongation
         (m) of a yielding tendon at the end.
-    stalled : int
+    rests_by_rounding : int
         Number of sequences that ended without proof because time no longer advanced between impacts.
-    near_ties : int
+    rounding_decisions : int
         Number of times that rounding determined whether a block touches the ground, or to which side it uplifts when
         no weight presses it down.
     solution : Solution

@@ -15,9 +15,9 @@ from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import counted
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.adjoint import Ends, adjoint, adjoint_of_final_state
+from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
 from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
-from rocking.kernels.uplift import next_uplifts
+from rocking.kernels.uplift import write_next_uplifts
 from rocking.response.history import History
 
 #: A response is ambiguous if changes of its inputs by one unit in the last place change its peak by more than this
@@ -146,23 +146,23 @@ def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: in
     heights, at_impacts, at_events = np.zeros(len(times)), np.zeros(impacts), np.zeros(events)
     start = _STARTS.get(quantity)
     if start is None or trail.nodes[start][0] != 0.0:  # a share of zero has no effect
-        scratch, work = state.new_scratch(), state.record(state.VARIATION)
+        scratch, work = state.new_scratch(), state.new_record(state.VARIATION)
         vary(copy_trail(trail), scratch, work, quantity, times, heights, at_impacts, at_events)
     return heights, at_impacts, at_events
 
 
-def ambiguities(changes: Sensitivity, trail: Trail, height: float, near_ties: int) -> tuple[str, ...]:
+def ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding_decisions: int) -> tuple[str, ...]:
     """Return the results ("peak", "events", "touch") that one unit in the last place of all inputs changes visibly.
 
-    ``height`` is the height of the peak above the stop, and ``near_ties`` counts the ties that are already known.
+    ``height`` is the height of the peak above the stop, and ``rounding_decisions`` the known number of ties.
     """
     early, late = (_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
-    near_ties += int(np.any(late > early + AMBIGUITY))
+    rounding_decisions += int(np.any(late > early + AMBIGUITY))
     peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._all)
     known = {
         "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
         "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
-        "touch": near_ties == 0,
+        "touch": rounding_decisions == 0,
     }
     return tuple(name for name, is_known in known.items() if not is_known)
 
@@ -172,7 +172,7 @@ def _uplifts(trail: Trail, share: float) -> Floats:
     block, times = trail.block.copy(), np.zeros(len(trail.nodes))
     block["threshold"] *= share
     block["restraint_threshold"] *= share
-    next_uplifts(trail._replace(block=block), state.new_scratch(), times)
+    write_next_uplifts(trail._replace(block=block), state.new_scratch(), times)
     return times
 
 
@@ -181,22 +181,26 @@ def carried_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
 
     ``proven``: which rests are proven; ``stop``: absolute coordinate at which the body stands.
     """
-    nodes = state.attributed(np.append(trail.nodes, trail.nodes[-1:]))
+    nodes = state.expose_fields(np.append(trail.nodes, trail.nodes[-1:]))
     nodes["side"][-1] = state.AT_REST
-    trail, scratch, work = copy_trail(trail._replace(nodes=nodes)), state.new_scratch(), state.record(state.VARIATION)
+    trail, scratch, work = (
+        copy_trail(trail._replace(nodes=nodes)),
+        state.new_scratch(),
+        state.new_record(state.VARIATION),
+    )
     fastest, out = np.sqrt(np.max(np.abs(trail.block["stiffness"]))), np.zeros_like(trail.ground.pieces[:, 2:])
     last, found = np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0)), np.full(len(proven), np.inf)
     for k in np.flatnonzero(proven):
         node, following, change = nodes[last[k]], nodes[last[k] + 1], np.zeros(5)
         row, time = (last[k], 0.0) if node["v"] > 0.0 else (last[k] - 1, math.inf)
-        if adjoint_of_final_state(trail, scratch, row, change, out) != Ends.START:
+        if adjoint_of_final_state(trail, scratch, row, change, out) != AdjointEnd.START:
             continue
         if node["v"] > 0.0:  # derivatives deviate from first order at least twice as much as the time to rest
             change[:3] *= 1.0 + 4.0 * abs((following["time"] - node["time"]) / (change[1] * node["v"]) - 1.0)
         ends = adjoint(trail, scratch, work, row, time, change, out)
         error = change[3] + 4.0 * _ULP * stop * abs(change[0])
         nonlinear = error * max(fastest, change[4])
-        if ends in (Ends.START, Ends.REST) and nonlinear <= _MOST_NONLINEAR:
+        if ends in (AdjointEnd.START, AdjointEnd.REST) and nonlinear <= _MOST_NONLINEAR:
             found[k] = error / (1.0 - nonlinear)
     return found
 

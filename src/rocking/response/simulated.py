@@ -50,8 +50,8 @@ class Simulated(Result):
     duration: float
     events: NDArray[np.void]
     impacts: NDArray[np.void]
-    stalled: int
-    near_ties: int
+    rests_by_rounding: int
+    rounding_decisions: int
     solution: Solution
 
     def __getstate__(self) -> dict[str, Any]:
@@ -220,7 +220,7 @@ class Simulated(Result):
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
         height = abs(self.peak_rotation - self.block.stops[0])
-        return ambiguities(self.sensitivity, self.solution.trail, height, self.near_ties + balanced)
+        return ambiguities(self.sensitivity, self.solution.trail, height, self.rounding_decisions + balanced)
 
     def perturbed(self, relative: float = RELATIVE, count: int = COUNT) -> Perturbed:
         """Repeat the simulation with the motion scaled by factors near 1.

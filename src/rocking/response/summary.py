@@ -266,8 +266,8 @@ def _outcome(response: Simulated) -> str:
         text += f", at {time_text(response.overturn_time, *response.perturbed().overturn_range)}"
     elif response.unfinished or response.stopped:
         text += f"; {in_words(response, '')}"
-    if response.stalled:
-        text += f"; {counted(response.stalled, 'rest')} not proven"
+    if response.rests_by_rounding:
+        text += f"; {counted(response.rests_by_rounding, 'rest')} not proven"
     if response.ambiguous:
         affected = " and ".join(_AFFECTED[name] for name in response.ambiguities)
         text += f"; AMBIGUOUS: one unit in the last place of the input changes {affected}"

@@ -133,15 +133,17 @@ def response_to(
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
         peak_rotation=float(highest(start, trail.block, np.array(block.stops))),
         peak_time=float(start["peak_time"]),
-        duration=float(start["end"]),
+        duration=float(start["end_time"]),
         events=_events(events),
         impacts=_public(table["impact"][: start["impacts"]], _IMPACT),
-        stalled=int(start["rests_by_rounding"]),
-        near_ties=int(start["rounding_decisions"]),
+        rests_by_rounding=int(start["rests_by_rounding"]),
+        rounding_decisions=int(start["rounding_decisions"]),
         solution=Solution(
-            trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
+            trail=trail._replace(nodes=state.expose_fields(np.array(table["node"][: start["nodes"]]))),
             sequences=_public(table["sequence"][: start["sequences"]], _CHATTERING),
-            residual=float(block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning"]),
+            residual=float(
+                block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning_rotation"]
+            ),
             again=functools.partial(response_to, block, motion, model, how, duration, initial, name),
         ),
     )
@@ -167,11 +169,11 @@ def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
         start["budget"] = SLICE
         ending = march(ground, block, settings, table, scratch, start)
         while ending == state.Ending.FULL:
-            table = state.grown(table)
+            table = state.enlarge_table(table)
             ending = march(ground, block, settings, table, scratch, start)
         if ending != state.Ending.PAUSED:
             return ending, table
-    start["end"] = table["node"]["time"][start["nodes"] - 1]
+    start["end_time"] = table["node"]["time"][start["nodes"] - 1]
     start["ending"] = state.Ending.UNFINISHED
     return state.Ending.UNFINISHED, table
 

@@ -172,14 +172,14 @@ def critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
     store.require_complete()
-    names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "stalled"]
+    names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
     holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
     for part in ranges(len(product.motions), store.grid.unit[0]):
         outcomes = _selected(store, names, True, (part, _EVERYTHING, _EVERYTHING, _EVERYTHING))
-        unfinished, stopped, overturned, completes, rests, stalled = (values != 0.0 for values in outcomes)
+        unfinished, stopped, overturned, completes, rests, rests_by_rounding = (values != 0.0 for values in outcomes)
         holds[part], known[part] = overturned, ~(unfinished | stopped)
         if outcome == "complete_chattering":
-            holds[part], known[part] = completes, (known[part] | rests) & ~stalled
+            holds[part], known[part] = completes, (known[part] | rests) & ~rests_by_rounding
     # Unknown outcomes inherit the last known one below, so that no change is lost.
     below = np.zeros(store.grid.shape, np.int64)  # index of that scale; -1 if no outcome is known so far
     for k in range(product.scales.count):

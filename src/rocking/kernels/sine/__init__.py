@@ -21,13 +21,13 @@ below. An arc that is still up at x = pi proves incomplete chattering.
 Under slow forcing an arc grows like exp(t/omega), beyond the range of a double. Only the sign and root of a long arc
 are needed, and are unchanged if the basis is multiplied by exp(-t/omega).
 
-The result for an arc or a sequence is a `Verdict`, never NaN or infinity.
+The result for an arc or a sequence is a `SequenceStatus`, never NaN or infinity.
 """
 
 from enum import IntEnum
 
 
-class Verdict(IntEnum):
+class SequenceStatus(IntEnum):
     """Result for an arc or a sequence."""
 
     #: The impact, or the phase of rest, is found (the latter with a proof).

@@ -14,7 +14,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.remaining import Restoring, remaining_time
+from rocking.kernels.remaining import ImpactSide, estimate_remaining_time
 from rocking.kernels.sine.sequence import LEVELS, STILL, richardson_weights
 
 
@@ -95,82 +95,84 @@ FourSeries = tuple[Series, Series, Series, Series]
 #: Relative change of each coefficient by the last extrapolation at which its result is accepted.
 _AGREEMENT: Final = 1e-14
 
-_MAXIMUM_PAIRS: Final = 100_000
+_MAX_PAIRS: Final = 100_000
 
 #: Number of pairs in the first batch: until the speed has decreased by exp(-4.6), and some more.
 _DECAY: Final = 2.3
-_MORE_PAIRS: Final = 3
+_EXTRA_PAIRS: Final = 3
 
 
-def phase_coefficients(delta: float, eta: float, order: int) -> Series:
+def compute_phase_coefficients(delta: float, eta: float, order: int) -> Series:
     """Compute ``order`` coefficients c_k of omega tau_ch = sqrt(eps) (c_0 + c_1 eps + ...); all NaN: not resolved."""
-    count = LEVELS + _MORE_PAIRS + int(_DECAY / -math.log(eta))
-    passed, entered = first_impact(delta, eta, order)
-    while passed.shape[0] < _MAXIMUM_PAIRS:
-        more_passed, more_entered = impact_pairs(entered[-1], delta, eta, count)
-        passed = np.concatenate((passed, more_passed))
-        entered = np.concatenate((entered, more_entered))
-        v, p, d = entered.transpose(1, 2, 0)
+    count = LEVELS + _EXTRA_PAIRS + int(_DECAY / -math.log(eta))
+    elapsed, entries = expand_first_impact(delta, eta, order)
+    while elapsed.shape[0] < _MAX_PAIRS:
+        new_elapsed, new_entries = expand_impact_pairs(entries[-1], delta, eta, count)
+        elapsed = np.concatenate((elapsed, new_elapsed))
+        entries = np.concatenate((entries, new_entries))
+        v, p, d = entries.transpose(1, 2, 0)
         state = PowerSeries(v, 3), PowerSeries(p, 2), PowerSeries(d, 1)
         with np.errstate(over="ignore", invalid="ignore"):
-            remaining = remaining_series(state, delta, eta).from_power(1)
-            rest, change = extrapolated(remaining.T, passed, eta)
-        x = np.cumsum(passed, axis=0)[-change.shape[0] :]
-        settled = np.flatnonzero((change <= _AGREEMENT * np.abs(x)).all(axis=1))
-        if settled.size:
-            coefficients: Series = x[settled[0]] + rest[settled[0]]
+            remaining = expand_remaining_phase(state, delta, eta).from_power(1)
+            rest, change = extrapolate_series(remaining.T, elapsed, eta)
+        x = np.cumsum(elapsed, axis=0)[-change.shape[0] :]
+        converged_rows = np.flatnonzero((change <= _AGREEMENT * np.abs(x)).all(axis=1))
+        if converged_rows.size:
+            coefficients: Series = x[converged_rows[0]] + rest[converged_rows[0]]
             return coefficients
         if not np.isfinite(change).all():
             break
-        count = passed.shape[0]
+        count = elapsed.shape[0]
     return np.full(order, math.nan)
 
 
-def remaining_series(entered: tuple[PowerSeries, PowerSeries, PowerSeries], delta: float, eta: float) -> PowerSeries:
-    """Evaluate the uncompiled formula of `remaining_time` for a state (V, P, D) of power series."""
-    V, P, D = entered
-    formula: Any = getattr(remaining_time, "py_func", remaining_time)
-    side: Any = Restoring
+def expand_remaining_phase(
+    entries: tuple[PowerSeries, PowerSeries, PowerSeries], delta: float, eta: float
+) -> PowerSeries:
+    """Evaluate the uncompiled formula of `estimate_remaining_time` for a state (V, P, D) of power series."""
+    V, P, D = entries
+    formula: Any = getattr(estimate_remaining_time, "py_func", estimate_remaining_time)
+    side: Any = ImpactSide
     remaining: PowerSeries = formula(V, side(2.0 - P, -D, 0.0, delta, eta, 0.0), side(P, D, 0.0, delta, eta, 0.0))
     return remaining
 
 
-def extrapolated(remaining: Series, passed: Series, eta: float) -> tuple[Series, Series]:
+def extrapolate_series(remaining: Series, elapsed: Series, eta: float) -> tuple[Series, Series]:
     """Extrapolate the estimates of successive pairs, as `sequence.extrapolate`: last column and its changes."""
     weights = getattr(richardson_weights, "py_func", richardson_weights)(eta)
-    column = less = remaining
+    column = previous = remaining
     for k, weight in enumerate(weights):
-        less = column[1:]
-        column = less + (less - column[:-1] + passed[k + 1 :]) * weight
-    from_level = column - less
-    from_pair = column[1:] - column[:-1] + passed[-column.shape[0] + 1 :]
+        previous = column[1:]
+        column = previous + (previous - column[:-1] + elapsed[k + 1 :]) * weight
+    from_level = column - previous
+    from_pair = column[1:] - column[:-1] + elapsed[-column.shape[0] + 1 :]
     return column[1:], np.maximum(np.abs(from_level[1:]), np.abs(from_pair))
 
 
-def first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
+def expand_first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
     """Compute phase divided by r and v, p, d after the first impact; shapes (1, order), (1, 3, order)."""
     start = np.zeros((3, order))
-    start[2] = -square_root_of_two_plus(order)
-    return _arcs(start, True, delta, eta, 1)
+    start[2] = -expand_root_of_two_plus(order)
+    return _expand_arcs(start, True, delta, eta, 1)
 
 
-def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[Series, Series]:
+def expand_impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[Series, Series]:
     """Compute phases divided by r and v, p, d after the next pairs of impacts, from those in ``start``."""
-    durations, states = _arcs(start, False, delta, eta, 2 * count)
-    passed = durations[1::2]
-    passed[:, 1:] += durations[::2, :-1]
-    return passed, states[1::2]
+    durations, states = _expand_arcs(start, False, delta, eta, 2 * count)
+    elapsed = durations[1::2]
+    elapsed[:, 1:] += durations[::2, :-1]
+    return elapsed, states[1::2]
 
 
-def _arcs(start: Series, first_side: bool, delta: float, eta: float, count: int) -> tuple[Series, Series]:
+def _expand_arcs(start: Series, is_first_side: bool, delta: float, eta: float, count: int) -> tuple[Series, Series]:
     """Compute scaled durations of arcs on alternating sides, and v, p, d after their impacts."""
     order = start.shape[1]
     durations, states = np.zeros((count, order)), np.zeros((count, 3, order))
-    series_arcs(start, first_side, delta, eta, np.empty((_ROWS, order)), durations, states)
+    write_arc_series(start, is_first_side, delta, eta, np.empty((_SCRATCH_ROWS, order)), durations, states)
     return durations, states
 
 
-def square_root_of_two_plus(order: int) -> Series:
+def expand_root_of_two_plus(order: int) -> Series:
     """Return the series of sqrt(2 + eps)."""
     root = np.zeros(order)
     term = math.sqrt(2.0)
@@ -181,96 +183,98 @@ def square_root_of_two_plus(order: int) -> Series:
 
 
 @kernel
-def series_arcs(
-    start: Series, first_side: bool, delta: float, eta: float, space: Series, durations: Series, states: Series
+def write_arc_series(
+    start: Series, is_first_side: bool, delta: float, eta: float, scratch: Series, durations: Series, states: Series
 ) -> None:
-    """Write the results of `_arcs`; ``space`` is scratch space of `_ROWS` series."""
+    """Write the results of `_expand_arcs`; ``scratch`` is scratch space of `_SCRATCH_ROWS` series."""
     state = start
     for n in range(durations.shape[0]):
-        lifts = n == 0 and first_side  # at zero speed
-        if state[0, 0] < STILL and not lifts:
-            stay(state, durations[n], states[n])
+        is_uplift = n == 0 and is_first_side  # at zero speed
+        if state[0, 0] < STILL and not is_uplift:
+            write_resting_arc(state, durations[n], states[n])
         else:
-            series_arc(state, first_side, delta, space, durations[n], states[n])
-        state, first_side = states[n], not first_side
+            expand_series_arc(state, is_first_side, delta, scratch, durations[n], states[n])
+        state, is_first_side = states[n], not is_first_side
         for k in range(start.shape[1]):
             state[0, k] *= eta
 
 
 @inlined
-def stay(state: Series, z: Series, end: Series) -> None:
-    """Write the unchanged state of a block at rest, as in `next_arc`."""
+def write_resting_arc(state: Series, z: Series, end: Series) -> None:
+    """Write the unchanged state of a block at rest, as in `solve_next_arc`."""
     for k in range(z.size):
         z[k] = end[0, k] = 0.0
         end[1, k], end[2, k] = state[1, k], state[2, k]
 
 
-#: Number of series in the scratch space of `series_arc`.
-_ROWS: Final = 17
+#: Number of series in the scratch space of `expand_series_arc`.
+_SCRATCH_ROWS: Final = 17
 
 
 @inlined
-def series_arc(state: Series, first_side: bool, delta: float, space: Series, z: Series, end: Series) -> None:
+def expand_series_arc(
+    state: Series, is_first_side: bool, delta: float, scratch: Series, z: Series, end: Series
+) -> None:
     """Compute one arc from v, p, d: its scaled duration z, and impact speed, p and d at its end."""
     order = z.size
-    mean, q, height, speed, spare = space[0], space[4], space[9], space[10], space[11:]
-    forces, basis = (space[1], space[2], space[3]), (space[5], space[6], space[7], space[8])
-    _set_forces(state, first_side, mean, forces)
+    mean, q, height, speed, work = scratch[0], scratch[4], scratch[9], scratch[10], scratch[11:]
+    forces, basis = (scratch[1], scratch[2], scratch[3]), (scratch[5], scratch[6], scratch[7], scratch[8])
+    _write_forces(state, is_first_side, mean, forces)
     for k in range(order):
         z[k] = 0.0
-    z[0] = leading_duration(state[0, 0], state[1, 0], state[2, 0]) if first_side else state[0, 0]
-    correct = 1
+    z[0] = estimate_leading_duration(state[0, 0], state[1, 0], state[2, 0]) if is_first_side else state[0, 0]
+    correct_terms = 1
     while True:
-        _multiply(z, z, spare[0])
-        _shift(spare[0], 1 if first_side else 3, 1.0, q)
-        series_basis(q, delta, spare, basis)
-        _rise(state[0], z, q, basis, forces, delta, spare, height, speed)
-        if correct >= 2 * order:
+        _multiply(z, z, work[0])
+        _shift_powers(work[0], 1 if is_first_side else 3, 1.0, q)
+        write_series_basis(q, delta, work, basis)
+        _write_height_and_speed(state[0], z, q, basis, forces, delta, work, height, speed)
+        if correct_terms >= 2 * order:
             break
-        _multiply(height, z, spare[0])
+        _multiply(height, z, work[0])
         for k in range(order):
-            spare[1, k] = speed[k] - height[k]
-        _divide(spare[0], spare[1], spare[2])
+            work[1, k] = speed[k] - height[k]
+        _divide(work[0], work[1], work[2])
         for k in range(order):
-            z[k] -= spare[2, k]
-        correct *= 2
-    _turn(state, first_side, mean, z, q, basis, spare, end)
+            z[k] -= work[2, k]
+        correct_terms *= 2
+    _write_end_state(state, is_first_side, mean, z, q, basis, work, end)
     for k in range(order):
         end[0, k] = -speed[k]
 
 
 @inlined
-def _set_forces(state: Series, first_side: bool, mean: Series, forces: ThreeSeries) -> None:
+def _write_forces(state: Series, is_first_side: bool, mean: Series, forces: ThreeSeries) -> None:
     """Write the restoring forces: mean, and coefficients of degrees 0, 1 and 2 in time."""
-    _shift(state[1], 1, -1.0, mean)
+    _shift_powers(state[1], 1, -1.0, mean)
     mean[0] += 1.0
-    if first_side:
-        _shift(state[1], 0, 1.0, forces[0])
-        _shift(state[2], 0, 1.0, forces[1])
-        _shift(mean, 0, 1.0, forces[2])
+    if is_first_side:
+        _shift_powers(state[1], 0, 1.0, forces[0])
+        _shift_powers(state[2], 0, 1.0, forces[1])
+        _shift_powers(mean, 0, 1.0, forces[2])
     else:
-        _shift(state[1], 1, -1.0, forces[0])
+        _shift_powers(state[1], 1, -1.0, forces[0])
         forces[0][0] += 2.0
-        _shift(state[2], 2, -1.0, forces[1])
-        _shift(mean, 3, -1.0, forces[2])
+        _shift_powers(state[2], 2, -1.0, forces[1])
+        _shift_powers(mean, 3, -1.0, forces[2])
 
 
 @inlined
-def _rise(
+def _write_height_and_speed(
     v: Series, z: Series, q: Series, basis: FourSeries, forces: ThreeSeries, delta: float,
-    spare: Series, height: Series, speed: Series,
+    work: Series, height: Series, speed: Series,
 ) -> None:  # fmt: skip
     """Write height divided by z, and speed, after the duration z."""
     sine, versine, E, W = basis
-    A, B, bend, product = spare[2], spare[3], spare[4], spare[5]
+    A, B, bend, product = work[2], work[3], work[4], work[5]
     _multiply(q, E, A)
     _multiply(q, W, B)
     for k in range(z.size):
         bend[k] = versine[k] + delta * B[k]
         A[k] = sine[k] + (1.0 + delta) * A[k]
         B[k] = versine[k] + (1.0 + delta) * B[k]
-    _push(z, forces, (B, E, W), spare, height)
-    _push(z, forces, (A, bend, E), spare, speed)
+    _write_forcing(z, forces, (B, E, W), work, height)
+    _write_forcing(z, forces, (A, bend, E), work, speed)
     _multiply(v, A, product)
     for k in range(z.size):
         height[k] = product[k] - height[k]
@@ -281,44 +285,44 @@ def _rise(
 
 
 @inlined
-def _turn(
-    state: Series, first_side: bool, mean: Series, z: Series, q: Series, basis: FourSeries, spare: Series, end: Series
+def _write_end_state(
+    state: Series, is_first_side: bool, mean: Series, z: Series, q: Series, basis: FourSeries, work: Series, end: Series
 ) -> None:
     """Write p and d at the end of an arc. In the second arc of a pair, the phase has the additional factor r^2."""
     sine, versine, _, _ = basis
-    product, swept, turned, steeper, steady = spare[0], spare[1], spare[2], spare[3], spare[4]
+    product, factor, slope_drop, sine_term, versine_term = work[0], work[1], work[2], work[3], work[4]
     _multiply(versine, mean, product)
-    _multiply(z, z, swept)
-    _multiply(swept, product, steady)
+    _multiply(z, z, factor)
+    _multiply(factor, product, versine_term)
     _multiply(q, versine, product)
-    _multiply(product, state[2], turned)
-    _multiply(z, sine, swept)
-    _multiply(state[2], swept, steeper)
-    _multiply(mean, swept, product)
-    later = 0 if first_side else 1
+    _multiply(product, state[2], slope_drop)
+    _multiply(z, sine, factor)
+    _multiply(state[2], factor, sine_term)
+    _multiply(mean, factor, product)
+    shift = 0 if is_first_side else 1
     for k in range(z.size):
         end[1, k] = state[1, k]
-        end[2, k] = state[2, k] - turned[k]
-        if k >= 2 * later:
-            end[1, k] += steady[k - 2 * later]
-        if k >= later:
-            end[1, k] += steeper[k - later]
-            end[2, k] += product[k - later]
+        end[2, k] = state[2, k] - slope_drop[k]
+        if k >= 2 * shift:
+            end[1, k] += versine_term[k - 2 * shift]
+        if k >= shift:
+            end[1, k] += sine_term[k - shift]
+            end[2, k] += product[k - shift]
 
 
 @inlined
-def leading_duration(v: float, p: float, d: float) -> float:
+def estimate_leading_duration(v: float, p: float, d: float) -> float:
     """Compute the duration of a first-side arc to leading order (the cubic of Eq. 62)."""
     if v == 0.0:
         return -4.0 * d
-    return positive_root(d / 6.0, p / 2.0, v)
+    return find_positive_root(d / 6.0, p / 2.0, v)
 
 
 @shared
-def series_basis(q: Series, delta: float, spare: Series, basis: FourSeries) -> None:
+def write_series_basis(q: Series, delta: float, work: Series, basis: FourSeries) -> None:
     """Compute sine, versine, E and W of `sine.arc.Basis` at a series q without constant term."""
     sine, versine, E, W = basis
-    power, mixed, turned = spare[0], spare[1], spare[2]
+    power, mixed, product = work[0], work[1], work[2]
     order = q.size
     for k in range(order):
         sine[k] = versine[k] = E[k] = W[k] = power[k] = mixed[k] = 0.0
@@ -332,27 +336,27 @@ def series_basis(q: Series, delta: float, spare: Series, basis: FourSeries) -> N
         for k in range(order):
             E[k] += factor * mixed[k]
             W[k] += factor / (2 * m + 4) * mixed[k]
-        _multiply(q, power, turned)
+        _multiply(q, power, product)
         for k in range(order):
-            power[k] = -turned[k]
-        _multiply(q, mixed, turned)
+            power[k] = -product[k]
+        _multiply(q, mixed, product)
         for k in range(order):
-            mixed[k] = delta * turned[k] + power[k]
+            mixed[k] = delta * product[k] + power[k]
 
 
 @inlined
-def _push(z: Series, forces: ThreeSeries, basis: ThreeSeries, spare: Series, found: Series) -> None:
+def _write_forcing(z: Series, forces: ThreeSeries, basis: ThreeSeries, work: Series, effect: Series) -> None:
     """Write the effect of the forces of degrees 0, 1 and 2 in time during z: z (f0 b0 + z (f1 b1 + z f2 b2))."""
-    some, more = spare[0], spare[1]
-    _multiply(forces[2], basis[2], some)
-    _multiply(z, some, more)
+    product, total = work[0], work[1]
+    _multiply(forces[2], basis[2], product)
+    _multiply(z, product, total)
     for i in (1, 0):
-        _multiply(forces[i], basis[i], some)
+        _multiply(forces[i], basis[i], product)
         for k in range(z.size):
-            some[k] += more[k]
-        _multiply(z, some, more)
+            product[k] += total[k]
+        _multiply(z, product, total)
     for k in range(z.size):
-        found[k] = more[k]
+        effect[k] = total[k]
 
 
 @shared
@@ -377,7 +381,7 @@ def _divide(a: Series, b: Series, c: Series) -> None:
 
 
 @inlined
-def _shift(a: Series, power: int, sign: float, b: Series) -> None:
+def _shift_powers(a: Series, power: int, sign: float, b: Series) -> None:
     """Write a series times eps^power, or its negative, into another one."""
     for k in range(a.size):
         b[k] = sign * a[k - power] if k >= power else 0.0
@@ -393,11 +397,11 @@ _ROOT2: Final = math.sqrt(2.0)
 #: Omitted part of the sum in Eq. 65, relative to the sum.
 _NEGLIGIBLE: Final = 1e-17
 
-_MAXIMUM_NEWTON_STEPS: Final = 60
+_MAX_NEWTON_STEPS: Final = 60
 
 
 @kernel
-def eq65_sums(eta: float) -> tuple[float, float]:
+def sum_eq65(eta: float) -> tuple[float, float]:
     """Return the sums of omega T_{n;1} (n even) and omega T_{n;3} (n odd) in Eq. 65; infinite for eta = 1 and NaN."""
     if not eta < 1.0:
         return math.inf, math.inf
@@ -405,34 +409,34 @@ def eq65_sums(eta: float) -> tuple[float, float]:
     third = 0.0
     v = 0.0
     z = math.inf
-    while not vanishes(z, y, eta):
-        z, odd, v = eq65_pair(y, v, eta)
+    while not is_negligible(z, y, eta):
+        z, odd, v = solve_eq65_pair(y, v, eta)
         y += z
         third += odd
     return y, third
 
 
 @kernel
-def eq65_terms(eta: float, first: Floats, third: Floats) -> int:
+def write_eq65_terms(eta: float, first: Floats, third: Floats) -> int:
     """Write omega T_{n;1} and omega T_{n+1;3} until they vanish or no more fit; return their number."""
     y = 0.0
     v = 0.0
     for pair in range(first.size):
-        first[pair], third[pair], v = eq65_pair(y, v, eta)
+        first[pair], third[pair], v = solve_eq65_pair(y, v, eta)
         y += first[pair]
-        if vanishes(first[pair], y, eta):
+        if is_negligible(first[pair], y, eta):
             return pair + 1
     return first.size
 
 
 @inlined
-def vanishes(z: float, y: float, eta: float) -> bool:
+def is_negligible(z: float, y: float, eta: float) -> bool:
     """Return whether all terms after z, nearly a geometric series, are negligible compared with their sum y."""
     return z <= _NEGLIGIBLE * (1.0 - eta * eta) * y
 
 
 @inlined
-def eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
+def solve_eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
     """Compute steps 2 and 3 of the paper's iterative procedure: omega T_{n;1}, omega T_{n+1;3} and v of the next pair.
 
     The cubic of Eq. 62, z^3/24 + c2 z^2 + c1 z = v, has one positive root: from the second pair on, its coefficients
@@ -440,17 +444,17 @@ def eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
     """
     c2 = (y - _ROOT2) / 6.0
     c1 = y * (y - 2.0 * _ROOT2) / 4.0
-    z = 4.0 * _ROOT2 if y == 0.0 else positive_root(c2, c1, v)
+    z = 4.0 * _ROOT2 if y == 0.0 else find_positive_root(c2, c1, v)
     speed_before = z * (c1 + z * (2.0 * c2 + z / 8.0))
     odd = eta * speed_before
     return z, odd, eta * odd
 
 
 @inlined
-def positive_root(c2: float, c1: float, v: float) -> float:
+def find_positive_root(c2: float, c1: float, v: float) -> float:
     """Find the root of z^3/24 + c2 z^2 + c1 z - v, all positive, by Newton steps from above (the cubic is convex)."""
     z = min(v / c1, math.sqrt(v / c2))
-    for _ in range(_MAXIMUM_NEWTON_STEPS):
+    for _ in range(_MAX_NEWTON_STEPS):
         excess = z * (c1 + z * (c2 + z / 24.0)) - v
         step = excess / (c1 + z * (2.0 * c2 + z / 8.0))
         z -= step
