@@ -14,7 +14,7 @@ import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.inputs.notes import vertical_notes
 from rocking.motion.description import Origin
-from rocking.motion.motion import exceedances, lifting_factors
+from rocking.motion.motion import compute_uplift_factors, find_exceedances
 from rocking.records.named import named_motion
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -129,7 +129,7 @@ def test_a_vertical_component_that_is_not_there_is_refused(run, tmp_path: Path, 
 def test_stretches_beyond_the_threshold_are_those_of_the_weighted_threshold(seed: int) -> None:
     motion = wave(3.0, seed).with_vertical(wave(3.0, seed + 50, dt=0.03, count=150))
     plus, minus = 1.8, 2.2
-    found = exceedances(motion, (plus, minus), G)
+    found = find_exceedances(motion, (plus, minus), G)
     times = np.linspace(0.0, 4.5, 90_001)[1:-1]
     weight = 1.0 + motion.vertical.acceleration(times) / G
     push = motion.acceleration(times)
@@ -201,7 +201,7 @@ def test_levels_of_a_block_with_two_sides_begin_at_the_side_that_the_motion_lift
     assert found.data.lowest_uplift == pytest.approx(G * math.tan(0.2))
     pair = [block.uplift_thresholds("nonlinear")]
     curved = rocking.pulses.one_sine(1.0, 1.0)
-    assert lifting_factors(curved, pair) == pytest.approx([G * math.tan(0.1)], rel=1e-12)
+    assert compute_uplift_factors(curved, pair) == pytest.approx([G * math.tan(0.1)], rel=1e-12)
 
 
 def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:

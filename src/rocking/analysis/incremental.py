@@ -33,7 +33,7 @@ from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thres
 from rocking.engine.tasks import Setup, missing_text, simulate_each
 from rocking.engine.treatment import Certified
 from rocking.errors import InvalidOption
-from rocking.motion.motion import Motion, lifting_factors
+from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, one_motion, several_motions
 from rocking.response import Gradient, Response, gradient
@@ -289,7 +289,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
 def _lowest_uplift(blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
     """Return the lowest level at which a motion, scaled with its vertical component, lifts a block."""
     thresholds, own = thresholds_of(blocks, model)
-    factors = np.array([lifting_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
+    factors = np.array([compute_uplift_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
     lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
     if math.isinf(lowest):
         raise InvalidOption("no motion lifts a block at any level: none pushes towards a side as its weight allows")

@@ -23,8 +23,8 @@ from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, parts_o
 from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.piecewise import STRONGEST
-from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
+from rocking.motion.piecewise import MAX_ACCELERATION
+from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 from rocking.records.named import Motions, names_of, several_motions
 from rocking.response import COUNT, RELATIVE, factors_near
 
@@ -90,7 +90,7 @@ class Scales:
     @classmethod
     def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
         """Create scales from `levels` and `measure` as in `simulate_many`, or for unscaled motions."""
-        known = Measure.of(measure, among=SCALES)
+        known = Measure.of(measure, among=SCALING_MEASURES)
         if levels is None:
             if known.name != "factor":
                 raise InvalidOption("{} says what {} are: give those as well", "measure", "levels")
@@ -113,7 +113,7 @@ class Scales:
         with np.errstate(over="ignore"):
             factors = self.values / (self.measure or FACTOR).positive(motion, motion.name)
             largest = factors.max() * np.abs(motion.coefficients).max()
-        if not largest <= STRONGEST:
+        if not largest <= MAX_ACCELERATION:
             motion.scaled(float(factors.max()))  # raises for too strong motions, not only steep ones
         return factors
 
