@@ -22,7 +22,7 @@ from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
-from rocking.records.named import several_motions
+from rocking.records.named import list_motions
 from rocking.simulation.ensemble import Scales, simulate_many
 from rocking.solid.rose import checked_azimuths
 from rocking.solid.solid import Solid
@@ -241,7 +241,7 @@ class ResponseRose(DatasetResult):
 def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
     """Return pairs by name, or raise an error if one is not a pair of motions."""
     given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.several(pairs, "pairs", InvalidOption)
-    found = [several_motions(pair) for pair in given if not isinstance(pair, Motion)]
+    found = [list_motions(pair) for pair in given if not isinstance(pair, Motion)]
     if not found or len(found) < len(given) or any(len(components) != 2 for components in found):
         raise InvalidOption(
             "{} must hold the two horizontal components of each place, as [(first, second)]", "pairs", value=pairs

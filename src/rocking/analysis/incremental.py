@@ -35,7 +35,7 @@ from rocking.engine.treatment import Certified
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.records.named import Motions, one_motion, several_motions
+from rocking.records.named import Motions, check_motion, list_motions
 from rocking.response import Gradient, Response, gradient
 from rocking.simulation.simulate import simulate
 
@@ -120,7 +120,7 @@ def incremental_dynamic_analysis(
     >>> incremental_dynamic_analysis(block, pulse, measure="pga_ratio").data.band_start.values.round(4).tolist()
     [2.9855, 7.2759]
     """
-    many, how, shaken = bodies_of(blocks), Measure.of(measure), several_motions(motions)
+    many, how, shaken = bodies_of(blocks), Measure.of(measure), list_motions(motions)
     slenderness = slenderness_of(many)
     values = values_of(shaken, how)
     if never_rests(many):
@@ -474,7 +474,7 @@ def critical_scale(
     >>> f"{rocking.critical_scale(block, record, 2.0, 6.0).scale:.6f}"
     '3.256134'
     """
-    if one_motion(motion) is None:
+    if check_motion(motion) is None:
         raise InvalidOption("there is no {} to scale: give one", "motion")
     least, most = (checks.positive(value, name, InvalidOption) for value, name in ((low, "low"), (high, "high")))
     if least >= most:

@@ -25,7 +25,7 @@ from rocking.engine.treatment import Certified
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.inputs.pulses import pulse_family
 from rocking.motion.motion import Motion
-from rocking.records.named import one_motion
+from rocking.records.named import check_motion
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -376,7 +376,7 @@ def _pulse_function(
 
 
 def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
-    motion = one_motion(pulse(amplitude, frequency))
+    motion = check_motion(pulse(amplitude, frequency))
     if motion is None:
         raise InvalidMotion(
             f"the pulse of amplitude {amplitude:g} and frequency {frequency:g} is None; return a Motion"

@@ -18,7 +18,7 @@ from rocking.explorer.payload import english
 from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
 from rocking.inputs.declared import SHAPES as ALL_SHAPES
 from rocking.inputs.pulses import FAMILIES
-from rocking.records.units import CHOICES
+from rocking.records.units import UNIT_NAMES
 from rocking.solid.mesh import SHIPPED
 from rocking.solid.mesh import UNITS as MESH_UNITS
 
@@ -224,7 +224,7 @@ def specification() -> dict[str, Any]:
             for name in records.names()
         ],
         "mesh_units": list(MESH_UNITS),
-        "units": list(CHOICES),
+        "units": list(UNIT_NAMES),
         "models": ["nonlinear", "linear"],
         "treatments": list(_TREATMENTS),
         "quantities": list(QUANTITIES),

@@ -25,7 +25,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
-from rocking.records.named import Motions, names_of, several_motions
+from rocking.records.named import Motions, list_motion_names, list_motions
 from rocking.response import COUNT, RELATIVE, factors_near
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def product_of(
     duration: float | None,
 ) -> Product:
     """Create a product from the arguments of `simulate_many`."""
-    bodies, shaking = bodies_of(blocks), tuple(several_motions(motions))
+    bodies, shaking = bodies_of(blocks), tuple(list_motions(motions))
     return Product(bodies, shaking, Scales.of(levels, measure), polarity, model, treatment(chattering), duration)
 
 
@@ -229,7 +229,7 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
         described["overturned"]["long_name"] = f"whether the {coordinate.name} passed its limit, where it has one"
     variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
     coordinates = {
-        "motion": ("motion", names_of(product.motions)),
+        "motion": ("motion", list_motion_names(product.motions)),
         **verticals_of(product.motions),
         "scale": ("scale", product.scales.values, product.scales.about),
         "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in product.signs]),
