@@ -11,7 +11,7 @@ from rocking.analysis.hazard import HEADINGS
 from rocking.calibration.tables import read_observed
 from rocking.inputs import quantities
 from rocking.records import units
-from rocking.solid.mesh import UNITS as LENGTHS_OF_MESHES
+from rocking.solid.mesh import LENGTH_UNITS as LENGTHS_OF_MESHES
 
 G = 9.80665
 

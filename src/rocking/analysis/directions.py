@@ -24,7 +24,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.named import list_motions
 from rocking.simulation.ensemble import Scales, simulate_many
-from rocking.solid.rose import checked_azimuths
+from rocking.solid.rose import check_azimuths
 from rocking.solid.solid import Solid
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def response_rose(
     if not isinstance(solid, Solid):
         raise InvalidBlock(f"a Solid is needed, not a {type(solid).__name__}: make one with rocking.Solid.from_mesh")
     named = _named_pairs(pairs)
-    at = np.arange(0.0, 180.0, 15.0) if azimuths is None else checked_azimuths(azimuths)
+    at = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
     scales = Scales.of(levels, measure)
     blocks = [solid.block(azimuth, restitution=restitution) for azimuth in at]
     factors = np.array([_factors(scales, pair) for pair in named.values()])

@@ -22,7 +22,7 @@ from rocking.records import formats
 from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request
 from rocking.records.units import UNIT_NAMES, find_unit
-from rocking.solid.mesh import SHIPPED
+from rocking.solid.mesh import SHIPPED_MESHES
 
 V = TypeVar("V")
 
@@ -213,7 +213,7 @@ class UploadStore:
         """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts of a case."""
         upload = self.file(name.removeprefix("file:"), "mesh") if name.startswith("file:") else None
         if upload is None:
-            checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED])
+            checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED_MESHES])
         given = options_of(texts, tolerance, gravity)
         key = name, upload.name if upload else "", json.dumps(given)
         found = self._bodies.get(key, lambda: read_body(name, upload, given))
