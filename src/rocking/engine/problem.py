@@ -199,7 +199,7 @@ def settings_of(
 def _joined(motion: Motion) -> tuple[piecewise.Pieces, piecewise.Pieces]:
     """Return both components of a motion on the same pieces."""
     assert motion.vertical is not None
-    breakpoints, (pushes, lifts) = piecewise.align(motion, motion.vertical)
+    breakpoints, (pushes, lifts) = piecewise.align_pieces(motion, motion.vertical)
     return piecewise.Pieces(breakpoints, pushes), piecewise.Pieces(breakpoints, lifts)
 
 

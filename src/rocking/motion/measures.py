@@ -55,11 +55,11 @@ class MotionMeasures:
 
     def _compute_velocity(self) -> Floats:
         """Compute the coefficients of the ground velocity on each piece."""
-        return piecewise.integrate(self._widths(), self.coefficients)
+        return piecewise.integrate_pieces(self._widths(), self.coefficients)
 
     def _compute_displacement(self) -> Floats:
         """Compute the coefficients of the ground displacement on each piece."""
-        return piecewise.integrate(self._widths(), self._compute_velocity())
+        return piecewise.integrate_pieces(self._widths(), self._compute_velocity())
 
     def acceleration(self, time: ArrayLike) -> Any:
         """Return the ground acceleration at times (s), m/s^2, shaped like `time` and zero outside the motion."""
@@ -117,7 +117,7 @@ class MotionMeasures:
         cuts = np.hstack([np.zeros((len(widths), 1)), roots, widths[:, np.newaxis]])
         # The sign is constant between cuts. Adding the integral's start value would only lose digits.
         integral[..., 0] = 0.0
-        return float(np.sum(np.abs(np.diff(piecewise.evaluate(integral, cuts), axis=1))))
+        return float(np.sum(np.abs(np.diff(piecewise.evaluate_pieces(integral, cuts), axis=1))))
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
         """Return the time between two fractions of the Arias intensity, s, or NaN if the intensity is zero.
@@ -204,7 +204,7 @@ def find_significant_span(motion: MotionMeasures, start: float = 0.05, end: floa
 def _integrate_square(coefficients: Floats, widths: Floats) -> Floats:
     """Integrate the squared polynomials over their widths, exactly, by Gauss's rule with degree + 1 points."""
     nodes, weights = np.polynomial.legendre.leggauss(coefficients.shape[-1])
-    values = piecewise.evaluate(coefficients[..., np.newaxis, :], 0.5 * widths[..., np.newaxis] * (nodes + 1.0))
+    values = piecewise.evaluate_pieces(coefficients[..., np.newaxis, :], 0.5 * widths[..., np.newaxis] * (nodes + 1.0))
     energy: Floats = 0.5 * widths * (values**2 @ weights)
     return energy
 

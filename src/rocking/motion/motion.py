@@ -300,7 +300,7 @@ class Motion(Processable):
         """Return the sum of two motions that start together."""
         if not isinstance(other, Motion):
             return NotImplemented
-        breakpoints, (first, second) = piecewise.align(self, other)
+        breakpoints, (first, second) = piecewise.align_pieces(self, other)
         vertical = self.vertical or other.vertical
         if self.vertical is not None and other.vertical is not None:
             vertical = self.vertical + other.vertical
@@ -367,7 +367,7 @@ def compute_uplift_factors(
         widths = np.diff(motion.breakpoints)
         peaks = np.array([[piecewise.find_maximum(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
     else:
-        breakpoints, (push, vertical) = piecewise.align(motion, motion.vertical)
+        breakpoints, (push, vertical) = piecewise.align_pieces(motion, motion.vertical)
         widths = np.diff(breakpoints)
 
         def find_peak(sign: float, threshold: float) -> float:

@@ -68,17 +68,17 @@ def has_jumps(pieces: Piecewise) -> bool:
 def find_jumps(pieces: Piecewise) -> Flags:
     """Return which pieces end in a jump, beyond rounding (the last one to zero)."""
     widths, coefficients = np.diff(pieces.breakpoints), pieces.coefficients
-    gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - evaluate(coefficients, widths))
+    gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - evaluate_pieces(coefficients, widths))
     return gaps > _JUMP_TOLERANCE * find_peak_magnitude(widths, coefficients)
 
 
 def sample_breakpoints(pieces: Piecewise) -> tuple[Floats, Floats]:
     """Return times (s) and values at the breakpoints, with the value after a jump."""
-    last = evaluate(pieces.coefficients[-1], np.diff(pieces.breakpoints)[-1])
+    last = evaluate_pieces(pieces.coefficients[-1], np.diff(pieces.breakpoints)[-1])
     return pieces.breakpoints, np.append(pieces.coefficients[:, 0], last)
 
 
-def evaluate(coefficients: Floats, x: Floats) -> Floats:
+def evaluate_pieces(coefficients: Floats, x: Floats) -> Floats:
     """Evaluate each polynomial (last axis of `coefficients`: powers) at `x` by Horner's rule."""
     result = coefficients[..., -1] + 0.0 * x
     for j in range(coefficients.shape[-1] - 2, -1, -1):
@@ -91,7 +91,7 @@ def evaluate_at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floa
     """Return the value at `time`, clipped to the span of the breakpoints, with the value after a jump."""
     clipped = np.clip(time, breakpoints[0], breakpoints[-1])
     piece = np.minimum(np.searchsorted(breakpoints, clipped, side="right"), len(coefficients)) - 1
-    return evaluate(coefficients[piece], clipped - breakpoints[piece])
+    return evaluate_pieces(coefficients[piece], clipped - breakpoints[piece])
 
 
 def make_even_times(count: int, step: float) -> Floats:
@@ -106,16 +106,16 @@ def join_linearly(times: Floats, samples: Floats) -> Floats:
         return np.column_stack([samples[:-1], np.diff(samples) / np.diff(times)])
 
 
-def differentiate(coefficients: Floats) -> Floats:
+def differentiate_pieces(coefficients: Floats) -> Floats:
     """Return the coefficients of the derivative of each piece."""
     return coefficients[:, 1:] * np.arange(1.0, coefficients.shape[1])
 
 
-def integrate(widths: Floats, coefficients: Floats) -> Floats:
+def integrate_pieces(widths: Floats, coefficients: Floats) -> Floats:
     """Return the coefficients of the continuous antiderivative that starts at zero."""
     powers = np.arange(1.0, coefficients.shape[1] + 1)
     integral = np.hstack([np.zeros((len(coefficients), 1)), coefficients / powers])
-    integral[1:, 0] = np.cumsum(evaluate(integral, widths))[:-1]
+    integral[1:, 0] = np.cumsum(evaluate_pieces(integral, widths))[:-1]
     return integral
 
 
@@ -142,7 +142,7 @@ def shift_origin_exactly(coefficients: Floats, shift: Floats) -> Floats:
     return result + errors
 
 
-def refine(breakpoints: Floats, coefficients: Floats, new_breakpoints: Floats, columns: int) -> Floats:
+def refine_pieces(breakpoints: Floats, coefficients: Floats, new_breakpoints: Floats, columns: int) -> Floats:
     """Return coefficients between new breakpoints, which include the old ones (zero after the end)."""
     piece = np.minimum(np.searchsorted(breakpoints, new_breakpoints[:-1], side="right"), len(coefficients)) - 1
     shift = new_breakpoints[:-1] - breakpoints[piece]
@@ -154,7 +154,7 @@ def refine(breakpoints: Floats, coefficients: Floats, new_breakpoints: Floats, c
     return result
 
 
-def align(first: Piecewise, second: Piecewise) -> tuple[Floats, tuple[Floats, Floats]]:
+def align_pieces(first: Piecewise, second: Piecewise) -> tuple[Floats, tuple[Floats, Floats]]:
     """Return common breakpoints, and the coefficients of each between them, of equal degree."""
     columns = max(first.coefficients.shape[1], second.coefficients.shape[1])
     if np.array_equal(first.breakpoints, second.breakpoints):
@@ -162,7 +162,7 @@ def align(first: Piecewise, second: Piecewise) -> tuple[Floats, tuple[Floats, Fl
     else:
         breakpoints = np.union1d(first.breakpoints, second.breakpoints)
     first_rows, second_rows = (
-        refine(pieces.breakpoints, pieces.coefficients, breakpoints, columns) for pieces in (first, second)
+        refine_pieces(pieces.breakpoints, pieces.coefficients, breakpoints, columns) for pieces in (first, second)
     )
     return breakpoints, (first_rows, second_rows)
 
@@ -224,22 +224,22 @@ def _bernstein_matrix(columns: int) -> Floats:
 def bound_magnitudes(widths: Floats, coefficients: Floats) -> Floats:
     """Return an upper bound on each piece's magnitude, from the ends (straight) or Bernstein coefficients."""
     if coefficients.shape[1] <= 2:
-        return np.maximum(np.abs(coefficients[:, 0]), np.abs(evaluate(coefficients, widths)))
+        return np.maximum(np.abs(coefficients[:, 0]), np.abs(evaluate_pieces(coefficients, widths)))
     result: Floats = np.max(np.abs(_compute_control_points(widths, coefficients)), axis=1)
     return result
 
 
 def find_maximum(widths: Floats, coefficients: Floats) -> float:
     """Return the highest value over all pieces."""
-    maximum = max(float(np.max(coefficients[:, 0])), float(np.max(evaluate(coefficients, widths))))
+    maximum = max(float(np.max(coefficients[:, 0])), float(np.max(evaluate_pieces(coefficients, widths))))
     if coefficients.shape[1] <= 2:
         return maximum
     may_exceed = np.max(_compute_control_points(widths, coefficients), axis=1) > maximum + 1e-15 * abs(maximum)
     if not np.any(may_exceed):
         return maximum
     pieces, spans = coefficients[may_exceed], widths[may_exceed]
-    extrema = find_root_candidates(spans, differentiate(pieces))
-    return max(maximum, float(np.max(evaluate(pieces[:, np.newaxis, :], extrema))))
+    extrema = find_root_candidates(spans, differentiate_pieces(pieces))
+    return max(maximum, float(np.max(evaluate_pieces(pieces[:, np.newaxis, :], extrema))))
 
 
 def find_peak_magnitude(widths: Floats, coefficients: Floats) -> float:
@@ -283,9 +283,9 @@ def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Float
             f"a motion must last from {MIN_DURATION:g} to {_MAX_DURATION:g} s, not {ends[-1]:g} s: check its units"
         )
     with np.errstate(over="ignore"):
-        if not np.all(evaluate(np.abs(rows), widths) <= MAX_ACCELERATION):
+        if not np.all(evaluate_pieces(np.abs(rows), widths) <= MAX_ACCELERATION):
             raise InvalidMotion(TOO_STRONG)
-        if not np.all(evaluate(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
+        if not np.all(evaluate_pieces(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
             raise InvalidMotion(
                 f"a piece of a motion is too steep: shorter than {MIN_DURATION:g} s, it would pass "
                 f"{MAX_ACCELERATION:g} m/s^2 within that time: check units and times"

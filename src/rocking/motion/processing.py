@@ -100,7 +100,7 @@ class Processable(MotionMeasures):
         if self.vertical is not None and other.vertical not in (None, self.vertical):
             raise InvalidMotion("each component has a vertical one: give it to one of the two with with_vertical")
         first_factor, second_factor = compute_rotation_factors((first_azimuth, second_azimuth), target)
-        breakpoints, (first_rows, second_rows) = piecewise.align(self, other)
+        breakpoints, (first_rows, second_rows) = piecewise.align_pieces(self, other)
         fields: dict[str, Any] = {"channel": f"{target:g} deg", "number": None, "azimuth": target, "reversed": False}
         origin = replace(self.description.origin or Origin(), **fields)
         text = (
@@ -276,7 +276,9 @@ def _trim(motion: Piecewise, start: float, end: float, fine_step: float | None =
     breakpoints = motion.breakpoints
     inner_breakpoints = breakpoints[(breakpoints > start) & (breakpoints < end)]
     new_breakpoints = np.concatenate([[start], inner_breakpoints, [end]])
-    coefficients = piecewise.refine(breakpoints, motion.coefficients, new_breakpoints, motion.coefficients.shape[1])
+    coefficients = piecewise.refine_pieces(
+        breakpoints, motion.coefficients, new_breakpoints, motion.coefficients.shape[1]
+    )
     return ProcessedPieces(new_breakpoints - start, coefficients, entry)
 
 
@@ -380,7 +382,7 @@ def _compute_floor_motion(
     breakpoints = np.append(start + index * width, nodes[-1])
     width = np.diff(breakpoints)
     columns = max(motion.coefficients.shape[1], _SERIES_DEGREE + 1)
-    forcing = piecewise.refine(motion.breakpoints, motion.coefficients, breakpoints, columns)
+    forcing = piecewise.refine_pieces(motion.breakpoints, motion.coefficients, breakpoints, columns)
     series = _compute_oscillator_series(forcing, rate, damping_ratio, columns + 2)
     end_states = np.stack(
         [_evaluate_series(series, width), _evaluate_series(series[..., 1:] * np.arange(1, columns + 2), width)]
@@ -408,7 +410,7 @@ def _compute_oscillator_series(forcing: Floats, rate: float, damping_ratio: floa
 
 
 def _evaluate_series(series: Floats, x: Floats) -> Floats:
-    return piecewise.evaluate(series, np.broadcast_to(x, series.shape[:-1]))
+    return piecewise.evaluate_pieces(series, np.broadcast_to(x, series.shape[:-1]))
 
 
 def _propagate_states(end_states: Floats) -> Floats:

@@ -159,7 +159,7 @@ class Contact:
         anywhere = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
         piece = np.where(at_rest, anywhere, self.history.trail.nodes["piece"][rows])
         elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
-        push, *lift = (piecewise.evaluate(coefficients, elapsed) for coefficients in components(ground, piece))
+        push, *lift = (piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in components(ground, piece))
         return push, lift[0] if lift else np.zeros_like(push)
 
     def _samples(self) -> tuple[Floats, Integers]:

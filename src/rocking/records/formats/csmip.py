@@ -100,7 +100,7 @@ def _parse_labels(header: Header, event_line: int) -> tuple[dict[str, Any], dict
             labels["station"] = following.text[:40].strip() or match[1].split("  ")[0]
             facts["station line"] = " ".join(line.text.split())
             break
-    if channel := header.find(_CHANNEL):
+    if channel := header.find_match(_CHANNEL):
         words = channel[2].strip()
         name = re.split(r"\s{2,}|\(|location\s*:", words, maxsplit=1, flags=re.IGNORECASE)[0].strip()
         labels |= {"number": int(channel[1]), "azimuth": parse_azimuth(_DEGREES, name)}
@@ -137,10 +137,10 @@ def _parse_cosmos_header(header: Header) -> HeaderData:
         header.skip(1 + int(comments[1]))
     points = header.expect(_DATA, "the line with the number of points")
     data_line = header.lines[-1]
-    missing_mark, station = header.find_text(_MISSING_MARK), header.find(_COSMOS_STATION)
+    missing_mark, station = header.find_text(_MISSING_MARK), header.find_match(_COSMOS_STATION)
     labels: dict[str, Any] = {"name": "", "event": text_lines[1].text.strip() if len(text_lines) > 1 else ""}
     location = ""
-    if channel := header.find(_COSMOS_CHANNEL):
+    if channel := header.find_match(_COSMOS_CHANNEL):
         if re.fullmatch(r"\d{1,6}", channel[1], re.ASCII):
             labels["number"] = int(channel[1])
         labels["name"] = " ".join(channel[2].split("  ")[0].split())

@@ -75,7 +75,7 @@ class Header:
             if match := pattern.search(line.text):
                 self.read_lines(k + 1)
                 return match
-            if k > 0 and self.record_format.begins(line):
+            if k > 0 and self.record_format.begins_channel(line):
                 break
         return None
 
@@ -85,13 +85,13 @@ class Header:
         self.skip(rows)
         return read_values(self.source, start, self.end, layout, Count(count, start))
 
-    def find(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+    def find_match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
         """Return the first match of a pattern in the lines."""
         return next((match for line in self.lines if (match := pattern.search(line.text))), None)
 
     def find_text(self, pattern: re.Pattern[str]) -> str:
         """Return the first group of a match, or an empty text."""
-        match = self.find(pattern)
+        match = self.find_match(pattern)
         return match[1].strip() if match else ""
 
     def find_offset(self, pattern: re.Pattern[str]) -> int:
@@ -142,11 +142,11 @@ class Format(NamedTuple):
         matches = [next(filter(None, (mark.search(line.text) for line in lines)), None) for mark in self.marks]
         if matches[0] is None or None in matches:
             return None
-        offset = next(line.start for line in lines if self.begins(line))
+        offset = next(line.start for line in lines if self.begins_channel(line))
         reason = f"line {source.find_line_number(offset)} reads {matches[0][0].strip()!r}"
         return Recognised(self.name, reason, functools.partial(self._read_channels, source, lines[0].start))
 
-    def begins(self, line: Line) -> bool:
+    def begins_channel(self, line: Line) -> bool:
         """Return whether a line begins a channel."""
         return self.marks[0].search(line.text) is not None
 
@@ -168,13 +168,13 @@ class Format(NamedTuple):
         """Return the end of a channel's numbers: the end of the file, or a line that begins other content."""
         end = find_numeric_end(source, start) if self.has_several_channels else len(source.data)
         line = source.read_line(end)
-        ends = _END_OF_DATA.match(line.text) or self.begins(line) or self.other_data.search(line.text)
+        ends = _END_OF_DATA.match(line.text) or self.begins_channel(line) or self.other_data.search(line.text)
         return end if ends else line.next_start  # such a line is not an end, but contains a damaged number
 
     def _find_next(self, source: Source, end: int) -> int | None:
         """Return the offset of the next channel."""
         line = source.find_first_line(end)
-        while line is not None and not self.begins(line):
+        while line is not None and not self.begins_channel(line):
             if not (_END_OF_DATA.match(line.text) or self.other_data.search(line.text)):
                 raise source.error("the title of another channel should stand here; correct the file", line.start)
             line = source.find_first_line(find_numeric_end(source, line.next_start))
