@@ -265,7 +265,8 @@ def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
     data = SHIPPED_MESHES["statue"].read_bytes()
     made, sections = apart.made_apart("statue.obj", data, {"unit": "ft"})
     assert rocking.Solid(**made).to_dict() == rocking.Solid.from_mesh("statue", unit="ft").to_dict()
-    assert np.abs(sections.across(30.0) - apart.made_here("statue", {"unit": "ft"})[1].across(30.0)).max() < 1e-5
+    expected = apart.made_here("statue", {"unit": "ft"})[1]
+    assert np.abs(sections.compute_outline(30.0) - expected.compute_outline(30.0)).max() < 1e-5
     monkeypatch.setattr(apart, "_PATIENCE", 0.05)
     with pytest.raises(
         InvalidBlock, match=r"statue\.obj: takes more than 20 s or 2 GiB to read: make the mesh coarser"
