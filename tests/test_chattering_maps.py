@@ -11,7 +11,7 @@ import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.families import SimulationInput
 from rocking.chattering.maps import Outcome, chattering_episodes, chattering_map
-from rocking.motion.motion import exceedances
+from rocking.motion.motion import find_exceedances
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 THRESHOLD = BLOCK.gravity * 0.2
@@ -184,7 +184,7 @@ def test_lobes_swell_or_fade_by_the_ratio():
 )
 def test_a_motion_is_beyond_a_threshold_within_the_exceedances_and_nowhere_else(samples, plus, minus, times):
     motion = rocking.Motion.from_samples(samples, 0.5)
-    found = exceedances(motion, (plus, minus))
+    found = find_exceedances(motion, (plus, minus))
     assert np.all(np.diff(found, axis=1) > 0.0)
     instants = motion.duration * np.array(times)
     # At the ends of a stretch rounding decides.
@@ -198,7 +198,7 @@ def test_a_motion_is_beyond_a_threshold_within_the_exceedances_and_nowhere_else(
 
 def test_exceedances_of_a_pulse_start_where_a_resting_block_is_lifted():
     motion = rocking.pulses.ricker(2.7 * THRESHOLD, 0.7)
-    starts = exceedances(motion, BLOCK.uplift_thresholds("linear"))[:, 0]
+    starts = find_exceedances(motion, BLOCK.uplift_thresholds("linear"))[:, 0]
     assert len(starts) == 3
     response = rocking.simulate(BLOCK, motion, model="linear")
     assert response.events["time"][0] == pytest.approx(starts[0], abs=1e-12)
@@ -206,9 +206,9 @@ def test_exceedances_of_a_pulse_start_where_a_resting_block_is_lifted():
 
 def test_the_two_sides_have_thresholds_of_their_own():
     motion = rocking.pulses.sine(1.0, 1.0, cycles=1)
-    assert exceedances(motion, (2.0, 0.5)).round(12).tolist() == [[round(1 / 12, 12), round(5 / 12, 12)]]
-    assert exceedances(motion, (0.5, 2.0)).round(12).tolist() == [[round(7 / 12, 12), round(11 / 12, 12)]]
-    assert exceedances(motion, (2.0, 2.0)).shape == (0, 2)
+    assert find_exceedances(motion, (2.0, 0.5)).round(12).tolist() == [[round(1 / 12, 12), round(5 / 12, 12)]]
+    assert find_exceedances(motion, (0.5, 2.0)).round(12).tolist() == [[round(7 / 12, 12), round(11 / 12, 12)]]
+    assert find_exceedances(motion, (2.0, 2.0)).shape == (0, 2)
 
 
 # Episodes

@@ -14,7 +14,7 @@ from rocking.cli import main
 from rocking.core.progress import note, notes_for
 from rocking.inputs.notes import motion_notes
 from rocking.motion.scaling import Measure
-from rocking.records.named import expanded
+from rocking.records.named import expand_record_names
 
 RECORD = "el-centro-meloland-270"
 OTHER = "ridgecrest-clc-090"
@@ -159,9 +159,9 @@ def test_a_pulse_has_the_vertical_component_that_is_given(run):
 
 
 def test_each_record_counts_once(folder):
-    assert len(expanded([str(folder), str(folder / "*.AT2")])) == 3
+    assert len(expand_record_names([str(folder), str(folder / "*.AT2")])) == 3
     with pytest.raises(rocking.UnreadableRecord, match="matches"):
-        expanded([str(folder / "*.xyz")])
+        expand_record_names([str(folder / "*.xyz")])
 
 
 @pytest.mark.thorough
@@ -324,11 +324,11 @@ def test_no_shipped_record_looks_like_a_mistake():
 
 def test_a_pattern_finds_shipped_records_where_no_file_matches(run, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    assert expanded(["ridgecrest-*-090"]) == ["ridgecrest-clc-090", "ridgecrest-tow2-090"]
+    assert expand_record_names(["ridgecrest-*-090"]) == ["ridgecrest-clc-090", "ridgecrest-tow2-090"]
     assert "2 records" in run("simulate", "ridgecrest-*-090", *BLOCK)[1]
     assert run("records", "ridgecrest-*-090")[1].count("ridgecrest-") == 2
     (tmp_path / "ridgecrest-mine-090").write_text("0\n1\n")
-    assert expanded(["ridgecrest-*-090"]) == ["ridgecrest-mine-090"]
+    assert expand_record_names(["ridgecrest-*-090"]) == ["ridgecrest-mine-090"]
     assert "no file or shipped record matches" in run("simulate", "parkfield-*", *BLOCK)[2]
 
 

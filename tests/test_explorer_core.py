@@ -28,7 +28,7 @@ from rocking.explorer.periodic import sweep_of
 from rocking.explorer.simulated import extremes
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
-from rocking.motion.motion import exceedances
+from rocking.motion.motion import find_exceedances
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
 SINE = {
@@ -183,7 +183,7 @@ def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
     response = explorer.show(texts).response
     lift = response.block.uplift_thresholds()[0] / 9.80665
     beyond = np.abs(arrays["ground_g"]) > lift * arrays["weight"]
-    stretches = exceedances(response.motion, response.block.uplift_thresholds())
+    stretches = find_exceedances(response.motion, response.block.uplift_thresholds())
     times = 228.0 + arrays["ground_time"]
     inside = (np.searchsorted(stretches.ravel(), times, side="right") % 2).astype(bool)
     assert beyond.sum() > 30

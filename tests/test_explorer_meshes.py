@@ -22,7 +22,7 @@ from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
 from rocking.explorer.server import App
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore
-from rocking.solid.mesh import SHIPPED
+from rocking.solid.mesh import SHIPPED_MESHES
 
 STATUE = {"mesh": "statue", "azimuth": "30", "motion": "ridgecrest-clc-090", "pga": "0.6g"}
 DENSITY = "plinth=2700,figure=2650,head=2650"
@@ -262,10 +262,11 @@ def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned(here):
 
 @pytest.mark.thorough
 def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
-    data = SHIPPED["statue"].read_bytes()
+    data = SHIPPED_MESHES["statue"].read_bytes()
     made, sections = apart.made_apart("statue.obj", data, {"unit": "ft"})
     assert rocking.Solid(**made).to_dict() == rocking.Solid.from_mesh("statue", unit="ft").to_dict()
-    assert np.abs(sections.across(30.0) - apart.made_here("statue", {"unit": "ft"})[1].across(30.0)).max() < 1e-5
+    expected = apart.made_here("statue", {"unit": "ft"})[1]
+    assert np.abs(sections.compute_outline(30.0) - expected.compute_outline(30.0)).max() < 1e-5
     monkeypatch.setattr(apart, "_PATIENCE", 0.05)
     with pytest.raises(
         InvalidBlock, match=r"statue\.obj: takes more than 20 s or 2 GiB to read: make the mesh coarser"
@@ -278,7 +279,7 @@ def test_a_process_that_takes_too_much_is_ended(tmp_path, monkeypatch):
     (tmp_path / "sitecustomize.py").write_text("import resource\nresource.setrlimit(resource.RLIMIT_CPU, (0, 1))\n")
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
     with pytest.raises(InvalidBlock, match="takes more than"):
-        apart.made_apart("statue.obj", SHIPPED["statue"].read_bytes(), {})
+        apart.made_apart("statue.obj", SHIPPED_MESHES["statue"].read_bytes(), {})
 
 
 def test_what_reads_meshes_may_be_missing(here, monkeypatch):

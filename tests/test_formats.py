@@ -25,7 +25,7 @@ from rocking.analysis.levels import clusters_of
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.records import channels, formats, identify, read
 from rocking.records.formats import source, through_obspy
-from rocking.records.formats.channel import even_step, gap_at
+from rocking.records.formats.channel import find_missing_value, fit_even_step
 from rocking.records.formats.source import Request
 
 GRAVITY = 9.80665
@@ -194,7 +194,7 @@ def test_counts_are_multiplied_by_the_calibration_of_their_file(
 ) -> None:
     obspy = pytest.importorskip("obspy")
     stream = obspy.Stream([obspy.Trace(np.arange(9.0), {"calib": by, "channel": f"HN{by}"}) for by in (1.0, -2.5)])
-    monkeypatch.setattr(through_obspy, "_traces", lambda *_, **__: stream)
+    monkeypatch.setattr(through_obspy, "_read_traces", lambda *_, **__: stream)
     one, other = channels(file(waveform("MSEED", 900)), units="m/s2")
     assert np.array_equal(other.acceleration, -2.5 * one.acceleration) and one.acceleration[-1] == 8.0
 
@@ -215,11 +215,11 @@ def test_the_vertical_motion_is_a_channel_by_its_name_whatever_the_horizontal_on
     path, single = written.FOLDER / "two.v1", written.FOLDER / "nga.at2"
     for several in (False, True):
         for horizontal in (1, "90 Deg", None):
-            request = Request.checked(None, None, horizontal, several=several)
-            assert formats.chosen(path, request, vertical="Up").motion().pga == read(path, channel="Up").pga
+            request = Request.create(None, None, horizontal, several=several)
+            assert formats.read_channel(path, request, vertical="Up").motion().pga == read(path, channel="Up").pga
         for file in (path, single):
             with pytest.raises(UnreadableRecord, match="no channel, file or shipped record 'north'; give one of 1 '"):
-                formats.chosen(file, Request.checked(several=several), vertical="north")
+                formats.read_channel(file, Request.create(several=several), vertical="north")
 
 
 # PEER
@@ -311,8 +311,8 @@ def test_uneven_times_contradict_a_step(form: str, file: Callable[[str], Path]) 
     path = file(v1 if form == "CSMIP V1" else written.smc(pairs, rate=None))
     assert channels(path)[0].times is not None
     assert "the times are not evenly 0.02 s apart; leave dt out" in complaint(path, dt=0.02)
-    request = source.Request.checked(0.02, None, several=True)
-    assert formats.chosen(path, request).times is not None
+    request = source.Request.create(0.02, None, several=True)
+    assert formats.read_channel(path, request).times is not None
 
 
 def test_times_printed_with_few_digits_have_the_step_that_is_given(file: Callable[[str], Path]) -> None:
@@ -552,21 +552,21 @@ def test_arguments_must_agree_with_the_file() -> None:
 )
 def test_even_times_give_their_step_whatever_their_decimals(step: float, points: int, start: float) -> None:
     exact = start + step * np.arange(points)
-    assert even_step(exact) == pytest.approx(step, rel=1e-9)
+    assert fit_even_step(exact) == pytest.approx(step, rel=1e-9)
     for decimals in (3, 4, 6):
         rounded = np.round(exact, decimals)
         if 10.0**-decimals <= 0.5 * step:
-            found = even_step(rounded)
+            found = fit_even_step(rounded)
             assert found is not None
             assert abs(found - step) * (points - 1) <= 1.01 * 10.0**-decimals
 
 
 def test_a_missing_sample_is_not_even() -> None:
-    assert even_step(np.round(0.015 * np.arange(100), 2)) is None
+    assert fit_even_step(np.round(0.015 * np.arange(100), 2)) is None
     for step, decimals in ((0.01, 2), (0.005, 3), (0.0078125, 4), (0.02, 17)):
         times = np.round(step * np.arange(2000), decimals)
-        assert even_step(np.delete(times, 1000)) is None
-        assert even_step(times) == pytest.approx(step, rel=1e-9)
+        assert fit_even_step(np.delete(times, 1000)) is None
+        assert fit_even_step(times) == pytest.approx(step, rel=1e-9)
 
 
 @pytest.mark.cases(fast=4)
@@ -586,9 +586,9 @@ def test_a_step_that_is_given_holds_where_times_are_its_own_with_few_digits(step
 
 
 def test_a_step_of_short_digits_is_found_exactly() -> None:
-    assert even_step(np.round(0.005 * np.arange(5000), 3)) == 0.005
-    assert even_step(0.01 * np.arange(5000)) == 0.01
-    assert even_step(np.cumsum(np.full(5000, 0.02))) == 0.02
+    assert fit_even_step(np.round(0.005 * np.arange(5000), 3)) == 0.005
+    assert fit_even_step(0.01 * np.arange(5000)) == 0.01
+    assert fit_even_step(np.cumsum(np.full(5000, 0.02))) == 0.02
 
 
 # Text and numbers
@@ -719,7 +719,7 @@ def test_traces_with_gaps_or_without_numbers_are_refused(
     gaps = np.ma.masked_array(np.arange(5.0), [False, True, False, False, False])
     for data in (gaps, np.array(["a", "b"])):
         stream = obspy.Stream([obspy.Trace(data)])
-        monkeypatch.setattr(through_obspy, "_traces", lambda *_, stream=stream: stream)
+        monkeypatch.setattr(through_obspy, "_read_traces", lambda *_, stream=stream: stream)
         assert "trace 1 has gaps, or no numbers" in complaint(path, units="g")
 
 
@@ -749,7 +749,7 @@ def test_files_say_when_their_first_sample_is_wherever_they_are_read(zone: None,
 def test_without_obspy_the_extra_is_named(monkeypatch: pytest.MonkeyPatch, file: Callable[[bytes], Path]) -> None:
     path = file(waveform("MSEED"))
     monkeypatch.setitem(sys.modules, "obspy", None)
-    assert not through_obspy.installed()
+    assert not through_obspy.is_obspy_installed()
     assert "pip install '.[formats]' in the source folder" in complaint(path)
     assert read(written.FOLDER / "knet.ns").pga > 0.0
 
@@ -822,10 +822,10 @@ def test_a_motion_knows_where_it_comes_from(file: Callable[[str], Path]) -> None
 
 def test_a_number_for_a_missing_value_is_found_among_far_smaller_ones() -> None:
     for mark in (-99.0, -999.0, 9999.0, 99.9999, -99999.99, 999.25, -12345.0, -32768.0, 8388607.0):
-        assert gap_at(np.array([0.1, 0.2, mark, mark, 0.2])) == 2
-        assert gap_at(np.array([0.1, 0.9 * abs(mark), mark, 0.2])) is None  # a value among values
+        assert find_missing_value(np.array([0.1, 0.2, mark, mark, 0.2])) == 2
+        assert find_missing_value(np.array([0.1, 0.9 * abs(mark), mark, 0.2])) is None  # a value among values
     for value in (9.0, 9.9999, 99.99999, 98.0, 999999999.0, 32766.0):
-        assert gap_at(np.array([0.1, value, 0.2])) is None
+        assert find_missing_value(np.array([0.1, value, 0.2])) is None
 
 
 # What is refused

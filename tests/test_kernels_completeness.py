@@ -8,9 +8,8 @@ from kernel_records import long_uncompiled, rocking_block, state_of
 
 import rocking
 from rocking.engine.problem import ground_of
-from rocking.kernels.state import AT_REST, new_records, new_scratch
-from rocking.kernels.uplift import write_completeness
-from rocking.motion.motion import exceedances
+from rocking.kernels.state import AT_REST, new_scratch
+from rocking.motion.motion import find_exceedances
 
 Pair = tuple[float, float]
 
@@ -51,7 +50,7 @@ def motions(draw: st.DrawFn) -> rocking.Motion:
 def test_chattering_is_complete_where_the_next_stretch_beyond_a_threshold_starts_after_the_rest(
     motion: rocking.Motion, thresholds: Pair, share: float
 ) -> None:
-    found, rest = exceedances(motion, thresholds, 1.0), share * motion.duration
+    found, rest = find_exceedances(motion, thresholds, 1.0), share * motion.duration
     assume(len(found) > 0 and found[0, 0] < rest)
     edges = np.sort(np.append(found.ravel(), rest))
     assume(np.diff(edges).min() > 1e-6)  # a touch, and a tie, are decided by rounding

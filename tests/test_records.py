@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 from rocking import read, records
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
-from rocking.records.named import named_motion, numbered
+from rocking.records.named import load_motion, make_names_unique
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "src" / "rocking" / "records" / "data"
@@ -117,11 +117,11 @@ def test_a_record_by_name_is_multiplied_by_its_scale(scale, tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("time (s),a (g)\n" + "".join(f"{0.01 * k:.2f},{0.1 * (k % 7 - 3):.3f}\n" for k in range(40)))
     for name, base in (("el-centro-meloland-270", records.load("el-centro-meloland-270")), (str(path), read(path))):
-        found = named_motion(name, scale=scale)
+        found = load_motion(name, scale=scale)
         assert np.array_equal(found.coefficients, scale * base.coefficients)
         assert found.name == base.name
 
 
 def test_numbers_of_names_leave_names_that_are_there():
-    assert numbered(["a", "a", "a #1"]) == ["a #2", "a #3", "a #1"]
-    assert numbered(["a #2", "a", "b", "a"]) == ["a #2", "a #1", "b", "a #3"]
+    assert make_names_unique(["a", "a", "a #1"]) == ["a #2", "a #3", "a #1"]
+    assert make_names_unique(["a #2", "a", "b", "a"]) == ["a #2", "a #1", "b", "a #3"]

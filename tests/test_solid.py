@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
-from rocking.solid.mesh import upright
-from rocking.solid.repair import shells_of
+from rocking.solid.mesh import compute_upright_rotation
+from rocking.solid.repair import label_shells
 
 SCRIPT = runpy.run_path(str(Path(__file__).resolve().parents[1] / "scripts" / "ship_statue.py"))
 SIZES = (0.6, 0.4, 1.8)
@@ -190,7 +190,7 @@ def test_where_a_mesh_lies_how_it_is_turned_and_its_units_do_not_matter():
 
 @pytest.mark.parametrize("up", ["x", "y", "z", "-x", "-y", "-z", [1.0, 2.0, -0.5], [0.0, 0.0, -3.0]])
 def test_any_axis_is_turned_up_without_a_mirror(up):
-    rotation = upright(up)
+    rotation = compute_upright_rotation(up)
     axis = (
         np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1) if isinstance(up, str) else up / np.linalg.norm(up)
     )
@@ -204,7 +204,7 @@ def test_all_formats_hold_the_same_body_and_gltf_points_up_by_y(tmp_path):
     for suffix in ("obj", "ply", "stl", "glb"):
         made = box()
         if suffix == "glb":
-            made.vertices = made.vertices @ upright("y")  # z to y
+            made.vertices = made.vertices @ compute_upright_rotation("y")  # z to y
         made.export(tmp_path / f"box.{suffix}")
         assert_same(Solid.from_mesh(tmp_path / f"box.{suffix}"), plain, 1e-6)
     for name, content in made.export(file_type="gltf").items():
@@ -739,7 +739,7 @@ def test_a_piece_that_is_turned_inside_out_and_touches_the_rest_is_none_of_its_c
 
 def test_open_pieces_that_share_an_edge_are_one_surface_and_closed_ones_are_not():
     """Three pages of a book; two tetrahedra back to back along an edge."""
-    assert shells_of(np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])).tolist() == [0, 0, 0]
+    assert label_shells(np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])).tolist() == [0, 0, 0]
     tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     other = np.array([[0, 5, 1], [0, 1, 6], [1, 5, 6], [0, 6, 5]])
-    assert shells_of(np.vstack([tetrahedron, other])).tolist() == [0, 0, 0, 0, 1, 1, 1, 1]
+    assert label_shells(np.vstack([tetrahedron, other])).tolist() == [0, 0, 0, 0, 1, 1, 1, 1]

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from rocking.solid.mesh import properties
-from rocking.solid.support import sections_of
+from rocking.solid.mesh import compute_properties
+from rocking.solid.support import compute_sections
 
 
 def surfaces_of(mesh):
-    return properties(mesh, None, None, None, up=None, unit="m", turn=0.0)[1]
+    return compute_properties(mesh, None, None, None, up=None, unit="m", turn=0.0)[1]
 
 
 def box(sizes, at):
@@ -32,7 +32,7 @@ def covered(trapezoids, height, place):
 @pytest.mark.parametrize("azimuth", [247.5, *(pytest.param(a, marks=pytest.mark.thorough) for a in (0.0, 30.0, 90.0))])
 def test_the_outline_is_where_triangles_are_seen(azimuth):
     surfaces = surfaces_of("statue")
-    outline = sections_of(surfaces).across(azimuth)
+    outline = compute_sections(surfaces).compute_outline(azimuth)
     towards = np.array([math.sin(math.radians(azimuth)), math.cos(math.radians(azimuth))])
     random = np.random.default_rng(7)
     height = random.uniform(0.0, 1.7295, 4000)
@@ -56,19 +56,21 @@ def test_the_outline_is_where_triangles_are_seen(azimuth):
 def test_the_outline_spans_what_is_open_between_legs():
     legs = [box((0.1, 0.1, 0.5), (x, 0.0, 0.25)) for x in (-0.4, 0.4)]
     table = trimesh.Scene([*legs, box((1.0, 0.6, 0.1), (0.0, 0.0, 0.55))])
-    found = sections_of(surfaces_of(table))
+    found = compute_sections(surfaces_of(table))
     ends = [[0.0, 0.5, -0.45, 0.45, -0.45, 0.45], [0.5, 0.6, -0.5, 0.5, -0.5, 0.5]]
-    assert np.allclose(found.across(90.0), ends)
-    assert np.allclose(found.across(0.0), [[0.0, 0.5, -0.05, 0.05, -0.05, 0.05], [0.5, 0.6, -0.3, 0.3, -0.3, 0.3]])
-    assert np.allclose(found.across(180.0)[:, 2:4], -found.across(0.0)[:, 3:1:-1])
+    assert np.allclose(found.compute_outline(90.0), ends)
+    assert np.allclose(
+        found.compute_outline(0.0), [[0.0, 0.5, -0.05, 0.05, -0.05, 0.05], [0.5, 0.6, -0.3, 0.3, -0.3, 0.3]]
+    )
+    assert np.allclose(found.compute_outline(180.0)[:, 2:4], -found.compute_outline(0.0)[:, 3:1:-1])
 
 
 @pytest.mark.thorough
 def test_a_mesh_of_very_many_corners_has_a_small_outline():
     ball = trimesh.creation.icosphere(4)
     ball.vertices[:, 2] = np.maximum(ball.vertices[:, 2], -0.9)
-    fine = sections_of(surfaces_of(ball))
+    fine = compute_sections(surfaces_of(ball))
     assert len(fine.heights) == 240
     assert max(map(len, fine.hulls)) <= 180
-    wide = fine.across(17.0)[:, 2:4]
+    wide = fine.compute_outline(17.0)[:, 2:4]
     assert np.abs(wide[np.argmax(wide[:, 1])] - [-1.0, 1.0]).max() < 1e-3

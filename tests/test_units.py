@@ -11,7 +11,7 @@ from rocking.analysis.hazard import HEADINGS
 from rocking.calibration.tables import read_observed
 from rocking.inputs import quantities
 from rocking.records import units
-from rocking.solid.mesh import UNITS as LENGTHS_OF_MESHES
+from rocking.solid.mesh import LENGTH_UNITS as LENGTHS_OF_MESHES
 
 G = 9.80665
 
@@ -43,7 +43,7 @@ WRITTEN = {
     "velocity": {"": 1.0, **{f"{name}s": factor for name, factor in LENGTHS.items() if name}},
     "frequency": {"": 1.0, "hz": 1.0, "rads": 0.5 / math.pi},
     "rate": {"": 1.0, "rads": 1.0, "degs": PER_TURN, "°s": PER_TURN},
-    "duration": {"": 1.0, **{units.plain_spelling(each): factor for each, factor in SECONDS.items()}},
+    "duration": {"": 1.0, **{units.normalise_spelling(each): factor for each, factor in SECONDS.items()}},
     "number": {"": 1.0},
 }
 
@@ -56,7 +56,7 @@ def test_every_unit_of_a_quantity_is_so_much_in_si_units(kind):
 
 
 def test_every_spelling_of_accelerations_and_times_in_records_is_so_much_in_si_units():
-    assert (set(ACCELERATIONS), set(SECONDS)) == (set(units.ACCELERATIONS), set(units.TIMES))
+    assert (set(ACCELERATIONS), set(SECONDS)) == (set(units.ACCELERATION_UNITS), set(units.TIME_UNITS))
     for find, factors in ((units.find_unit, ACCELERATIONS), (units.find_time_unit, SECONDS)):
         for spelling, factor in factors.items():
             assert find(spelling).to_si(np.array([2.5])) == pytest.approx(2.5 * factor, rel=1e-15), spelling

@@ -14,8 +14,8 @@ import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.inputs.notes import vertical_notes
 from rocking.motion.description import Origin
-from rocking.motion.motion import exceedances, lifting_factors
-from rocking.records.named import named_motion
+from rocking.motion.motion import compute_uplift_factors, find_exceedances
+from rocking.records.named import load_motion
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -129,7 +129,7 @@ def test_a_vertical_component_that_is_not_there_is_refused(run, tmp_path: Path, 
 def test_stretches_beyond_the_threshold_are_those_of_the_weighted_threshold(seed: int) -> None:
     motion = wave(3.0, seed).with_vertical(wave(3.0, seed + 50, dt=0.03, count=150))
     plus, minus = 1.8, 2.2
-    found = exceedances(motion, (plus, minus), G)
+    found = find_exceedances(motion, (plus, minus), G)
     times = np.linspace(0.0, 4.5, 90_001)[1:-1]
     weight = 1.0 + motion.vertical.acceleration(times) / G
     push = motion.acceleration(times)
@@ -155,23 +155,23 @@ def two_files(tmp_path: Path) -> dict[str, Path]:
 
 def test_what_is_said_of_files_is_for_the_one_of_two_that_does_not_say_its_own(two_files: dict[str, Path]) -> None:
     says, plain = str(two_files["says.csv"]), str(two_files["plain.txt"])
-    found = named_motion(says, vertical=plain, channel="ns", dt=0.02, units="m/s2")
+    found = load_motion(says, vertical=plain, channel="ns", dt=0.02, units="m/s2")
     alone = rocking.read(says, channel="ns")
     assert found.pga == alone.pga == pytest.approx(0.3, rel=1e-2)
     assert found.vertical is not None
     assert found.vertical.pga == pytest.approx(0.1, rel=1e-2)
-    shipped = named_motion("el-centro-meloland-270", vertical=plain, dt=0.02, units="m/s2")
+    shipped = load_motion("el-centro-meloland-270", vertical=plain, dt=0.02, units="m/s2")
     assert shipped.vertical is not None
     assert shipped.vertical.pga == found.vertical.pga
 
 
 def test_a_file_of_several_that_says_its_units_keeps_them_for_both_channels(two_files: dict[str, Path]) -> None:
     for name in ("says.csv", "silent.csv"):
-        found = named_motion(str(two_files[name]), channel="ns", vertical="up", units="g", several=True)
+        found = load_motion(str(two_files[name]), channel="ns", vertical="up", units="g", several=True)
         assert found.vertical is not None
         assert (found.pga, found.vertical.pga) == pytest.approx((0.3, 0.1), rel=1e-2)
     # Of one file alone a heading is overruled, and for both channels alike.
-    alone = named_motion(str(two_files["says.csv"]), channel="ns", vertical="up", units="g")
+    alone = load_motion(str(two_files["says.csv"]), channel="ns", vertical="up", units="g")
     assert alone.vertical is not None
     assert alone.pga / alone.vertical.pga == pytest.approx(3.0, rel=2e-2)
     assert alone.pga == pytest.approx(30.0 * G, rel=1e-2)
@@ -201,7 +201,7 @@ def test_levels_of_a_block_with_two_sides_begin_at_the_side_that_the_motion_lift
     assert found.data.lowest_uplift == pytest.approx(G * math.tan(0.2))
     pair = [block.uplift_thresholds("nonlinear")]
     curved = rocking.pulses.one_sine(1.0, 1.0)
-    assert lifting_factors(curved, pair) == pytest.approx([G * math.tan(0.1)], rel=1e-12)
+    assert compute_uplift_factors(curved, pair) == pytest.approx([G * math.tan(0.1)], rel=1e-12)
 
 
 def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:

@@ -24,7 +24,7 @@ from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
-from rocking.motion.piecewise import exact_product, exact_quotient
+from rocking.motion.piecewise import divide_exactly, multiply_exactly
 
 __all__ = [
     "half_sine",
@@ -40,16 +40,16 @@ __all__ = [
 
 #: Error relative to the amplitude, which a cut pulse need not reach. It covers the neglected terms and the rounding of
 #: the coefficients, which are multiples of the amplitude.
-_ERROR: Final = 1e-15
+_RELATIVE_ERROR: Final = 1e-15
 
 #: Pieces per cycle of a sine: half a piece is pi/8 = 0.39 rad, and 0.39**14 / 14! = 2.4e-17.
 _PIECES_PER_CYCLE: Final = 8
 _SINE_DEGREE: Final = 13
-_MOST_CYCLES: Final = 100_000
+_MAX_CYCLES: Final = 100_000
 
 #: Piece of a derivative of a Gaussian in standard deviations: by Cramer's inequality (|He_n(x)| exp(-x^2/4) is at most
 #: 1.09 sqrt(n!)) the first neglected term is below 6 e-17 of the peak.
-_GAUSSIAN_PIECE: Final = 0.4
+_GAUSSIAN_PIECE_LENGTH: Final = 0.4
 _GAUSSIAN_DEGREE: Final = 15
 
 
@@ -75,10 +75,10 @@ def rectangular(amplitude: float, duration: float) -> Motion:
     >>> rectangular(2.0, 0.5).pgv
     1.0
     """
-    numbers = _checked(amplitude=amplitude, duration=duration)
-    description = Description("rectangular", numbers, "constant")
-    points = np.array([0.0, numbers["duration"]]), np.array([[numbers["amplitude"]]])
-    return Motion(*points, name="rectangular", description=description)
+    parameters = _check_parameters(amplitude=amplitude, duration=duration)
+    description = Description("rectangular", parameters, "constant")
+    pieces = np.array([0.0, parameters["duration"]]), np.array([[parameters["amplitude"]]])
+    return Motion(*pieces, name="rectangular", description=description)
 
 
 def triangular(amplitude: float, duration: float) -> Motion:
@@ -103,9 +103,9 @@ def triangular(amplitude: float, duration: float) -> Motion:
     >>> triangular(2.0, 0.5).pgv
     0.5
     """
-    numbers = _checked(amplitude=amplitude, duration=duration)
-    description = Description("triangular", numbers, "linear from 0 to amplitude at duration/2 and back to 0")
-    points = [0.0, 0.5 * numbers["duration"], numbers["duration"]], [0.0, numbers["amplitude"], 0.0]
+    parameters = _check_parameters(amplitude=amplitude, duration=duration)
+    description = Description("triangular", parameters, "linear from 0 to amplitude at duration/2 and back to 0")
+    points = [0.0, 0.5 * parameters["duration"], parameters["duration"]], [0.0, parameters["amplitude"], 0.0]
     return Motion.from_points(*points, name="triangular", description=description)
 
 
@@ -136,7 +136,7 @@ def sine(amplitude: float, frequency: float, *, cycles: float, phase: float = 0.
     >>> motion.duration, round(motion.pga, 12), round(motion.acceleration(0.0625), 9)
     (2.5, 3.0, 2.121320344)
     """
-    return _sine("sine", amplitude, frequency, cycles, phase)
+    return _create_sine("sine", amplitude, frequency, cycles, phase)
 
 
 def half_sine(amplitude: float, frequency: float) -> Motion:
@@ -161,7 +161,7 @@ def half_sine(amplitude: float, frequency: float) -> Motion:
     >>> round(half_sine(2.0, 0.5).pgv * math.pi, 12)
     4.0
     """
-    return _sine("half sine", amplitude, frequency, 0.5, 0.0)
+    return _create_sine("half sine", amplitude, frequency, 0.5, 0.0)
 
 
 def one_sine(amplitude: float, frequency: float) -> Motion:
@@ -186,7 +186,7 @@ def one_sine(amplitude: float, frequency: float) -> Motion:
     >>> abs(one_sine(2.0, 0.5).velocity(2.0)) < 1e-15
     True
     """
-    return _sine("one-sine", amplitude, frequency, 1.0, 0.0)
+    return _create_sine("one-sine", amplitude, frequency, 1.0, 0.0)
 
 
 def one_cosine(amplitude: float, frequency: float) -> Motion:
@@ -211,7 +211,7 @@ def one_cosine(amplitude: float, frequency: float) -> Motion:
     >>> round(one_cosine(2.0, 0.5).acceleration(0.0), 12)
     2.0
     """
-    return _sine("one-cosine", amplitude, frequency, 1.0, 0.5 * math.pi)
+    return _create_sine("one-cosine", amplitude, frequency, 1.0, 0.5 * math.pi)
 
 
 def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int | None = None) -> Motion:
@@ -244,63 +244,69 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
     >>> motion.acceleration([0.5, 1.5, 2.5]).round(12)
     array([ 1., -3.,  2.])
     """
-    amplitudes = _lobe_amplitudes(amplitude, lobes)
-    frequency = _checked(frequency=frequency)["frequency"]
-    per_lobe = _PIECES_PER_CYCLE // 2
-    breakpoints = np.arange(len(amplitudes) * per_lobe + 1.0) / (_PIECES_PER_CYCLE * frequency)
-    unit = _sine_pieces(breakpoints, frequency, 0.0)
-    one = np.ndim(amplitude) == 0
-    numbers = {"amplitude" if one else f"amplitude_{k}": a for k, a in enumerate(amplitudes)}
+    amplitudes = _expand_amplitudes(amplitude, lobes)
+    frequency = _check_parameters(frequency=frequency)["frequency"]
+    pieces_per_lobe = _PIECES_PER_CYCLE // 2
+    breakpoints = np.arange(len(amplitudes) * pieces_per_lobe + 1.0) / (_PIECES_PER_CYCLE * frequency)
+    unit_series = _compute_sine_pieces(breakpoints, frequency, 0.0)
+    is_single = np.ndim(amplitude) == 0
+    parameters = {"amplitude" if is_single else f"amplitude_{k}": value for k, value in enumerate(amplitudes)}
     formula = "amplitude sin(2 pi frequency t), an amplitude for each half cycle"
-    about = Description("n-lobe", numbers | {"frequency": frequency, "lobes": len(amplitudes)}, formula)
-    series = unit * np.repeat(amplitudes, per_lobe)[:, np.newaxis]
-    return _made(breakpoints, series, max(map(abs, amplitudes)), about, f"{len(amplitudes)} lobes")
+    description = Description("n-lobe", parameters | {"frequency": frequency, "lobes": len(amplitudes)}, formula)
+    series = unit_series * np.repeat(amplitudes, pieces_per_lobe)[:, np.newaxis]
+    return _create_motion(breakpoints, series, max(map(abs, amplitudes)), description, f"{len(amplitudes)} lobes")
 
 
-def _checked(**numbers: float) -> dict[str, float]:
+def _check_parameters(**numbers: float) -> dict[str, float]:
     """Validate parameters: any amplitude and phase, positive duration, frequency in the range of a pulse."""
-    found = {}
+    checked = {}
     for name, value in numbers.items():
         if name in ("amplitude", "phase"):
-            found[name] = checks.finite(value, name, InvalidMotion)
+            checked[name] = checks.finite(value, name, InvalidMotion)
         elif name == "duration":
-            found[name] = checks.positive(value, name, InvalidMotion, "s")
+            checked[name] = checks.positive(value, name, InvalidMotion, "s")
         else:
             positive = checks.positive(value, name, InvalidMotion, "Hz")
-            found[name] = checks.within(positive, "frequency of a pulse", InvalidMotion, 1e-9, 1e6, "Hz")
-    return found
+            checked[name] = checks.within(positive, "frequency of a pulse", InvalidMotion, 1e-9, 1e6, "Hz")
+    return checked
 
 
-def _made(breakpoints: Floats, series: Floats, peak: float, about: Description, name: str = "") -> Motion:
-    """Create a motion from pieces (about their starts) with an error proportional to a peak acceleration."""
-    return Motion(breakpoints, series, name=name or about.family, description=about, error=_ERROR * abs(peak))
+def _create_motion(
+    breakpoints: Floats, series: Floats, peak: float, description: Description, name: str = ""
+) -> Motion:
+    """Create a motion from pieces with an error proportional to the peak acceleration."""
+    return Motion(
+        breakpoints, series, name=name or description.family, description=description, error=_RELATIVE_ERROR * abs(peak)
+    )
 
 
-def _sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
-    numbers = _checked(amplitude=amplitude, frequency=frequency, phase=phase)
+def _create_sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
+    parameters = _check_parameters(amplitude=amplitude, frequency=frequency, phase=phase)
     cycles = checks.positive(cycles, "number of cycles", InvalidMotion, "cycles")
-    if cycles > _MOST_CYCLES:
-        raise InvalidMotion(f"a sine may have at most {_MOST_CYCLES} {{}}, not {cycles:g}", "cycles", value=cycles)
-    amplitude, frequency, phase = numbers.values()
-    breakpoints = np.linspace(0.0, cycles / frequency, _whole_pieces(_PIECES_PER_CYCLE * cycles))
-    numbers = {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase}
-    about = Description(family, numbers, "amplitude sin(2 pi frequency t + phase) over the given cycles")
-    return _made(breakpoints, amplitude * _sine_pieces(breakpoints, frequency, phase), amplitude, about)
+    if cycles > _MAX_CYCLES:
+        raise InvalidMotion(f"a sine may have at most {_MAX_CYCLES} {{}}, not {cycles:g}", "cycles", value=cycles)
+    amplitude, frequency, phase = parameters.values()
+    breakpoints = np.linspace(0.0, cycles / frequency, _count_breakpoints(_PIECES_PER_CYCLE * cycles))
+    parameters = {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase}
+    description = Description(family, parameters, "amplitude sin(2 pi frequency t + phase) over the given cycles")
+    return _create_motion(
+        breakpoints, amplitude * _compute_sine_pieces(breakpoints, frequency, phase), amplitude, description
+    )
 
 
-def _lobe_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> list[float]:
+def _expand_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> list[float]:
     if np.ndim(amplitude) > 1:
         raise InvalidMotion("the amplitudes of the lobes must be one number or a flat sequence of numbers")
-    each = np.atleast_1d(np.asarray(amplitude, dtype=object))
-    given = [checks.finite(value, "amplitude of a lobe", InvalidMotion) for value in each]
-    count = None if lobes is None else checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * _MOST_CYCLES)
+    values = np.atleast_1d(np.asarray(amplitude, dtype=object))
+    amplitudes = [checks.finite(value, "amplitude of a lobe", InvalidMotion) for value in values]
+    count = None if lobes is None else checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * _MAX_CYCLES)
     if np.ndim(amplitude) == 0 and count is not None:
-        return given * count
-    if np.ndim(amplitude) == 0 or not given or count not in (None, len(given)):
+        return amplitudes * count
+    if np.ndim(amplitude) == 0 or not amplitudes or count not in (None, len(amplitudes)):
         raise InvalidMotion(
             "give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe"
         )
-    return given
+    return amplitudes
 
 
 def ricker(
@@ -345,27 +351,29 @@ def ricker(
     >>> round(pulse.pga, 12), abs(pulse.velocity(pulse.duration)) < 1e-15
     (2.0, True)
     """
-    amplitude, frequency = _checked(amplitude=amplitude, frequency=frequency).values()
+    amplitude, frequency = _check_parameters(amplitude=amplitude, frequency=frequency).values()
     kinds = ("symmetric", "antisymmetric")
     symmetric = checks.one_of(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
     rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
-    longest = 2.0 * (9.1 if symmetric else 9.3) / rate  # limit at 1e-16 of the peak
-    length = longest if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")
-    if length > longest:
-        raise InvalidMotion(f"a Ricker pulse of {frequency:.6g} Hz lasts only {longest:.6g} s: give no longer duration")
-    breakpoints = np.linspace(0.0, length, _whole_pieces(rate * length / _GAUSSIAN_PIECE))
-    series = -_gaussian_derivative(2 if symmetric else 3, _middles(breakpoints) - 0.5 * length, rate)
+    limit = 2.0 * (9.1 if symmetric else 9.3) / rate  # limit at 1e-16 of the peak
+    span = limit if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")
+    if span > limit:
+        raise InvalidMotion(f"a Ricker pulse of {frequency:.6g} Hz lasts only {limit:.6g} s: give no longer duration")
+    breakpoints = np.linspace(0.0, span, _count_breakpoints(rate * span / _GAUSSIAN_PIECE_LENGTH))
+    series = -_compute_gaussian_series(2 if symmetric else 3, _compute_midpoints(breakpoints) - 0.5 * span, rate)
     # (x^2 - 3) x exp(-x^2 / 2) is stationary at x^4 - 6 x^2 + 3 = 0.
-    squared = 3.0 - math.sqrt(6.0)
-    peak = 1.0 if symmetric else (3.0 - squared) * math.sqrt(squared) * math.exp(-0.5 * squared)
+    x_squared = 3.0 - math.sqrt(6.0)
+    peak = 1.0 if symmetric else (3.0 - x_squared) * math.sqrt(x_squared) * math.exp(-0.5 * x_squared)
     formula = (
         "amplitude (1 - x^2) exp(-x^2/2), x = sqrt(2) pi frequency (t - duration/2)"
         if symmetric
         else "(amplitude/1.3801) (x^2 - 3) x exp(-x^2/2), x = 2 pi frequency (t - duration/2)/sqrt(3)"
     )
-    numbers = {"amplitude": amplitude, "frequency": frequency, "duration": length}
-    about = Description(f"{kind} Ricker", numbers, formula)
-    return _made(breakpoints, _about_starts(breakpoints, series * (amplitude / peak)), amplitude, about)
+    parameters = {"amplitude": amplitude, "frequency": frequency, "duration": span}
+    description = Description(f"{kind} Ricker", parameters, formula)
+    return _create_motion(
+        breakpoints, _shift_to_starts(breakpoints, series * (amplitude / peak)), amplitude, description
+    )
 
 
 def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float, gamma: float) -> Motion:
@@ -409,32 +417,32 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
     >>> pulse.duration, round(pulse.pgv, 12)
     (4.0, 0.8)
     """
-    numbers = _checked(amplitude=amplitude, frequency=frequency, phase=phase)
-    amplitude, frequency, phase = numbers.values()
+    parameters = _check_parameters(amplitude=amplitude, frequency=frequency, phase=phase)
+    amplitude, frequency, phase = parameters.values()
     gamma = checks.positive(gamma, "gamma", InvalidMotion, "cycles")
-    if not 1.0 <= gamma <= _MOST_CYCLES:
-        sentence = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MOST_CYCLES}, not {gamma}"
+    if not 1.0 <= gamma <= _MAX_CYCLES:
+        sentence = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MAX_CYCLES}, not {gamma}"
         raise InvalidMotion(sentence, "gamma", value=gamma)
-    breakpoints = np.linspace(0.0, gamma / frequency, _whole_pieces(_PIECES_PER_CYCLE * (gamma + 1.0)))
-    turns, rest = exact_product(frequency, _middles(breakpoints))
-    carrier = _sine_and_cosine(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
-    quotient, quotient_rest = exact_quotient(turns, rest, gamma)
-    envelope = _sine_and_cosine(quotient, quotient_rest - 0.5, 0.0)
+    breakpoints = np.linspace(0.0, gamma / frequency, _count_breakpoints(_PIECES_PER_CYCLE * (gamma + 1.0)))
+    turns, rest = multiply_exactly(frequency, _compute_midpoints(breakpoints))
+    carrier = _compute_angle(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
+    quotient, quotient_rest = divide_exactly(turns, rest, gamma)
+    envelope = _compute_angle(quotient, quotient_rest - 0.5, 0.0)
     # The product of cosines is the sum of three with a half, a quarter and a quarter of the amplitude.
     rate, shift = 2.0 * math.pi * frequency, 1.0 / gamma
     series = (
-        0.5 * _sine_series(carrier, rate)
-        + 0.25 * (1.0 + shift) * _sine_series(_sum_of_angles(carrier, envelope, 1.0), rate * (1.0 + shift))
-        + 0.25 * (1.0 - shift) * _sine_series(_sum_of_angles(carrier, envelope, -1.0), rate * (1.0 - shift))
+        0.5 * _compute_sine_series(carrier, rate)
+        + 0.25 * (1.0 + shift) * _compute_sine_series(_add_angles(carrier, envelope, 1.0), rate * (1.0 + shift))
+        + 0.25 * (1.0 - shift) * _compute_sine_series(_add_angles(carrier, envelope, -1.0), rate * (1.0 - shift))
     )
     peak = rate * amplitude
-    about = Description(
+    description = Description(
         "Mavroeidis-Papageorgiou",
-        numbers | {"gamma": gamma},
+        parameters | {"gamma": gamma},
         "derivative of amplitude/2 [1 + cos(2 pi frequency s/gamma)] cos(2 pi frequency s + phase), "
         "s = t - gamma/(2 frequency); amplitude is a velocity, m/s",
     )
-    return _made(breakpoints, _about_starts(breakpoints, -peak * series), peak, about)
+    return _create_motion(breakpoints, _shift_to_starts(breakpoints, -peak * series), peak, description)
 
 
 class _Angle(NamedTuple):
@@ -444,60 +452,60 @@ class _Angle(NamedTuple):
     cosine: Floats
 
 
-def _sine_and_cosine(turns: Floats, rest: Floats, phase: float) -> _Angle:
-    """Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle."""
-    within = (turns - np.rint(turns)) + rest
-    quarter = np.rint(4.0 * within)
-    turned = _Angle(*piecewise.from_quadrant(quarter, 2.0 * np.pi * (within - 0.25 * quarter)))
-    return _sum_of_angles(turned, _Angle(np.sin(phase), np.cos(phase)), 1.0)
+def _compute_angle(turns: Floats, rest: Floats, phase: float) -> _Angle:
+    """Compute ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle."""
+    fraction = (turns - np.rint(turns)) + rest
+    quarters = np.rint(4.0 * fraction)
+    angle = _Angle(*piecewise.sine_cosine_from_quarters(quarters, 2.0 * np.pi * (fraction - 0.25 * quarters)))
+    return _add_angles(angle, _Angle(np.sin(phase), np.cos(phase)), 1.0)
 
 
-def _sum_of_angles(one: _Angle, other: _Angle, sign: float) -> _Angle:
-    """Sum of two angles, or their difference for sign -1."""
+def _add_angles(first: _Angle, second: _Angle, sign: float) -> _Angle:
+    """Add two angles, or subtract them for sign -1."""
     return _Angle(
-        one.sine * other.cosine + sign * one.cosine * other.sine,
-        one.cosine * other.cosine - sign * one.sine * other.sine,
+        first.sine * second.cosine + sign * first.cosine * second.sine,
+        first.cosine * second.cosine - sign * first.sine * second.sine,
     )
 
 
-def _whole_pieces(pieces: float) -> int:
+def _count_breakpoints(pieces: float) -> int:
     """Return the number of breakpoints of at least `pieces` equal pieces."""
     return math.ceil(pieces - 1e-9) + 1
 
 
-def _middles(breakpoints: Floats) -> Floats:
-    """Midpoint of each piece, s."""
+def _compute_midpoints(breakpoints: Floats) -> Floats:
+    """Compute the midpoint of each piece, s."""
     return breakpoints[:-1] + 0.5 * np.diff(breakpoints)
 
 
-def _about_starts(breakpoints: Floats, about_middles: Floats) -> Floats:
+def _shift_to_starts(breakpoints: Floats, midpoint_series: Floats) -> Floats:
     """Convert coefficients about the middle of each piece to coefficients about its start."""
-    return piecewise.moved(about_middles, breakpoints[:-1] - _middles(breakpoints))
+    return piecewise.shift_origin(midpoint_series, breakpoints[:-1] - _compute_midpoints(breakpoints))
 
 
-def _sine_pieces(breakpoints: Floats, frequency: float, phase: float) -> Floats:
-    """Coefficients of ``sin(2 pi frequency t + phase)`` on each piece."""
-    turns, rest = exact_product(frequency, _middles(breakpoints))
-    angle = _sine_and_cosine(turns, rest, phase)
-    return _about_starts(breakpoints, _sine_series(angle, 2.0 * math.pi * frequency))
+def _compute_sine_pieces(breakpoints: Floats, frequency: float, phase: float) -> Floats:
+    """Compute the coefficients of ``sin(2 pi frequency t + phase)`` on each piece."""
+    turns, rest = multiply_exactly(frequency, _compute_midpoints(breakpoints))
+    angle = _compute_angle(turns, rest, phase)
+    return _shift_to_starts(breakpoints, _compute_sine_series(angle, 2.0 * math.pi * frequency))
 
 
-def _sine_series(angle: _Angle, rate: float) -> Floats:
-    """Taylor coefficients of ``sin(angle + rate t)`` about ``t = 0``; shape (angles, degree + 1)."""
+def _compute_sine_series(angle: _Angle, rate: float) -> Floats:
+    """Compute the Taylor coefficients of ``sin(angle + rate t)`` about ``t = 0``, shape (angles, degree + 1)."""
     powers = np.arange(_SINE_DEGREE + 1)
     derivatives = np.column_stack([angle.sine, angle.cosine, -angle.sine, -angle.cosine])[:, powers % 4]
-    return derivatives * _scaled_powers(rate, powers)
+    return derivatives * _compute_taylor_factors(rate, powers)
 
 
-def _gaussian_derivative(order: int, times: Floats, rate: float) -> Floats:
-    """Taylor coefficients in t of ``(-1)^n He_n(x) exp(-x^2/2)``, ``x = rate t``, n the order, about each time."""
+def _compute_gaussian_series(order: int, times: Floats, rate: float) -> Floats:
+    """Compute Taylor coefficients in t of ``(-1)^n He_n(x) exp(-x^2/2)``, ``x = rate t``, n the order."""
     x = rate * times
     powers = np.arange(_GAUSSIAN_DEGREE + 1)
     hermite = hermite_e.hermevander(x, order + _GAUSSIAN_DEGREE)[:, order:]
     derivatives = hermite * np.exp(-0.5 * x * x)[:, np.newaxis]
-    return (-1.0) ** (order + powers) * derivatives * _scaled_powers(rate, powers)
+    return (-1.0) ** (order + powers) * derivatives * _compute_taylor_factors(rate, powers)
 
 
-def _scaled_powers(rate: float, powers: NDArray[np.int_]) -> Floats:
+def _compute_taylor_factors(rate: float, powers: NDArray[np.int_]) -> Floats:
     """Return ``rate**n / n!``."""
     return rate ** powers.astype(np.float64) / np.array([math.factorial(n) for n in powers], dtype=np.float64)

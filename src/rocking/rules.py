@@ -26,7 +26,7 @@ from rocking.core.tables import counted, range_text
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.records.named import Motions, motions_by_name, several_motions
+from rocking.records.named import Motions, index_motions, list_motions
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
@@ -121,7 +121,7 @@ def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
     def rule_of(comparison: Comparison) -> Rule:
         @wraps(comparison, assigned=("__module__", "__name__", "__qualname__"))
         def rule(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
-            demand, capacity = np.broadcast_arrays(*comparison(_free(blocks), several_motions([motion])[0]))
+            demand, capacity = np.broadcast_arrays(*comparison(_free(blocks), list_motions([motion])[0]))
             weaker = np.arange(len(demand)), np.argmax(demand / capacity, axis=1)
             return Rating(name, demand[weaker], capacity[weaker], unit)
 
@@ -452,7 +452,7 @@ def check(
     0.90 0.90 0.71 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
     0.93 0.93 0.64 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
     """
-    named_motions = motions_by_name(motions)
+    named_motions = index_motions(motions)
     names = None if rules is None else checks.several(rules, "rules", InvalidOption)
     # Raise errors before the simulations.
     values_of([*named_motions.values()], Measure("pga"))

@@ -131,7 +131,7 @@ def read_record(name: str, content: bytes, given: dict[str, Any]) -> list[Any]:
     """Read a record as `rocking.read` does, and all channels as motions."""
     stream = io.BytesIO(content)
     stream.name = name
-    found = formats.content(stream, Request.checked(given.get("dt"), given.get("units")))[1]
+    found = formats.read_content(stream, Request.create(given.get("dt"), given.get("units")))[1]
     for each in found:
         each.motion()
     return found
@@ -157,14 +157,14 @@ def read_other(name: str, content: bytes) -> Any:
 def judge(part: int) -> Found:
     """Judge the truncations and the damaged files of a part."""
     found, rng = Found(parts=1), random.Random(f"reading {part}")
-    installed, through_obspy.installed = through_obspy.installed, lambda: False
+    installed, through_obspy.is_obspy_installed = through_obspy.is_obspy_installed, lambda: False
     try:
         for number, (name, content) in enumerate(_cases(part, rng)):
             _judge_case(
                 found, rng, f"{name}, case {number} of part {part}", name, content, traced=number % _TRACED == 0
             )
     finally:
-        through_obspy.installed = installed
+        through_obspy.is_obspy_installed = installed
     return found
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking.core.arrays import Floats
-from rocking.motion.motion import exceedances
+from rocking.motion.motion import find_exceedances
 
 GRAVITY = 9.80665
 ULP = 2.0**-52
@@ -442,9 +442,9 @@ def _completes(response: rocking.Response) -> bool:
         return False
     plus, minus = response.block.uplift_thresholds(response.model)
     touching = (1.0 - TOUCH) * plus, (1.0 - TOUCH) * minus
-    starts = exceedances(response.motion, (plus, minus), response.block.gravity)[:, 0]
+    starts = find_exceedances(response.motion, (plus, minus), response.block.gravity)[:, 0]
     # Thresholds are touched up to a share of themselves whatever the weight, also where there is none.
-    stretches = exceedances(response.motion, touching, (1.0 - TOUCH) * response.block.gravity)[:, 0]
+    stretches = find_exceedances(response.motion, touching, (1.0 - TOUCH) * response.block.gravity)[:, 0]
     return len(np.unique(np.searchsorted(stretches, starts[starts < rests[0]], side="right"))) == 1
 
 

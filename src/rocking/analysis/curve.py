@@ -22,7 +22,7 @@ from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.tables import within
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.measures import DAMPING
-from rocking.motion.scaling import Measure, intensities
+from rocking.motion.scaling import Measure, check_intensities
 
 if TYPE_CHECKING:
     from rocking.plot.curves import FragilityLine
@@ -136,7 +136,7 @@ class FragilityCurve:
 
     def probability(self, intensity: ArrayLike) -> Floats:
         """Compute the fitted probability at intensities >= 0 (SI units or a block's own), with their shape."""
-        at = intensities(intensity)
+        at = check_intensities(intensity)
         return as_asked(probabilities(self.fitted, _logarithm(at).ravel())[0].reshape(at.shape))
 
     def intensity_of(self, probability: float) -> float:
@@ -166,7 +166,7 @@ class FragilityCurve:
         """Compute the lower and upper end of the pointwise confidence band of `probability`."""
         from scipy.special import ndtr
 
-        at = intensities(intensity)
+        at = check_intensities(intensity)
         z = _logarithm(at).ravel()
         ends = extremes(self.region, lambda fits: normal_scores(fits, z))
         low, high = (as_asked(np.asarray(ndtr(end)).reshape(at.shape)) for end in ends)

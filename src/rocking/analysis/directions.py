@@ -22,9 +22,9 @@ from rocking.engine.tasks import missing_text
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
-from rocking.records.named import several_motions
+from rocking.records.named import list_motions
 from rocking.simulation.ensemble import Scales, simulate_many
-from rocking.solid.rose import checked_azimuths
+from rocking.solid.rose import check_azimuths
 from rocking.solid.solid import Solid
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def response_rose(
     if not isinstance(solid, Solid):
         raise InvalidBlock(f"a Solid is needed, not a {type(solid).__name__}: make one with rocking.Solid.from_mesh")
     named = _named_pairs(pairs)
-    at = np.arange(0.0, 180.0, 15.0) if azimuths is None else checked_azimuths(azimuths)
+    at = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
     scales = Scales.from_levels(levels, measure)
     blocks = [solid.block(azimuth, restitution=restitution) for azimuth in at]
     factors = np.array([_factors(scales, pair) for pair in named.values()])
@@ -239,7 +239,7 @@ class ResponseRose(DatasetResult):
 def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
     """Return pairs by name, or raise an error if one is not a pair of motions."""
     given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.several(pairs, "pairs", InvalidOption)
-    found = [several_motions(pair) for pair in given if not isinstance(pair, Motion)]
+    found = [list_motions(pair) for pair in given if not isinstance(pair, Motion)]
     if not found or len(found) < len(given) or any(len(components) != 2 for components in found):
         raise InvalidOption(
             "{} must hold the two horizontal components of each place, as [(first, second)]", "pairs", value=pairs

@@ -30,7 +30,7 @@ from rocking.core.tables import as_written, counted, text_table
 from rocking.engine.problem import bodies_of, slenderness_of
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
-from rocking.records.named import Motions, several_motions
+from rocking.records.named import Motions, list_motions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,7 +104,7 @@ def compare_measures(
     >>> [f"{name} {beta:.2f}" for name, beta in zip(found.data.measure.values, found.data.dispersion.values)]
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
     """
-    many, shaken = bodies_of(blocks), several_motions(motions)
+    many, shaken = bodies_of(blocks), list_motions(motions)
     slenderness_of(many)  # raise errors before the simulations
     shares = normalised_weights(weights, len(many))
     if len(shaken) < 2:

@@ -54,7 +54,7 @@ from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup, missing_text
 from rocking.errors import InvalidOption, Message, Unfitted
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.records.named import Motions, several_motions
+from rocking.records.named import Motions, list_motions
 from rocking.simulation.ensemble import SIGNS, Polarity, simulate_many
 
 if TYPE_CHECKING:
@@ -403,7 +403,7 @@ def fragility(
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
         raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
-    shaken = several_motions(motions)
+    shaken = list_motions(motions)
     values, together, units = values_of(shaken, how), clusters_of(shaken, clusters), units_of(many, how, model)
     options: dict[str, Any] = {"chattering": chattering}
     options["polarity"] = "+" if mirrored else polarity

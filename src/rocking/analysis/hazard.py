@@ -19,7 +19,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Result
 from rocking.core.tables import csv_rows, text_table
 from rocking.errors import InvalidOption
-from rocking.motion.scaling import IntensityName, Measure, intensities
+from rocking.motion.scaling import IntensityName, Measure, check_intensities
 
 if TYPE_CHECKING:
     from rocking.plot.curves import HazardLine
@@ -157,7 +157,7 @@ class HazardCurve(Result):
 
         The curve is extrapolated below its first and above its last point.
         """
-        at = intensities(intensity)
+        at = check_intensities(intensity)
         exponents, factors = powers(self)
         segment = np.clip(np.searchsorted(self.intensity, at, side="right") - 1, 0, len(self.rate) - 2)
         with np.errstate(divide="ignore", over="ignore"):

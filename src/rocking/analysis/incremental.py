@@ -33,9 +33,9 @@ from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thres
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, missing_text, simulate_each
 from rocking.errors import InvalidOption
-from rocking.motion.motion import Motion, lifting_factors
+from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.records.named import Motions, one_motion, several_motions
+from rocking.records.named import Motions, check_motion, list_motions
 from rocking.response import Gradient, Response, gradient
 from rocking.simulation.simulate import simulate
 
@@ -116,7 +116,7 @@ def incremental_dynamic_analysis(
     >>> incremental_dynamic_analysis(block, pulse, measure="pga_ratio").data.band_start.values.round(4).tolist()
     [2.9855, 7.2759]
     """
-    many, how, shaken = bodies_of(blocks), Measure.parse(measure), several_motions(motions)
+    many, how, shaken = bodies_of(blocks), Measure.parse(measure), list_motions(motions)
     slenderness = slenderness_of(many)
     values = values_of(shaken, how)
     if never_rests(many):
@@ -285,7 +285,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
 def _lowest_uplift(blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
     """Return the lowest level at which a motion, scaled with its vertical component, lifts a block."""
     thresholds, own = thresholds_of(blocks, model)
-    factors = np.array([lifting_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
+    factors = np.array([compute_uplift_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
     lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
     if math.isinf(lowest):
         raise InvalidOption("no motion lifts a block at any level: none pushes towards a side as its weight allows")
@@ -469,7 +469,7 @@ def critical_scale(
     >>> f"{rocking.critical_scale(block, record, (2.0, 6.0)).scale:.6f}"
     '3.256134'
     """
-    if one_motion(motion) is None:
+    if check_motion(motion) is None:
         raise InvalidOption("there is no {} to scale: give one", "motion")
     low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
     checks.positive(low, "bounds", InvalidOption)

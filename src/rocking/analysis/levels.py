@@ -21,7 +21,7 @@ from rocking.engine.problem import bodies_of
 from rocking.engine.tasks import Setup, Task, missing_text, simulate_tasks
 from rocking.errors import InvalidOption, Message
 from rocking.inputs.notes import is_multiple
-from rocking.motion.description import Origin, labelled
+from rocking.motion.description import Origin, compose_label
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.response import COUNT, RELATIVE, factors_near, percent
@@ -58,7 +58,7 @@ def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
     histories = data.histories if with_history else [""] * len(names)
     return [
-        labelled(str(name), done.split("; ") if done else [], str(vertical))
+        compose_label(str(name), done.split("; ") if done else [], str(vertical))
         for name, done, vertical in zip(names, histories, verticals, strict=True)
     ]
 

@@ -25,7 +25,7 @@ from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.inputs.pulses import pulse_family
 from rocking.motion.motion import Motion
-from rocking.records.named import one_motion
+from rocking.records.named import check_motion
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -371,7 +371,7 @@ def _pulse_function(
 
 
 def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
-    motion = one_motion(pulse(amplitude, frequency))
+    motion = check_motion(pulse(amplitude, frequency))
     if motion is None:
         raise InvalidMotion(
             f"the pulse of amplitude {amplitude:g} and frequency {frequency:g} is None; return a Motion"

@@ -23,7 +23,7 @@ from rocking.engine.problem import bodies_of
 from rocking.engine.schemes import ChatteringScheme
 from rocking.engine.tasks import missing_text
 from rocking.errors import InvalidOption
-from rocking.records.named import Motions, several_motions
+from rocking.records.named import Motions, list_motions
 from rocking.simulation.ensemble import simulate_many
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def rocking_spectrum(
     each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
     shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in each])
     options: dict[str, Any] = {"model": model, "chattering": chattering}
-    gathered, shaken = bodies_of(blocks), several_motions(motions)
+    gathered, shaken = bodies_of(blocks), list_motions(motions)
     if not isinstance(gathered, Blocks):
         raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {gathered.kind}")
     if (axes := gathered.axes) is not None and p is None and size is None and weights is None:

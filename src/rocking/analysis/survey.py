@@ -18,7 +18,7 @@ from rocking.core.tables import Column, columns_with_skipped, counted, decimal, 
 from rocking.engine.problem import one_body
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.records.named import Motions, motions_by_name, names_of
+from rocking.records.named import Motions, index_motions, list_motion_names
 from rocking.response import PRECISION, Response, in_brief, known_ratio, ratio_text, steps_within
 from rocking.response.mechanics import friction_coefficient
 from rocking.simulation.ensemble import body_coordinates, verticals_of
@@ -285,7 +285,7 @@ def survey(
     >>> len(found.responses)
     1
     """
-    named_motions = motions_by_name(motions)
+    named_motions = index_motions(motions)
     if not one_body(block).coordinate.limit:
         raise InvalidOption(f"a survey is of a block, which has a balance, not of a {type(block).__name__}")
     if friction is not None:
@@ -312,7 +312,7 @@ def folder_names(records: Sequence[str]) -> list[str]:
 
 def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
     """Return the name of each record as requested, and of its motion as in other analyses."""
-    names, verticals = names_of(motions), verticals_of(motions)
+    names, verticals = list_motion_names(motions), verticals_of(motions)
     return [
         {"record": record, "motion": names[k], **{name: column[1][k] for name, column in verticals.items()}}
         for k, record in enumerate(records)

@@ -34,7 +34,7 @@ from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, counted, text_table
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.records.named import Motions, distinct_motions, several_motions
+from rocking.records.named import Motions, find_distinct_motions, list_motions
 from rocking.simulation.ensemble import simulate_many
 
 if TYPE_CHECKING:
@@ -381,14 +381,14 @@ def calibrate(
     >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
     True
     """
-    tested = several_motions(motions)
+    tested = list_motions(motions)
     observed = checked_outcomes(overturned, len(tested))
     space = Space.from_bounds(p, alpha, restitution, two_sided=checks.flag(two_sided, "two_sided", InvalidOption))
     checks.share(outlier_probability, "outlier_probability", InvalidOption, below=0.5)
     checks.whole(candidates, "candidates", InvalidOption, 128)
     checks.whole(max_blocks, "max_blocks", InvalidOption, 1)
     rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
-    distinct, which = distinct_motions(tested)
+    distinct, which = find_distinct_motions(tested)
 
     def tried(points: Floats) -> NDArray[np.float32]:
         return np.take(overturned_under(space.blocks(points), distinct, model), which, axis=1)

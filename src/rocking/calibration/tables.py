@@ -22,7 +22,7 @@ from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.inputs.pulses import FAMILIES, named_pulse
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.records.named import is_there, named_motion, named_vertical
+from rocking.records.named import load_motion, load_vertical, path_exists
 
 _ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 
@@ -175,15 +175,15 @@ def _motion_of(table: Path, name: str, vertical: str, *, several: bool, **about:
     record = _beside(table, name)
     upwards = _beside(table, vertical) if vertical else None
     if record != name or name.partition(":")[0] not in FAMILIES:
-        return named_motion(record, vertical=upwards, **about, several=several)
+        return load_motion(record, vertical=upwards, **about, several=several)
     pulse = named_pulse(name)
-    return pulse if upwards is None else pulse.with_vertical(named_vertical(upwards, record, **about))
+    return pulse if upwards is None else pulse.with_vertical(load_vertical(upwards, record, **about))
 
 
 def _beside(table: Path, name: str) -> str:
     """Return the path of a file relative to the table's folder if it exists there."""
     beside = table.parent / name
-    return str(beside) if is_there(beside) else name
+    return str(beside) if path_exists(beside) else name
 
 
 def _finite(text: str) -> float:

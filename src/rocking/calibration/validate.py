@@ -23,7 +23,7 @@ from rocking.core.tables import Column, as_written, columns_with_skipped, counte
 from rocking.engine.problem import bodies_of, slenderness_of
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.records.named import distinct_motions, numbered, one_motion
+from rocking.records.named import check_motion, find_distinct_motions, make_names_unique
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,7 +67,7 @@ class ShakeTest:
     group: str = ""
 
     def __post_init__(self) -> None:
-        motion, fell = one_motion(self.motion), self.overturned
+        motion, fell = check_motion(self.motion), self.overturned
         if motion is None:
             raise InvalidMotion("a test needs the {} of what the specimen stood on, not None", "motion")
         for label in ("name", "group"):
@@ -324,7 +324,7 @@ def validate(
     rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
     if outlier_probability is not None:
         checks.within(outlier_probability, "outlier_probability", InvalidOption, 0.0, 0.5)
-    distinct, which = distinct_motions([test.motion for test in given])
+    distinct, which = find_distinct_motions([test.motion for test in given])
     observed = np.array([test.overturned for test in given], dtype=bool)
     clusters = levels.numbered(
         [("group", test.group) if test.group else ("motion", k) for test, k in zip(given, which, strict=True)]
@@ -353,7 +353,7 @@ def validate(
     term = miscalibration(probabilities, np.vstack([observed, outcomes]), places)
     # Summation order changes the last digits.
     larger = np.count_nonzero(term[1:] >= term[0] - 1e-9 * abs(term[0]))
-    rows = zip(numbered([test.name for test in given]), given, probabilities.tolist(), strict=True)
+    rows = zip(make_names_unique([test.name for test in given]), given, probabilities.tolist(), strict=True)
     return ModelValidation(
         tests=tuple(JudgedTest(name, test.motion.name, test.overturned, chance) for name, test, chance in rows),
         brier=score_of((probabilities - observed) ** 2, observed, lambda share: share * (1.0 - share), clusters),

@@ -17,7 +17,7 @@ from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.records.named import one_motion
+from rocking.records.named import check_motion
 
 
 class SimulationInput(NamedTuple):
@@ -188,7 +188,7 @@ def record(
     >>> record(rocking.pulses.one_sine(1.0, 1.0), 0.2, 0.9)(1.5, 2.0).block.p
     2.0
     """
-    if one_motion(motion) is None:
+    if check_motion(motion) is None:
         raise InvalidMotion("a Motion is needed, as rocking.pulses.one_sine(1, 1), not None")
 
     def case(a: float, p: float) -> SimulationInput:

@@ -25,7 +25,7 @@ from rocking.core.threads import in_threads
 from rocking.engine.tasks import OUTCOME, complete_chattering
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.motion.motion import Motion, exceedances
+from rocking.motion.motion import Motion, find_exceedances
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
@@ -268,9 +268,9 @@ def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: fl
     # Four ulp, because a peak that was meant to equal the threshold may exceed it.
     plus, minus = (threshold * (1.0 + 2.0**-50) for threshold in thresholds)
     lifts = motion.vertical is None and motion.pga > min(plus, minus)
-    if not (lifts or len(exceedances(motion, (plus, minus), gravity))):
+    if not (lifts or len(find_exceedances(motion, (plus, minus), gravity))):
         return None
-    starts = exceedances(motion, thresholds, gravity)[:, 0]
+    starts = find_exceedances(motion, thresholds, gravity)[:, 0]
     return float(starts[-1]) if starts.size else None
 
 
@@ -450,9 +450,8 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     if response.motion is None:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     episodes["ground"] = response.motion.acceleration(proven["end"])
-    beyond = exceedances(
-        response.motion, one_block(response.block).uplift_thresholds(response.model), one_block(response.block).gravity
-    )
+    block = one_block(response.block)
+    beyond = find_exceedances(response.motion, block.uplift_thresholds(response.model), block.gravity)
     if not len(beyond) or beyond[0, 0] >= response.duration:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)

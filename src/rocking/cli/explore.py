@@ -69,7 +69,7 @@ def _study(folder: Path) -> StudyView:
 def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
     """Return the texts of the initial motion."""
     from rocking.explorer.motions import is_pulse, pulse_of
-    from rocking.records.formats.source import unreadable
+    from rocking.records.formats.source import unreadable_file_error
 
     if is_pulse(motion):
         pulse_of(motion)
@@ -80,6 +80,6 @@ def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
     try:
         key = explorer.uploads.add_file(file.name, file.read_bytes())
     except OSError as error:
-        raise unreadable(motion, error) from None
+        raise unreadable_file_error(motion, error) from None
     explorer.uploads.contents(key)
     return {"motion": f"file:{key}"}

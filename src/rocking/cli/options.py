@@ -24,7 +24,7 @@ from rocking.inputs.quantities import Quantity, acceleration, number, scaling, v
 from rocking.inputs.texts import option_of
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.records.named import expanded, named_motion, named_vertical
+from rocking.records.named import expand_record_names, load_motion, load_vertical
 
 if TYPE_CHECKING:
     from rocking.block import Block
@@ -212,9 +212,9 @@ class FileOptions(InputOptions):
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
-                motion = motion.with_vertical(named_vertical(vertical, name, **self.about()))
+                motion = motion.with_vertical(load_vertical(vertical, name, **self.about()))
         else:
-            motion = named_motion(name, **self.about(), vertical=vertical, several=several)
+            motion = load_motion(name, **self.about(), vertical=vertical, several=several)
         notes = motion_notes(motion)
         for sentence in (*notes, *vertical_notes(motion)):
             note(f"{name}: {sentence}")
@@ -294,7 +294,7 @@ class _RecordOptions(FileOptions):
 
     def read_all(self, names: Sequence[str]) -> ReadRecords:
         """Return the motions by name."""
-        records, pulses = expanded(names), self.given().get("pulse", ())
+        records, pulses = expand_record_names(names), self.given().get("pulse", ())
         if not records and not pulses:
             raise InvalidOption(
                 "give one record or more: files, folders, or names of shipped records (see rocking records), or {}",

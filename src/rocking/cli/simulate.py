@@ -35,9 +35,9 @@ from rocking.records.named import (
     STANDARD_INPUT,
     Contents,
     contents,
-    expanded,
+    expand_record_names,
     is_shipped,
-    refuse_what_is_known,
+    reject_redundant_arguments,
     shipped,
 )
 from rocking.response import PRECISION, Response, steps_within
@@ -173,7 +173,7 @@ def records(
 
     For several files, those that cannot be read are listed with the reason, and the exit status is 2.
     """
-    files = expanded(names)
+    files = expand_record_names(names)
     several = len(files) > 1
     found, refused = read_each(files, lambda name: _contents(name, file, several=several), keep_going=several)
     shown = [*found.values()] if files else [shipped()]
@@ -190,7 +190,7 @@ def records(
 def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
     if is_shipped(name):
         if not several:
-            refuse_what_is_known(name, **file.about())
+            reject_redundant_arguments(name, **file.about())
         return shipped(name)
     source = sys.stdin.buffer if name == STANDARD_INPUT else name
     found = contents(source, **file.about(), several=several)

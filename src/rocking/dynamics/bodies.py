@@ -25,7 +25,7 @@ from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 from rocking.motion.motion import Motion
-from rocking.records.named import one_motion
+from rocking.records.named import check_motion
 from rocking.simulation.simulate import response_to
 
 
@@ -482,7 +482,7 @@ def simulate(
     >>> f"{response.events['time'][0]:.12f}"
     '1.800000000000'
     """
-    body, motion = _one_body(body), one_motion(motion)
+    body, motion = _one_body(body), check_motion(motion)
     until = _duration(body, motion, duration)
     at = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
     return in_positions(response_to(body, motion, "linear", chattering, until, (at, initial_velocity)))

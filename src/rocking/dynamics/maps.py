@@ -26,7 +26,7 @@ from rocking.kernels.periodic import TRAP, PeriodicProblem, build_step_rows, dif
 from rocking.kernels.periodic import Fate as Fate
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.records.named import one_motion
+from rocking.records.named import check_motion
 
 #: Ground acceleration, g, that lifts any body; it follows the second period.
 _BEYOND_ALL: Final = 1e12
@@ -42,7 +42,7 @@ class PeriodicForcing:
     """Body under periodic motion, in the form that kernels accept."""
 
     def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | ChatteringScheme) -> None:
-        given = one_motion(motion)
+        given = check_motion(motion)
         if given is None:
             raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")
         if given.vertical is not None:

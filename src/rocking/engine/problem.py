@@ -51,7 +51,7 @@ def step_of(motion: Motion) -> float | None:
     """Return the length of the pieces of `ground_of` if equally long and linear in all components, else None."""
     if motion.vertical is None:
         return motion.dt
-    steps = [piecewise.even_step(pieces) for pieces in _joined(motion)]
+    steps = [piecewise.find_even_step(pieces) for pieces in _joined(motion)]
     return None if None in steps else steps[0]
 
 
@@ -199,7 +199,7 @@ def settings_of(
 def _joined(motion: Motion) -> tuple[piecewise.Pieces, piecewise.Pieces]:
     """Return both components of a motion on the same pieces."""
     assert motion.vertical is not None
-    breakpoints, (pushes, lifts) = piecewise.together(motion, motion.vertical)
+    breakpoints, (pushes, lifts) = piecewise.align_pieces(motion, motion.vertical)
     return piecewise.Pieces(breakpoints, pushes), piecewise.Pieces(breakpoints, lifts)
 
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from rocking import errors
 from rocking.errors import InvalidBlock, RockingError
-from rocking.solid.mesh import Region, properties
-from rocking.solid.support import Sections, sections_of
+from rocking.solid.mesh import Region, compute_properties
+from rocking.solid.support import Sections, compute_sections
 
 if TYPE_CHECKING:
     from rocking.solid.mesh import Mesh
@@ -42,8 +42,8 @@ Made = tuple[dict[str, Any], Sections]
 def made_here(mesh: Mesh, options: Mapping[str, Any]) -> Made:
     """Read a mesh of up to `MOST_TRIANGLES` triangles with arguments of `rocking.Solid.from_mesh`."""
     given = {"density": None, "support": None, "tolerance": None, "up": None, "unit": "m", "turn": 0.0, **options}
-    made, surfaces = properties(mesh, **given, most=MOST_TRIANGLES)
-    return made, sections_of(surfaces)
+    made, surfaces = compute_properties(mesh, **given, max_faces=MOST_TRIANGLES)
+    return made, compute_sections(surfaces)
 
 
 def made_apart(name: str, data: bytes, options: Mapping[str, Any]) -> Made:

@@ -23,7 +23,7 @@ from rocking.explorer.parameters import ASSESSMENT, Texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import number
-from rocking.motion.motion import Motion, lifting_factors
+from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.response.mechanics import friction_coefficient
 from rocking.rules import overturning_velocity, rate
@@ -250,7 +250,7 @@ def _margin(case: Case) -> dict[str, Any] | None:
         )  # fmt: skip
         return np.asarray(table.overturned.values.ravel())
 
-    lifting = lifting_factors(motion, [case.block.uplift_thresholds(case.model)], case.block.gravity)[0]
+    lifting = compute_uplift_factors(motion, [case.block.uplift_thresholds(case.model)], case.block.gravity)[0]
     found: dict[str, Any] = {"factor": None, "pga": motion.pga}
     if math.isinf(lifting):
         return found

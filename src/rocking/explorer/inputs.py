@@ -21,7 +21,7 @@ from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, 
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.bodies import block_of, call_of
 from rocking.motion.motion import Motion
-from rocking.motion.piecewise import STRONGEST, TOO_STRONG
+from rocking.motion.piecewise import MAX_ACCELERATION, TOO_STRONG
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
@@ -124,7 +124,7 @@ def require_rest(restitutions: Iterable[float]) -> None:
 
 def require_possible(peak: float) -> None:
     """Reject a peak acceleration, m/s^2, that no motion can have, before the motions are created."""
-    if peak > STRONGEST:
+    if peak > MAX_ACCELERATION:
         raise InvalidMotion(TOO_STRONG)
 
 

@@ -17,8 +17,8 @@ from rocking.explorer.apart import made_apart, made_here
 from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.quantities import densities, number
 from rocking.solid import Rose, Solid
-from rocking.solid.solid import Plane, plane_of
-from rocking.solid.support import directions
+from rocking.solid.solid import Plane, compute_plane
+from rocking.solid.support import compute_directions
 
 if TYPE_CHECKING:
     from rocking.solid.support import Sections
@@ -58,13 +58,13 @@ class Body:
 
     def across(self, azimuth: float) -> Floats:
         """Return its outline seen along the axis perpendicular to an azimuth, from its centre of mass; shape (n, 6)."""
-        outline = self.sections.across(azimuth)
-        outline[:, 2:] -= float(self.solid.centre[:2] @ np.asarray(directions(azimuth)[0]))
+        outline = self.sections.compute_outline(azimuth)
+        outline[:, 2:] -= float(self.solid.centre[:2] @ np.asarray(compute_directions(azimuth)[0]))
         return outline
 
     def plane(self, azimuth: float) -> dict[str, Any]:
         """Describe the section in the plane of an azimuth: the rocking edges, m from its centre of mass."""
-        plane = plane_of(self.solid, azimuth)
+        plane = compute_plane(self.solid, azimuth)
         distance, low, high = (np.asarray(each).tolist() for each in plane.pivots)
         return {
             "name": self.solid.description,
@@ -107,7 +107,7 @@ def described(body: Body, azimuth: float) -> Payload:
 
 def pivots_of(body: Body, azimuth: float) -> tuple[tuple[float, float], float, float]:
     """Return the pivot distances, height of mass and radius of gyration of a body in a plane, m."""
-    plane: Plane = plane_of(body.solid, azimuth)
+    plane: Plane = compute_plane(body.solid, azimuth)
     plus, minus = plane.pivots.distance.tolist()
     return (plus, minus), plane.height, plane.gyration
 

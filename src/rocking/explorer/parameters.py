@@ -18,9 +18,9 @@ from rocking.explorer.payload import english
 from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
 from rocking.inputs.declared import SHAPES as ALL_SHAPES
 from rocking.inputs.pulses import FAMILIES
-from rocking.records.units import CHOICES
-from rocking.solid.mesh import SHIPPED
-from rocking.solid.mesh import UNITS as MESH_UNITS
+from rocking.records.units import UNIT_NAMES
+from rocking.solid.mesh import LENGTH_UNITS as MESH_UNITS
+from rocking.solid.mesh import SHIPPED_MESHES
 
 Texts = Mapping[str, str]
 
@@ -216,7 +216,7 @@ def specification() -> dict[str, Any]:
             name: {**pulse, "parameters": [parameter.described() for parameter in pulse["parameters"]]}
             for name, pulse in PULSES.items()
         },
-        "meshes": [*SHIPPED],
+        "meshes": [*SHIPPED_MESHES],
         "mesh_kinds": list(MESH_KINDS),
         "records": [
             {"name": name}
@@ -224,7 +224,7 @@ def specification() -> dict[str, Any]:
             for name in records.names()
         ],
         "mesh_units": list(MESH_UNITS),
-        "units": list(CHOICES),
+        "units": list(UNIT_NAMES),
         "models": ["nonlinear", "linear"],
         "treatments": list(_TREATMENTS),
         "quantities": list(QUANTITIES),

@@ -21,8 +21,8 @@ from rocking.motion.motion import Motion
 from rocking.records import formats
 from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request
-from rocking.records.units import CHOICES, find_unit
-from rocking.solid.mesh import SHIPPED
+from rocking.records.units import UNIT_NAMES, find_unit
+from rocking.solid.mesh import SHIPPED_MESHES
 
 V = TypeVar("V")
 
@@ -205,14 +205,15 @@ class UploadStore:
         upload = self.file(key)
         request = _request(dt, units, channel)
         return self._read.get(
-            (key, str(channel), str(dt), str(units)), lambda: _shown(upload, formats.chosen(upload.stream(), request))
+            (key, str(channel), str(dt), str(units)),
+            lambda: _shown(upload, formats.read_channel(upload.stream(), request)),
         )
 
     def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> Body:
         """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts of a case."""
         upload = self.file(name.removeprefix("file:"), "mesh") if name.startswith("file:") else None
         if upload is None:
-            checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED])
+            checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED_MESHES])
         given = options_of(texts, tolerance, gravity)
         key = name, upload.name if upload else "", json.dumps(given)
         found = self._bodies.get(key, lambda: read_body(name, upload, given))
@@ -230,7 +231,7 @@ class UploadStore:
         missing: list[str] = []
         while True:
             try:
-                identification, channels = formats.content(upload.stream(), _request(**given))
+                identification, channels = formats.read_content(upload.stream(), _request(**given))
                 break
             except (UnreadableRecord, InvalidMotion) as error:
                 name = error.argument
@@ -255,7 +256,7 @@ def _about(channel: Channel) -> dict[str, Any]:
 
 
 def _request(dt: float | None, units: str | None, channel: str | None = None) -> Request:
-    return replace(Request.checked(dt, units, channel), most=_MOST_SAMPLES)
+    return replace(Request.create(dt, units, channel), max_samples=_MOST_SAMPLES)
 
 
 def _shown(upload: Upload, channel: Channel) -> Motion:
@@ -272,7 +273,7 @@ def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
         return {"notes": list(motion_notes(motion)), "choices": {}, "measures": measures(motion)}
     choices: dict[str, list[tuple[str, dict[str, float]]]] = {}
     if "units" in missing:
-        units = {name: unit for name in CHOICES if (unit := find_unit(name)) is not None}
+        units = {name: unit for name in UNIT_NAMES if (unit := find_unit(name)) is not None}
         peaks = {name: motion.pga * unit.multiplier / unit.divisor for name, unit in units.items()}
         choices["units"] = [(name, {"peak": peak}) for name, peak in peaks.items()]
     if "dt" in missing:

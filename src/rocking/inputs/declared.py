@@ -11,7 +11,7 @@ from rocking.core.progress import note
 from rocking.errors import InvalidOption
 from rocking.inputs import quantities
 from rocking.inputs.notes import level_notes
-from rocking.records.units import plain_spelling
+from rocking.records.units import normalise_spelling
 
 #: Reader of a number of each kind, and its SI unit.
 READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
@@ -132,7 +132,7 @@ class Input:
         if kind not in quantities.UNITS:
             return {}
         units = quantities.UNITS[kind]
-        shown = units[plain_spelling(self.suffix)]
+        shown = units[normalise_spelling(self.suffix)]
         return {name: unit.multiplier * shown.divisor / unit.divisor / shown.multiplier for name, unit in units.items()}
 
 

@@ -12,8 +12,8 @@ from rocking.block import Block, RestrainedBlock
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
-from rocking.motion.description import Origin, begins_later
-from rocking.motion.measures import significant_span
+from rocking.motion.description import Origin, compute_start_delay
+from rocking.motion.measures import find_significant_span
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
@@ -190,13 +190,13 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
 
 def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
     """Yield notes on components that seem to start at different times."""
-    if later := begins_later(motion.description, vertical.description, motion.dt):
+    if later := compute_start_delay(motion.description, vertical.description, motion.dt):
         yield (
             f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
             "horizontal one, but both are taken to start together: cut what comes first"
         )
         return
-    (start, end), (first, last) = (significant_span(each) for each in (motion, vertical))
+    (start, end), (first, last) = (find_significant_span(each) for each in (motion, vertical))
     if last < start or first > end:
         yield (
             f"the horizontal motion is strong from {start:.4g} s to {end:.4g} s, the vertical one from {first:.4g} s "

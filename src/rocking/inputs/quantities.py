@@ -14,7 +14,7 @@ from rocking.core.arrays import Floats
 from rocking.core.tables import decimal
 from rocking.errors import InvalidOption, literal
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.records.units import ACCELERATIONS, TIMES, Unit, plain_spelling
+from rocking.records.units import ACCELERATION_UNITS, TIME_UNITS, Unit, normalise_spelling
 
 #: Reader of one number: converts its text, with the name of its argument, to SI units.
 Quantity = Callable[[str, str], float]
@@ -32,7 +32,7 @@ _DEGREE: Final = Unit("deg", math.pi / 180.0, 1.0)
 
 def _units(*units: Unit, **spellings: str) -> dict[str, Unit]:
     """Return units by their plain spellings, with the unit of a number without one, and further spellings."""
-    known = {plain_spelling(unit.name): unit for unit in units}
+    known = {normalise_spelling(unit.name): unit for unit in units}
     return {"": _SI, **known, **{other: known[name] for name, others in spellings.items() for other in others.split()}}
 
 
@@ -52,11 +52,11 @@ UNITS: Final[Mapping[str, Mapping[str, Unit]]] = {
     "length": _LENGTHS,
     "position": _LENGTHS,
     "angle": _ANGLES,
-    "acceleration": {"": _SI, **ACCELERATIONS},
+    "acceleration": {"": _SI, **ACCELERATION_UNITS},
     "velocity": _VELOCITIES,
     "frequency": _units(_SI._replace(name="Hz"), Unit("rad/s", 0.5 / math.pi, 1.0)),
     "rate": _RATES,
-    "duration": {"": _SI, **{plain_spelling(each): unit for each, unit in TIMES.items()}},
+    "duration": {"": _SI, **{normalise_spelling(each): unit for each, unit in TIME_UNITS.items()}},
     "number": {"": _SI},
 }
 
@@ -74,7 +74,7 @@ def _reader(units: Mapping[str, Unit], wanted: str) -> Quantity:
 
     def read(text: str, name: str) -> float:
         value, spelling = _parts(text)
-        unit = units.get(plain_spelling(spelling))
+        unit = units.get(normalise_spelling(spelling))
         if value is None or unit is None:
             raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", name, value=text)
         return value * unit.multiplier / unit.divisor

@@ -11,8 +11,8 @@ from typing import Any, Final
 from rocking.core import checks
 from rocking.errors import InvalidMotion
 
-_DOWN: Final = re.compile(r"\s*(?:down|dwn|dn)\b", re.IGNORECASE)
-_SCALED: Final = re.compile(r"(scaled by \S+) to .*")
+_DOWNWARD_CHANNEL: Final = re.compile(r"\s*(?:down|dwn|dn)\b", re.IGNORECASE)
+_SCALED_TO_LEVEL: Final = re.compile(r"(scaled by \S+) to .*")
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Origin:
     @property
     def downwards(self) -> bool:
         """Whether the motion is positive downwards, by the name of its channel."""
-        return _DOWN.match(self.channel) is not None and not self.reversed
+        return _DOWNWARD_CHANNEL.match(self.channel) is not None and not self.reversed
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,8 @@ class Description:
     def __post_init__(self) -> None:
         checks.text(self.family, "family of a description", InvalidMotion)
         checks.text(self.text, "text of a description", InvalidMotion)
-        given = self.parameters.items()
-        numbers = {name: checks.number(value, f"{name} of a description", InvalidMotion) for name, value in given}
+        parameters = self.parameters.items()
+        numbers = {name: checks.number(value, f"{name} of a description", InvalidMotion) for name, value in parameters}
         object.__setattr__(self, "parameters", MappingProxyType(numbers))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -116,8 +116,8 @@ class Description:
         parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
         origin = self.origin
         if origin is not None and factor < 0.0:
-            turned = None if origin.azimuth is None else (origin.azimuth + 180.0) % 360.0
-            origin = replace(origin, azimuth=turned, reversed=not origin.reversed)
+            azimuth = None if origin.azimuth is None else (origin.azimuth + 180.0) % 360.0
+            origin = replace(origin, azimuth=azimuth, reversed=not origin.reversed)
         return replace(self, parameters=parameters, origin=origin)
 
     def changed(self, how: str) -> Description:
@@ -127,16 +127,16 @@ class Description:
         return replace(self, family=family, origin=origin)
 
 
-def begins_later(first: Description, second: Description, step: float | None) -> float:
+def compute_start_delay(first: Description, second: Description, step: float | None) -> float:
     """Return the delay of the second of two records, s, by the clock of their files."""
-    one, other = (each.origin or Origin() for each in (first, second))
-    if one.start is None or other.start is None or one.format != other.format:
+    first_origin, second_origin = (description.origin or Origin() for description in (first, second))
+    if first_origin.start is None or second_origin.start is None or first_origin.format != second_origin.format:
         return 0.0
-    later = other.start - one.start
-    return later if abs(later) > 0.5 * (step or 0.0) + 1e-6 else 0.0
+    delay = second_origin.start - first_origin.start
+    return delay if abs(delay) > 0.5 * (step or 0.0) + 1e-6 else 0.0
 
 
-def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
+def compose_label(name: str, history: Sequence[str], vertical: str = "") -> str:
     """Return the name of a motion and its vertical component with processing but without scaling."""
-    both = f"{name} with vertical {vertical}" if vertical else name
-    return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))
+    full_name = f"{name} with vertical {vertical}" if vertical else name
+    return ", ".join((full_name, *(_SCALED_TO_LEVEL.sub(r"\1", entry) for entry in history)))

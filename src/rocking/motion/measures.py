@@ -21,7 +21,7 @@ from rocking.motion import piecewise
 DAMPING: Final = 0.05
 
 
-def checked_damping(value: object, error: checks.Error) -> float:
+def check_damping(value: object, error: checks.Error) -> float:
     """Return a damping ratio, or raise `error`."""
     ratio = checks.number(value, "damping", error)
     if not 0.0 <= ratio < 1.0:
@@ -29,7 +29,7 @@ def checked_damping(value: object, error: checks.Error) -> float:
     return ratio
 
 
-class Measured:
+class MotionMeasures:
     """Kinematics and intensity measures of the horizontal component."""
 
     breakpoints: Floats
@@ -48,81 +48,81 @@ class Measured:
     @property
     def samples(self) -> Floats:
         """Accelerations at `times`, m/s^2, with the value after a jump."""
-        return piecewise.samples(self)[1]
+        return piecewise.sample_breakpoints(self)[1]
 
     @property
     def jumps(self) -> bool:
         """Whether the acceleration jumps between pieces, beyond rounding."""
-        return piecewise.jumps(self)
+        return piecewise.has_jumps(self)
 
     def _widths(self) -> Floats:
         return np.diff(self.breakpoints)
 
-    def _velocity(self) -> Floats:
-        """Coefficients of the ground velocity on each piece."""
-        return piecewise.antiderivative(self._widths(), self.coefficients)
+    def _compute_velocity(self) -> Floats:
+        """Compute the coefficients of the ground velocity on each piece."""
+        return piecewise.integrate_pieces(self._widths(), self.coefficients)
 
-    def _displacement(self) -> Floats:
-        """Coefficients of the ground displacement on each piece."""
-        return piecewise.antiderivative(self._widths(), self._velocity())
+    def _compute_displacement(self) -> Floats:
+        """Compute the coefficients of the ground displacement on each piece."""
+        return piecewise.integrate_pieces(self._widths(), self._compute_velocity())
 
     def acceleration(self, time: ArrayLike) -> Any:
         """Return the ground acceleration at times (s), m/s^2, shaped like `time` and zero outside the motion."""
-        at = checks.numbers(time, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, self.coefficients, at)
-        result = np.where((at < 0.0) | (at > self.duration), 0.0, result)
+        times = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.evaluate_at(self.breakpoints, self.coefficients, times)
+        result = np.where((times < 0.0) | (times > self.duration), 0.0, result)
         return result if result.ndim else float(result)
 
     def velocity(self, time: ArrayLike) -> Any:
         """Return the ground velocity at times (s), m/s, from rest, constant after the end of the motion."""
-        at = checks.numbers(time, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, self._velocity(), at)
+        times = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.evaluate_at(self.breakpoints, self._compute_velocity(), times)
         return result if result.ndim else float(result)
 
     def displacement(self, time: ArrayLike) -> Any:
         """Return the ground displacement at times (s), m, from rest, with the last velocity after the end."""
-        at = checks.numbers(time, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, self._displacement(), at)
-        result = result + self.velocity(self.duration) * np.maximum(at - self.duration, 0.0)
+        times = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.evaluate_at(self.breakpoints, self._compute_displacement(), times)
+        result = result + self.velocity(self.duration) * np.maximum(times - self.duration, 0.0)
         return result if result.ndim else float(result)
 
     @property
     def extremes(self) -> tuple[float, float]:
         """Exact lowest and highest acceleration with their signs, m/s^2."""
-        return -piecewise.highest(self._widths(), -self.coefficients), piecewise.highest(
+        return -piecewise.find_maximum(self._widths(), -self.coefficients), piecewise.find_maximum(
             self._widths(), self.coefficients
         )
 
     @property
     def pga(self) -> float:
         """Exact peak ground acceleration, m/s^2."""
-        return piecewise.largest_magnitude(self._widths(), self.coefficients)
+        return piecewise.find_peak_magnitude(self._widths(), self.coefficients)
 
     @property
     def pgv(self) -> float:
         """Exact peak ground velocity from rest, m/s."""
-        return piecewise.largest_magnitude(self._widths(), self._velocity())
+        return piecewise.find_peak_magnitude(self._widths(), self._compute_velocity())
 
     @property
     def pgd(self) -> float:
         """Exact peak ground displacement until the end of the motion, m."""
-        return piecewise.largest_magnitude(self._widths(), self._displacement())
+        return piecewise.find_peak_magnitude(self._widths(), self._compute_displacement())
 
     @property
     def arias_intensity(self) -> float:
         """Arias intensity, m/s: ``pi/(2 g)`` times the exact integral of the squared acceleration."""
-        return math.pi / (2.0 * STANDARD_GRAVITY) * float(np.sum(_energy(self.coefficients, self._widths())))
+        return math.pi / (2.0 * STANDARD_GRAVITY) * float(np.sum(_integrate_square(self.coefficients, self._widths())))
 
     @property
     def cumulative_absolute_velocity(self) -> float:
         """Exact integral of the absolute acceleration, m/s, with sign changes located within pieces."""
         widths = self._widths()
-        integral = self._velocity()[:, np.newaxis, :]
-        roots = piecewise.root_candidates(widths, self.coefficients)
+        integral = self._compute_velocity()[:, np.newaxis, :]
+        roots = piecewise.find_root_candidates(widths, self.coefficients)
         cuts = np.hstack([np.zeros((len(widths), 1)), roots, widths[:, np.newaxis]])
         # The sign is constant between cuts. Adding the integral's start value would only lose digits.
         integral[..., 0] = 0.0
-        return float(np.sum(np.abs(np.diff(piecewise.value(integral, cuts), axis=1))))
+        return float(np.sum(np.abs(np.diff(piecewise.evaluate_pieces(integral, cuts), axis=1))))
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
         """Return the time between two fractions of the Arias intensity, s, or NaN if the intensity is zero.
@@ -133,8 +133,8 @@ class Measured:
         if not 0.0 <= start < end <= 1.0:
             sentence = f"a significant duration needs 0 <= {{}} < {{}} <= 1, not {start:g} and {end:g}"
             raise InvalidMotion(sentence, "start", "end", value=(start, end))
-        first, last = significant_span(self, start, end)
-        return last - first
+        start_time, end_time = find_significant_span(self, start, end)
+        return end_time - start_time
 
     def spectral_acceleration(self, period: ArrayLike, damping: float = DAMPING) -> Any:
         """Compute the pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement.
@@ -165,16 +165,18 @@ class Measured:
         periods = checks.numbers(period, "period of a spectral acceleration", InvalidMotion)
         if not np.all(np.isfinite(periods) & (periods > 0.0)):
             raise InvalidMotion("the {} of a spectral acceleration must be a positive number of seconds", "period")
-        length = f"the duration, {self.duration:.6g} s"
+        duration_text = f"the duration, {self.duration:.6g} s"
         if np.any(periods < 1e-6 * self.duration):
-            raise InvalidMotion(f"a {{}} below a millionth of {length}, takes too long: use pga", "period")
+            raise InvalidMotion(f"a {{}} below a millionth of {duration_text}, takes too long: use pga", "period")
         if np.any(periods > 1e6 * self.duration):
-            raise InvalidMotion(f"a {{}} above a million times {length}, says nothing: use pgd", "period")
-        ratio = checked_damping(damping, InvalidMotion)
+            raise InvalidMotion(f"a {{}} above a million times {duration_text}, says nothing: use pgd", "period")
+        damping_ratio = check_damping(damping, InvalidMotion)
         frequencies = np.ravel(2.0 * np.pi / periods)
         peaks = np.empty_like(frequencies)
-        work = np.empty(2 * self.coefficients.shape[1] + oscillator.TERMS)
-        oscillator.write_peak_displacements(self.breakpoints, self.coefficients, frequencies, ratio, work, peaks)
+        workspace = np.empty(2 * self.coefficients.shape[1] + oscillator.TERMS)
+        oscillator.write_peak_displacements(
+            self.breakpoints, self.coefficients, frequencies, damping_ratio, workspace, peaks
+        )
         result = (frequencies**2 * peaks).reshape(periods.shape)
         return result if result.ndim else float(result)
 
@@ -198,29 +200,29 @@ class Measured:
         return values
 
 
-def significant_span(motion: Measured, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
+def find_significant_span(motion: MotionMeasures, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
     """Return the times, s, at two fractions of the total Arias intensity, or NaN if zero."""
-    cumulated = np.append(0.0, np.cumsum(_energy(motion.coefficients, np.diff(motion.breakpoints))))
-    if cumulated[-1] == 0.0:
+    energy = np.append(0.0, np.cumsum(_integrate_square(motion.coefficients, np.diff(motion.breakpoints))))
+    if energy[-1] == 0.0:
         return math.nan, math.nan
-    return _time_at(motion, cumulated, start), _time_at(motion, cumulated, end)
+    return _find_time_at_energy(motion, energy, start), _find_time_at_energy(motion, energy, end)
 
 
-def _energy(coefficients: Floats, span: Floats) -> Floats:
-    """Integrate the squared polynomial from 0 to `span`, exactly, by Gauss's rule with degree + 1 points."""
+def _integrate_square(coefficients: Floats, widths: Floats) -> Floats:
+    """Integrate the squared polynomials over their widths, exactly, by Gauss's rule with degree + 1 points."""
     nodes, weights = np.polynomial.legendre.leggauss(coefficients.shape[-1])
-    values = piecewise.value(coefficients[..., np.newaxis, :], 0.5 * span[..., np.newaxis] * (nodes + 1.0))
-    energy: Floats = 0.5 * span * (values**2 @ weights)
+    values = piecewise.evaluate_pieces(coefficients[..., np.newaxis, :], 0.5 * widths[..., np.newaxis] * (nodes + 1.0))
+    energy: Floats = 0.5 * widths * (values**2 @ weights)
     return energy
 
 
-def _time_at(motion: Measured, cumulated: Floats, fraction: float) -> float:
-    """Find by bisection within a piece the first time at a fraction of the total energy."""
-    wanted = fraction * cumulated[-1]
-    piece = max(int(np.searchsorted(cumulated, wanted, side="left")) - 1, 0)
+def _find_time_at_energy(motion: MotionMeasures, energy: Floats, fraction: float) -> float:
+    """Find the first time at a fraction of the total of the cumulative energy, by bisection within a piece."""
+    target = fraction * energy[-1]
+    piece = max(int(np.searchsorted(energy, target, side="left")) - 1, 0)
     start, end = motion.breakpoints[piece : piece + 2]
 
     def is_reached(span: float) -> bool:
-        return bool(cumulated[piece] + _energy(motion.coefficients[piece], np.asarray(span)) >= wanted)
+        return bool(energy[piece] + _integrate_square(motion.coefficients[piece], np.asarray(span)) >= target)
 
     return float(start + bisected(0.0, end - start, is_reached, halvings=53)[1])

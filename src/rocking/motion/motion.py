@@ -15,9 +15,9 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import as_written
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.description import Description, labelled
+from rocking.motion.description import Description, compose_label
 from rocking.motion.processing import Processable
-from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
+from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,31 +83,33 @@ class Motion(Processable):
     dt: float | None = field(init=False)
 
     def __post_init__(self) -> None:
-        breakpoints, coefficients = piecewise.checked_pieces(self.breakpoints, self.coefficients)
+        breakpoints, coefficients = piecewise.check_pieces(self.breakpoints, self.coefficients)
         checks.text(self.name, "name of a motion", InvalidMotion)
         if not isinstance(self.description, Description):
-            given = type(self.description).__name__
-            sentence = f"the description of a motion must be a Description(family, parameters, text), not a {given}"
+            type_name = type(self.description).__name__
+            sentence = f"the description of a motion must be a Description(family, parameters, text), not a {type_name}"
             raise InvalidMotion(sentence, value=self.description)
         if isinstance(self.history, str) or not isinstance(self.history, Iterable):
             sentence = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
             raise InvalidMotion(sentence, value=self.history)
-        history = tuple(checks.text(each, "sentence of a motion's history", InvalidMotion) for each in self.history)
-        error = checks.within(self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.STRONGEST)
+        history = tuple(checks.text(entry, "sentence of a motion's history", InvalidMotion) for entry in self.history)
+        error = checks.within(
+            self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.MAX_ACCELERATION
+        )
         if self.vertical is not None and not isinstance(self.vertical, Motion):
-            given = type(self.vertical).__name__
-            sentence = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {given}"
+            type_name = type(self.vertical).__name__
+            sentence = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type_name}"
             raise InvalidMotion(sentence, "vertical", value=self.vertical)
         if self.vertical is not None and self.vertical.vertical is not None:
             raise InvalidMotion("{} must be a motion without a vertical component of its own", "vertical")
-        held = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
-        for name, value in held.items():
+        checked_fields = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
+        for name, value in checked_fields.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "dt", piecewise.even_step(self))
+        object.__setattr__(self, "dt", piecewise.find_even_step(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The constructor makes the arrays read-only again.
-        return Motion, tuple(getattr(self, each.name) for each in fields(self) if each.init)
+        return Motion, tuple(getattr(self, parameter.name) for parameter in fields(self) if parameter.init)
 
     @classmethod
     def from_samples(
@@ -149,10 +151,10 @@ class Motion(Processable):
         >>> motion.duration, motion.pga
         (0.06, 2.0)
         """
-        samples, step = piecewise.checked_samples(acceleration), piecewise.checked_step(dt)
-        times = piecewise.even_times(len(samples), step)
+        samples, step = piecewise.check_samples(acceleration), piecewise.check_step(dt)
+        times = piecewise.make_even_times(len(samples), step)
         description = description or Description("samples", text="linear between even samples")
-        return cls(times, piecewise.linear(times, samples), name=name, description=description)
+        return cls(times, piecewise.join_linearly(times, samples), name=name, description=description)
 
     @classmethod
     def from_points(
@@ -167,12 +169,12 @@ class Motion(Processable):
 
         Times must increase strictly. The first one becomes 0.
         """
-        samples = piecewise.checked_samples(acceleration)
-        instants = piecewise.checked_times(times, len(samples))
+        samples = piecewise.check_samples(acceleration)
+        instants = piecewise.check_times(times, len(samples))
         with np.errstate(over="ignore"):
             breakpoints = instants - instants[0]
         description = description or Description("points", text="linear between uneven points")
-        return cls(breakpoints, piecewise.linear(breakpoints, samples), name=name, description=description)
+        return cls(breakpoints, piecewise.join_linearly(breakpoints, samples), name=name, description=description)
 
     @property
     def end(self) -> float:
@@ -182,7 +184,7 @@ class Motion(Processable):
     @property
     def label(self) -> str:
         """Name with brief processing and vertical component, for titles."""
-        return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
+        return compose_label(self.name, self.history, "" if self.vertical is None else self.vertical.name)
 
     def scaled(self, factor: float) -> Motion:
         """Return the motion times a factor.
@@ -190,8 +192,8 @@ class Motion(Processable):
         A negative factor reverses only the horizontal component. Raises `InvalidMotion` if the factor is not finite, or
         the scaled motion would exceed the supported range.
         """
-        by = checks.finite(factor, "factor", InvalidMotion)
-        return self._times(by, FACTOR.scaling(by, by))
+        multiplier = checks.finite(factor, "factor", InvalidMotion)
+        return self._multiply(multiplier, FACTOR.scaling(multiplier, multiplier))
 
     def scaled_to(self, level: float, measure: MeasureName | Measure = "pga") -> Motion:
         """Return the motion scaled to a level of an intensity measure.
@@ -220,12 +222,12 @@ class Motion(Processable):
         --------
         rocking.Measure : intensity measure.
         """
-        wanted = Measure.parse(measure, among=SCALES)
-        if wanted.name == "factor":
+        intensity_measure = Measure.parse(measure, among=SCALING_MEASURES)
+        if intensity_measure.name == "factor":
             return self.scaled(level)
-        goal = checks.positive(level, "level", InvalidMotion, wanted.units)
-        factor = goal / wanted.positive(self, self.name)
-        return self._times(factor, wanted.scaling(goal, factor))
+        target = checks.positive(level, "level", InvalidMotion, intensity_measure.units)
+        factor = target / intensity_measure.positive(self, self.name)
+        return self._multiply(factor, intensity_measure.scaling(target, factor))
 
     def with_vertical(self, vertical: Motion | None) -> Motion:
         """Return the motion with a vertical component, which changes the effective gravity.
@@ -238,7 +240,7 @@ class Motion(Processable):
         """
         origin = vertical.description.origin if isinstance(vertical, Motion) else None
         if vertical is not None and origin is not None and origin.downwards:
-            vertical = vertical._times(-1.0, f"turned upwards, as its channel is called {origin.channel!r}")
+            vertical = vertical._multiply(-1.0, f"turned upwards, as its channel is called {origin.channel!r}")
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -264,13 +266,13 @@ class Motion(Processable):
         Breakpoints of both components are included, and times just before jumps. The end of the motion is a jump to
         zero.
         """
-        corners = self.breakpoints
+        points = self.breakpoints
         if self.coefficients.shape[1] > 2:
-            corners = (corners[:-1, None] + np.linspace(0.0, 1.0, 33) * np.diff(corners)[:, None]).ravel()
-        after = piecewise.jumps_after(self)
-        inner, last = self.breakpoints[1:-1][after[:-1]], self.breakpoints[-1:][after[-1:]]
-        corners = np.concatenate([corners, np.nextafter(inner, -np.inf), np.nextafter(last, np.inf)])
-        times = np.union1d([start, end], corners[(corners > start) & (corners < end)])
+            points = (points[:-1, None] + np.linspace(0.0, 1.0, 33) * np.diff(points)[:, None]).ravel()
+        is_jump = piecewise.find_jumps(self)
+        inner_jumps, end_jump = self.breakpoints[1:-1][is_jump[:-1]], self.breakpoints[-1:][is_jump[-1:]]
+        points = np.concatenate([points, np.nextafter(inner_jumps, -np.inf), np.nextafter(end_jump, np.inf)])
+        times = np.union1d([start, end], points[(points > start) & (points < end)])
         return times if self.vertical is None else np.union1d(times, self.vertical.drawing_times(start, end))
 
     def __repr__(self) -> str:
@@ -279,9 +281,9 @@ class Motion(Processable):
     def __str__(self) -> str:
         """Return name, duration, step, peak acceleration and changes in one line."""
         step = "" if self.dt is None else f" in steps of {self.dt:.5g} s"
-        parts = [f"{self.name}, {self.duration:.5g} s{step}, {_peak(self)}", *self.history]
+        parts = [f"{self.name}, {self.duration:.5g} s{step}, {_describe_peak(self)}", *self.history]
         if self.vertical is not None:
-            parts.append(f"vertical: {self.vertical.name}, {_peak(self.vertical)}")
+            parts.append(f"vertical: {self.vertical.name}, {_describe_peak(self.vertical)}")
         return "; ".join(parts)
 
     def __mul__(self, factor: float) -> Motion:
@@ -292,112 +294,112 @@ class Motion(Processable):
 
     def __neg__(self) -> Motion:
         """Return the motion with reversed polarity."""
-        return self._times(-1.0, "polarity reversed")
+        return self._multiply(-1.0, "polarity reversed")
 
     def __add__(self, other: Motion) -> Motion:
         """Return the sum of two motions that start together."""
         if not isinstance(other, Motion):
             return NotImplemented
-        breakpoints, (mine, theirs) = piecewise.together(self, other)
+        breakpoints, (first, second) = piecewise.align_pieces(self, other)
         vertical = self.vertical or other.vertical
         if self.vertical is not None and other.vertical is not None:
             vertical = self.vertical + other.vertical
         return Motion(
             breakpoints,
-            mine + theirs,
+            first + second,
             name=f"{self.name} + {other.name}",
-            description=Description("sum", text=f"{self._origin()}; plus {other._origin()}"),
+            description=Description("sum", text=f"{self._describe_origin()}; plus {other._describe_origin()}"),
             error=self.error + other.error,
             vertical=vertical,
         )
 
-    def _times(self, factor: float, done: str) -> Motion:
+    def _multiply(self, factor: float, history_entry: str) -> Motion:
         """Return both components times a factor, the vertical one times its absolute value."""
         vertical = self.vertical
         if vertical is not None and abs(factor) != 1.0:
-            vertical = vertical._times(abs(factor), done)
+            vertical = vertical._multiply(abs(factor), history_entry)
         with np.errstate(over="ignore", invalid="ignore"):
             coefficients = self.coefficients * factor
-        if not np.all(np.abs(coefficients[:, 0]) <= piecewise.STRONGEST) or not np.isfinite(coefficients).all():
+        if not np.all(np.abs(coefficients[:, 0]) <= piecewise.MAX_ACCELERATION) or not np.isfinite(coefficients).all():
             raise InvalidMotion(piecewise.TOO_STRONG)
         return replace(
             self,
             coefficients=coefficients,
             description=self.description.scaled(factor),
-            history=(*self.history, done),
+            history=(*self.history, history_entry),
             error=self.error * abs(factor),
             vertical=vertical,
         )
 
 
-def _peak(motion: Motion) -> str:
+def _describe_peak(motion: Motion) -> str:
     return f"peak {motion.pga:.5g} m/s^2 ({motion.pga / STANDARD_GRAVITY:.4g} g)"
 
 
-def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float = STANDARD_GRAVITY) -> Floats:
+def find_exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float = STANDARD_GRAVITY) -> Floats:
     """Return intervals in which a resting block would be lifted: start and end of each, s, in order, shape (n, 2).
 
     The block is lifted to side + if -a exceeds the first threshold (m/s^2), and to side - if a exceeds the second (see
     `Block.uplift_thresholds`). Vertical acceleration adds to the gravity (m/s^2) for which the thresholds hold.
     """
     plus, minus = thresholds
-    towards_plus, towards_minus = _push(motion, -plus / gravity), _push(motion, minus / gravity)
-    reaching = _reaching(towards_plus, plus) | _reaching(towards_minus, minus)
-    ends = towards_plus.breakpoints[np.append(reaching, False) | np.append(False, reaching)]
-    crossings = [_crossings(towards_plus, -plus, reaching), _crossings(towards_minus, minus, reaching)]
+    towards_plus, towards_minus = _deduct_vertical(motion, -plus / gravity), _deduct_vertical(motion, minus / gravity)
+    may_exceed = _find_pieces_reaching(towards_plus, plus) | _find_pieces_reaching(towards_minus, minus)
+    ends = towards_plus.breakpoints[np.append(may_exceed, False) | np.append(False, may_exceed)]
+    crossings = [_find_crossings(towards_plus, -plus, may_exceed), _find_crossings(towards_minus, minus, may_exceed)]
     cuts = np.unique(np.concatenate([ends, *crossings]))
-    middle = 0.5 * (cuts[:-1] + cuts[1:])
-    beyond = (towards_minus.acceleration(middle) > minus) | (towards_plus.acceleration(middle) < -plus)
-    return cuts[np.flatnonzero(np.diff(beyond, prepend=False, append=False))].reshape(-1, 2)
+    midpoints = 0.5 * (cuts[:-1] + cuts[1:])
+    is_exceeded = (towards_minus.acceleration(midpoints) > minus) | (towards_plus.acceleration(midpoints) < -plus)
+    return cuts[np.flatnonzero(np.diff(is_exceeded, prepend=False, append=False))].reshape(-1, 2)
 
 
-def lifting_factors(
-    motion: Motion, thresholds: ArrayLike, gravity: float = STANDARD_GRAVITY, own: ArrayLike | None = None
+def compute_uplift_factors(
+    motion: Motion, thresholds: ArrayLike, gravity: float = STANDARD_GRAVITY, weight_thresholds: ArrayLike | None = None
 ) -> Floats:
     """Compute the smallest factors on both components that lift blocks from rest, shape (n,), or infinity.
 
-    The thresholds, shape (n, 2), are pairs as for `exceedances`. `own` is the part due to the weight, by default all,
-    which alone changes with a vertical motion. Thresholds are infinite on sides without rocking.
+    The thresholds, shape (n, 2), are pairs as for `find_exceedances`, infinite on sides without rocking. The part due
+    to the weight, by default all of them, changes with a vertical motion.
     """
-    pairs = np.asarray(thresholds, dtype=np.float64)
-    weighing = pairs if own is None else np.asarray(own, dtype=np.float64)
+    threshold_pairs = np.asarray(thresholds, dtype=np.float64)
+    weight_pairs = threshold_pairs if weight_thresholds is None else np.asarray(weight_thresholds, dtype=np.float64)
     if motion.vertical is None:
         widths = np.diff(motion.breakpoints)
-        reached = np.array([[piecewise.highest(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
+        peaks = np.array([[piecewise.find_maximum(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
     else:
-        breakpoints, (push, lift) = piecewise.together(motion, motion.vertical)
+        breakpoints, (push, vertical) = piecewise.align_pieces(motion, motion.vertical)
         widths = np.diff(breakpoints)
 
-        def highest(sign: float, threshold: float) -> float:
+        def find_peak(sign: float, threshold: float) -> float:
             if np.isinf(threshold):
                 return 0.0
-            return piecewise.highest(widths, sign * push - threshold / gravity * lift)
+            return piecewise.find_maximum(widths, sign * push - threshold / gravity * vertical)
 
-        reached = np.array([[highest(-1.0, plus), highest(1.0, minus)] for plus, minus in weighing])
+        peaks = np.array([[find_peak(-1.0, plus), find_peak(1.0, minus)] for plus, minus in weight_pairs])
     with np.errstate(divide="ignore"):
-        factors = np.where(reached > 0.0, pairs / np.maximum(reached, 0.0), np.inf)
-    lowest: Floats = factors.min(axis=1)
-    return lowest
+        factors = np.where(peaks > 0.0, threshold_pairs / np.maximum(peaks, 0.0), np.inf)
+    min_factors: Floats = factors.min(axis=1)
+    return min_factors
 
 
-def _push(motion: Motion, threshold_over_g: float) -> Motion:
+def _deduct_vertical(motion: Motion, threshold_over_g: float) -> Motion:
     """Return the horizontal motion minus the contribution of the vertical motion to a threshold."""
-    alone = motion.with_vertical(None)
-    return alone if motion.vertical is None else alone + motion.vertical.scaled(-threshold_over_g)
+    horizontal = motion.with_vertical(None)
+    return horizontal if motion.vertical is None else horizontal + motion.vertical.scaled(-threshold_over_g)
 
 
-def _reaching(motion: Motion, level: float) -> Flags:
+def _find_pieces_reaching(motion: Motion, level: float) -> Flags:
     """Return which pieces may reach this magnitude, often few."""
-    bounds = piecewise.bounds(np.diff(motion.breakpoints), motion.coefficients)
+    bounds = piecewise.bound_magnitudes(np.diff(motion.breakpoints), motion.coefficients)
     return np.asarray(bounds >= level * (1.0 - 1e-12))
 
 
-def _crossings(motion: Motion, level: float, pieces: Flags) -> Floats:
+def _find_crossings(motion: Motion, level: float, pieces: Flags) -> Floats:
     """Return a superset of the times, s, at which the motion crosses a level inside a piece."""
     widths = np.diff(motion.breakpoints)[pieces]
     shifted = motion.coefficients[pieces]
     shifted[:, 0] -= level
-    offsets = piecewise.root_candidates(widths, shifted)
+    offsets = piecewise.find_root_candidates(widths, shifted)
     inside = (offsets > 0.0) & (offsets < widths[:, np.newaxis])
     times: Floats = (motion.breakpoints[:-1][pieces][:, np.newaxis] + offsets)[inside]
     return times

@@ -16,19 +16,19 @@ from rocking.core.constants import HIGHEST_DEGREE
 from rocking.errors import InvalidMotion
 
 #: Pieces that meet within this fraction of the largest value do not jump.
-_JUMP: Final = 1e-12
+_JUMP_TOLERANCE: Final = 1e-12
 #: Largest distance of even breakpoints from their grid divided by the duration, some units in the last place.
-_ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
+_STEP_ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 
 #: Far above any ground motion, but small enough that squares and integrals in measures do not overflow, and that the
 #: solvers terminate (up to 1e42 m/s^2).
-STRONGEST: Final = 1e30
-_LONGEST: Final = 1e15
+MAX_ACCELERATION: Final = 1e30
+_MAX_DURATION: Final = 1e15
 
-TOO_STRONG: Final = f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale"
+TOO_STRONG: Final = f"the acceleration of a motion must stay below {MAX_ACCELERATION:g} m/s^2: check units and scale"
 
 #: Far below any ground motion. Pieces may be shorter, but not change faster than over this time.
-SHORTEST: Final = 1e-9
+MIN_DURATION: Final = 1e-9
 
 
 class Piecewise(Protocol):
@@ -50,35 +50,35 @@ class Pieces(NamedTuple):
     coefficients: Floats
 
 
-def even_step(pieces: Piecewise) -> float | None:
+def find_even_step(pieces: Piecewise) -> float | None:
     """Return the length of straight pieces of equal length, else None."""
     breakpoints, coefficients = pieces.breakpoints, pieces.coefficients
     if coefficients.shape[1] < 2 or np.any(coefficients[:, 2:]):
         return None
     step = float(breakpoints[1])
-    off = np.abs(breakpoints - even_times(len(breakpoints), step))
-    return step if np.all(off <= _ROUNDING * breakpoints[-1]) else None
+    deviations = np.abs(breakpoints - make_even_times(len(breakpoints), step))
+    return step if np.all(deviations <= _STEP_ROUNDING * breakpoints[-1]) else None
 
 
-def jumps(pieces: Piecewise) -> bool:
+def has_jumps(pieces: Piecewise) -> bool:
     """Return whether a piece starts off the end of the previous one, beyond rounding."""
-    return bool(np.any(jumps_after(pieces)[:-1]))
+    return bool(np.any(find_jumps(pieces)[:-1]))
 
 
-def jumps_after(pieces: Piecewise) -> Flags:
+def find_jumps(pieces: Piecewise) -> Flags:
     """Return which pieces end in a jump, beyond rounding (the last one to zero)."""
     widths, coefficients = np.diff(pieces.breakpoints), pieces.coefficients
-    gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - value(coefficients, widths))
-    return gaps > _JUMP * largest_magnitude(widths, coefficients)
+    gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - evaluate_pieces(coefficients, widths))
+    return gaps > _JUMP_TOLERANCE * find_peak_magnitude(widths, coefficients)
 
 
-def samples(pieces: Piecewise) -> tuple[Floats, Floats]:
+def sample_breakpoints(pieces: Piecewise) -> tuple[Floats, Floats]:
     """Return times (s) and values at the breakpoints, with the value after a jump."""
-    last = value(pieces.coefficients[-1], np.diff(pieces.breakpoints)[-1])
+    last = evaluate_pieces(pieces.coefficients[-1], np.diff(pieces.breakpoints)[-1])
     return pieces.breakpoints, np.append(pieces.coefficients[:, 0], last)
 
 
-def value(coefficients: Floats, x: Floats) -> Floats:
+def evaluate_pieces(coefficients: Floats, x: Floats) -> Floats:
     """Evaluate each polynomial (last axis of `coefficients`: powers) at `x` by Horner's rule."""
     result = coefficients[..., -1] + 0.0 * x
     for j in range(coefficients.shape[-1] - 2, -1, -1):
@@ -87,39 +87,39 @@ def value(coefficients: Floats, x: Floats) -> Floats:
     return result
 
 
-def at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floats:
+def evaluate_at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floats:
     """Return the value at `time`, clipped to the span of the breakpoints, with the value after a jump."""
-    inside = np.clip(time, breakpoints[0], breakpoints[-1])
-    piece = np.minimum(np.searchsorted(breakpoints, inside, side="right"), len(coefficients)) - 1
-    return value(coefficients[piece], inside - breakpoints[piece])
+    clipped = np.clip(time, breakpoints[0], breakpoints[-1])
+    piece = np.minimum(np.searchsorted(breakpoints, clipped, side="right"), len(coefficients)) - 1
+    return evaluate_pieces(coefficients[piece], clipped - breakpoints[piece])
 
 
-def even_times(count: int, step: float) -> Floats:
+def make_even_times(count: int, step: float) -> Floats:
     """Return the times of even samples (infinite on overflow)."""
     with np.errstate(over="ignore"):
         return np.arange(count, dtype=np.float64) * step
 
 
-def linear(times: Floats, samples: Floats) -> Floats:
+def join_linearly(times: Floats, samples: Floats) -> Floats:
     """Return coefficients of the straight lines between the samples (not finite on overflow)."""
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         return np.column_stack([samples[:-1], np.diff(samples) / np.diff(times)])
 
 
-def derivative(coefficients: Floats) -> Floats:
+def differentiate_pieces(coefficients: Floats) -> Floats:
     """Return the coefficients of the derivative of each piece."""
     return coefficients[:, 1:] * np.arange(1.0, coefficients.shape[1])
 
 
-def antiderivative(widths: Floats, coefficients: Floats) -> Floats:
+def integrate_pieces(widths: Floats, coefficients: Floats) -> Floats:
     """Return the coefficients of the continuous antiderivative that starts at zero."""
     powers = np.arange(1.0, coefficients.shape[1] + 1)
     integral = np.hstack([np.zeros((len(coefficients), 1)), coefficients / powers])
-    integral[1:, 0] = np.cumsum(value(integral, widths))[:-1]
+    integral[1:, 0] = np.cumsum(evaluate_pieces(integral, widths))[:-1]
     return integral
 
 
-def moved(coefficients: Floats, shift: Floats) -> Floats:
+def shift_origin(coefficients: Floats, shift: Floats) -> Floats:
     """Return the coefficients of each piece about ``x = shift`` (repeated synthetic division)."""
     result = coefficients.copy()
     last = result.shape[1] - 1
@@ -129,43 +129,45 @@ def moved(coefficients: Floats, shift: Floats) -> Floats:
     return result
 
 
-def moved_exactly(coefficients: Floats, shift: Floats) -> Floats:
+def shift_origin_exactly(coefficients: Floats, shift: Floats) -> Floats:
     """Return coefficients of each piece about ``x = shift`` by Horner's rule with the error of each operation."""
-    by, nothing = shift[:, np.newaxis], np.zeros((len(shift), 1))
+    offset, zeros = shift[:, np.newaxis], np.zeros((len(shift), 1))
     result = errors = np.zeros_like(coefficients)
     for k in range(coefficients.shape[1] - 1, -1, -1):
         # Partial result times x + shift, plus the next coefficient.
-        before = np.hstack([coefficients[:, k : k + 1], result[:, :-1]])
-        product, of_product = exact_product(by, result)
-        result, of_sum = exact_sum(product, before)
-        errors = by * errors + np.hstack([nothing, errors[:, :-1]]) + (of_product + of_sum)
+        raised = np.hstack([coefficients[:, k : k + 1], result[:, :-1]])
+        product, product_error = multiply_exactly(offset, result)
+        result, sum_error = add_exactly(product, raised)
+        errors = offset * errors + np.hstack([zeros, errors[:, :-1]]) + (product_error + sum_error)
     return result + errors
 
 
-def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: int) -> Floats:
-    """Return coefficients on the pieces of `finer`, which contains all breakpoints (zero after the end)."""
-    piece = np.minimum(np.searchsorted(breakpoints, finer[:-1], side="right"), len(coefficients)) - 1
-    shift = finer[:-1] - breakpoints[piece]
-    cut = shift > 0.0
-    result = np.zeros((len(finer) - 1, columns))
+def refine_pieces(breakpoints: Floats, coefficients: Floats, new_breakpoints: Floats, columns: int) -> Floats:
+    """Return coefficients between new breakpoints, which include the old ones (zero after the end)."""
+    piece = np.minimum(np.searchsorted(breakpoints, new_breakpoints[:-1], side="right"), len(coefficients)) - 1
+    shift = new_breakpoints[:-1] - breakpoints[piece]
+    is_cut = shift > 0.0
+    result = np.zeros((len(new_breakpoints) - 1, columns))
     result[:, : coefficients.shape[1]] = coefficients[piece]
-    result[cut, : coefficients.shape[1]] = moved_exactly(coefficients[piece[cut]], shift[cut])
-    result[finer[:-1] >= breakpoints[-1]] = 0.0
+    result[is_cut, : coefficients.shape[1]] = shift_origin_exactly(coefficients[piece[is_cut]], shift[is_cut])
+    result[new_breakpoints[:-1] >= breakpoints[-1]] = 0.0
     return result
 
 
-def together(one: Piecewise, other: Piecewise) -> tuple[Floats, tuple[Floats, Floats]]:
+def align_pieces(first: Piecewise, second: Piecewise) -> tuple[Floats, tuple[Floats, Floats]]:
     """Return common breakpoints, and the coefficients of each between them, of equal degree."""
-    columns = max(one.coefficients.shape[1], other.coefficients.shape[1])
-    if np.array_equal(one.breakpoints, other.breakpoints):
-        breakpoints = one.breakpoints
+    columns = max(first.coefficients.shape[1], second.coefficients.shape[1])
+    if np.array_equal(first.breakpoints, second.breakpoints):
+        breakpoints = first.breakpoints
     else:
-        breakpoints = np.union1d(one.breakpoints, other.breakpoints)
-    mine, theirs = (refined(each.breakpoints, each.coefficients, breakpoints, columns) for each in (one, other))
-    return breakpoints, (mine, theirs)
+        breakpoints = np.union1d(first.breakpoints, second.breakpoints)
+    first_rows, second_rows = (
+        refine_pieces(pieces.breakpoints, pieces.coefficients, breakpoints, columns) for pieces in (first, second)
+    )
+    return breakpoints, (first_rows, second_rows)
 
 
-def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
+def find_root_candidates(widths: Floats, coefficients: Floats) -> Floats:
     """Return a superset of the roots of each piece, shape (pieces, degree), sorted along each row.
 
     Rows are padded with points that are not roots, which is harmless in a search for extrema.
@@ -181,24 +183,24 @@ def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
             q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
             roots = np.column_stack([q / a, c / q])
         else:
-            roots = _numerical_roots(widths, coefficients)
+            roots = _find_numerical_roots(widths, coefficients)
     roots = np.where(np.isfinite(roots), roots, 0.0)
     return np.sort(np.clip(roots, 0.0, widths[:, np.newaxis]), axis=1)
 
 
-def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
+def _find_numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
     roots = np.zeros((len(coefficients), coefficients.shape[1] - 1))
     scaled = coefficients * widths[:, np.newaxis] ** np.arange(float(coefficients.shape[1]))
-    control = _control_points(widths, coefficients)
+    control = _compute_control_points(widths, coefficients)
     rounding = 1e-14 * np.sum(np.abs(scaled), axis=1)
     may_vanish = (np.min(control, axis=1) <= rounding) & (np.max(control, axis=1) >= -rounding)
-    degrees = np.where(may_vanish, _significant_degrees(scaled), 0)
+    degrees = np.where(may_vanish, _find_significant_degrees(scaled), 0)
     for k in np.flatnonzero(degrees):
         roots[k, : degrees[k]] = np.polynomial.polynomial.polyroots(scaled[k, : degrees[k] + 1]).real
     return roots * widths[:, np.newaxis]
 
 
-def _significant_degrees(pieces: Floats) -> Integers:
+def _find_significant_degrees(pieces: Floats) -> Integers:
     """Return the degree of each piece without leading coefficients far below rounding, which distort the roots."""
     sizes = np.abs(pieces)
     significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
@@ -206,60 +208,60 @@ def _significant_degrees(pieces: Floats) -> Integers:
     return np.where(significant.any(axis=1), last, 0)
 
 
-def _control_points(widths: Floats, coefficients: Floats) -> Floats:
+def _compute_control_points(widths: Floats, coefficients: Floats) -> Floats:
     """Return the Bernstein coefficients of each piece, which enclose its values."""
     columns = coefficients.shape[1]
-    control: Floats = (coefficients * widths[:, np.newaxis] ** np.arange(float(columns))) @ _bernstein_shares(columns)
+    control: Floats = (coefficients * widths[:, np.newaxis] ** np.arange(float(columns))) @ _bernstein_matrix(columns)
     return control
 
 
 @functools.cache
-def _bernstein_shares(columns: int) -> Floats:
+def _bernstein_matrix(columns: int) -> Floats:
     """Return the share of each power in each Bernstein coefficient."""
     return np.array([[math.comb(i, j) / math.comb(columns - 1, j) for i in range(columns)] for j in range(columns)])
 
 
-def bounds(widths: Floats, coefficients: Floats) -> Floats:
+def bound_magnitudes(widths: Floats, coefficients: Floats) -> Floats:
     """Return an upper bound on each piece's magnitude, from the ends (straight) or Bernstein coefficients."""
     if coefficients.shape[1] <= 2:
-        return np.maximum(np.abs(coefficients[:, 0]), np.abs(value(coefficients, widths)))
-    result: Floats = np.max(np.abs(_control_points(widths, coefficients)), axis=1)
+        return np.maximum(np.abs(coefficients[:, 0]), np.abs(evaluate_pieces(coefficients, widths)))
+    result: Floats = np.max(np.abs(_compute_control_points(widths, coefficients)), axis=1)
     return result
 
 
-def highest(widths: Floats, coefficients: Floats) -> float:
+def find_maximum(widths: Floats, coefficients: Floats) -> float:
     """Return the highest value over all pieces."""
-    best = max(float(np.max(coefficients[:, 0])), float(np.max(value(coefficients, widths))))
+    maximum = max(float(np.max(coefficients[:, 0])), float(np.max(evaluate_pieces(coefficients, widths))))
     if coefficients.shape[1] <= 2:
-        return best
-    may_exceed = np.max(_control_points(widths, coefficients), axis=1) > best + 1e-15 * abs(best)
+        return maximum
+    may_exceed = np.max(_compute_control_points(widths, coefficients), axis=1) > maximum + 1e-15 * abs(maximum)
     if not np.any(may_exceed):
-        return best
+        return maximum
     pieces, spans = coefficients[may_exceed], widths[may_exceed]
-    extrema = root_candidates(spans, derivative(pieces))
-    return max(best, float(np.max(value(pieces[:, np.newaxis, :], extrema))))
+    extrema = find_root_candidates(spans, differentiate_pieces(pieces))
+    return max(maximum, float(np.max(evaluate_pieces(pieces[:, np.newaxis, :], extrema))))
 
 
-def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
+def find_peak_magnitude(widths: Floats, coefficients: Floats) -> float:
     """Return the largest absolute value over all pieces."""
-    return max(highest(widths, coefficients), highest(widths, -coefficients))
+    return max(find_maximum(widths, coefficients), find_maximum(widths, -coefficients))
 
 
-def from_quadrant(quarters: Floats, rest: Floats) -> tuple[Floats, Floats]:
+def sine_cosine_from_quarters(quarters: Floats, rest: Floats) -> tuple[Floats, Floats]:
     """Compute sine and cosine of quarter turns plus the rest of an angle, rad."""
     sine, cosine = np.sin(rest), np.cos(rest)
     quadrant = np.mod(quarters, 4.0).astype(np.int64)
     return np.choose(quadrant, [sine, cosine, -sine, -cosine]), np.choose(quadrant, [cosine, -sine, -cosine, sine])
 
 
-def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
+def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
     """Return checked breakpoints and coefficients of a motion as read-only copies."""
-    ends = _floats(breakpoints, "breakpoints", 1)
-    of_samples = ": of samples make a motion with Motion.from_samples(acceleration, dt)"
-    rows = _floats(coefficients, "coefficients", 2, of_samples)
-    for array, what in ((ends, "breakpoints"), (rows, "coefficients")):
+    ends = _convert_array(breakpoints, "breakpoints", 1)
+    hint = ": of samples make a motion with Motion.from_samples(acceleration, dt)"
+    rows = _convert_array(coefficients, "coefficients", 2, hint)
+    for array, name in ((ends, "breakpoints"), (rows, "coefficients")):
         if not np.all(np.isfinite(array)):
-            raise InvalidMotion("the {} of a motion must be finite numbers", what)
+            raise InvalidMotion("the {} of a motion must be finite numbers", name)
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
         raise InvalidMotion(
             "a motion of n pieces needs n + 1 {} and {} of shape (n, degree + 1), not "
@@ -276,26 +278,26 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
             f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}: "
             "split them into shorter ones of a lower degree"
         )
-    if not SHORTEST <= ends[-1] <= _LONGEST:
+    if not MIN_DURATION <= ends[-1] <= _MAX_DURATION:
         raise InvalidMotion(
-            f"a motion must last from {SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
+            f"a motion must last from {MIN_DURATION:g} to {_MAX_DURATION:g} s, not {ends[-1]:g} s: check its units"
         )
     with np.errstate(over="ignore"):
-        if not np.all(value(np.abs(rows), widths) <= STRONGEST):
+        if not np.all(evaluate_pieces(np.abs(rows), widths) <= MAX_ACCELERATION):
             raise InvalidMotion(TOO_STRONG)
-        if not np.all(value(np.abs(rows), np.maximum(widths, SHORTEST)) <= STRONGEST):
+        if not np.all(evaluate_pieces(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
             raise InvalidMotion(
-                f"a piece of a motion is too steep: shorter than {SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
-                "within that time: check units and times"
+                f"a piece of a motion is too steep: shorter than {MIN_DURATION:g} s, it would pass "
+                f"{MAX_ACCELERATION:g} m/s^2 within that time: check units and times"
             )
     for array in (ends, rows):
         array.setflags(write=False)
     return ends, rows
 
 
-def checked_samples(acceleration: ArrayLike) -> Floats:
+def check_samples(acceleration: ArrayLike) -> Floats:
     """Return accelerations, at least two and all finite."""
-    values = _floats(acceleration, "accelerations", 1)
+    values = _convert_array(acceleration, "accelerations", 1)
     if len(values) < 2:
         raise InvalidMotion(f"a motion needs at least two samples, not {len(values)}")
     bad = np.flatnonzero(~np.isfinite(values))
@@ -304,17 +306,17 @@ def checked_samples(acceleration: ArrayLike) -> Floats:
     return values
 
 
-def checked_step(dt: float) -> float:
+def check_step(dt: float) -> float:
     """Return a sampling step, s."""
     if np.ndim(dt) != 0:
         raise InvalidMotion("{} must be one number; for uneven times use Motion.from_points(times, acceleration)", "dt")
     positive = checks.positive(dt, "dt", InvalidMotion, "s")
-    return checks.within(positive, "dt", InvalidMotion, SHORTEST, 1.0 / SHORTEST, "s: check its units")
+    return checks.within(positive, "dt", InvalidMotion, MIN_DURATION, 1.0 / MIN_DURATION, "s: check its units")
 
 
-def checked_times(times: ArrayLike, count: int) -> Floats:
+def check_times(times: ArrayLike, count: int) -> Floats:
     """Return the times of this many samples, s."""
-    values = _floats(times, "times", 1)
+    values = _convert_array(times, "times", 1)
     if len(values) != count:
         raise InvalidMotion(f"there are {len(values)} {{}} but {count} accelerations: give one for each", "times")
     if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
@@ -322,37 +324,37 @@ def checked_times(times: ArrayLike, count: int) -> Floats:
     return values
 
 
-def _floats(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Floats:
-    array = np.array(checks.numbers(values, f"{what} of a motion", InvalidMotion), order="C")
+def _convert_array(values: ArrayLike, name: str, dimensions: int, hint: str = "") -> Floats:
+    array = np.array(checks.numbers(values, f"{name} of a motion", InvalidMotion), order="C")
     if array.ndim != dimensions:
         sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
-        raise InvalidMotion(sentence, what, value=values)
+        raise InvalidMotion(sentence, name, value=values)
     return array
 
 
-def exact_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+def add_exactly(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Return a sum and its rounding error (Knuth 1969)."""
     total = a + b
-    of_b = total - a
-    return total, (a - (total - of_b)) + (b - of_b)
+    b_rounded = total - a
+    return total, (a - (total - b_rounded)) + (b - b_rounded)
 
 
-def exact_product(a: float | Floats, b: Floats) -> tuple[Floats, Floats]:
+def multiply_exactly(a: float | Floats, b: Floats) -> tuple[Floats, Floats]:
     """Return a product and its rounding error (Dekker 1971)."""
     product = a * b
-    a_high, a_low = _halves(a)
-    b_high, b_low = _halves(b)
+    a_high, a_low = _split_digits(a)
+    b_high, b_low = _split_digits(b)
     return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
-def exact_quotient(a: Floats, rest: Floats, divisor: float) -> tuple[Floats, Floats]:
+def divide_exactly(a: Floats, rest: Floats, divisor: float) -> tuple[Floats, Floats]:
     """Return the quotient of ``a + rest`` and its error."""
     quotient = a / divisor
-    product, error = exact_product(divisor, quotient)
+    product, error = multiply_exactly(divisor, quotient)
     return quotient, ((a - product) - error + rest) / divisor
 
 
-def _halves(a: float | Floats) -> tuple[Any, Any]:
+def _split_digits(a: float | Floats) -> tuple[Any, Any]:
     scaled = 134217729.0 * a
     high = scaled - (scaled - a)
     return high, a - high

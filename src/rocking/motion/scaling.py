@@ -14,7 +14,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import named
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion.measures import DAMPING, Measured, checked_damping
+from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
 
 #: Intensity measures of the analyses.
 IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
@@ -22,10 +22,10 @@ MeasureName = Literal["factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
 
 INTENSITIES: Final[Sequence[str]] = get_args(IntensityName)
 #: Measures of a motion alone.
-SCALES: Final = ("factor", "pga", "pgv", "sa")
+SCALING_MEASURES: Final = ("factor", "pga", "pgv", "sa")
 
 #: Unit, and name in words.
-_MEASURES: Final[dict[str, tuple[str, str]]] = {
+_UNITS_AND_NAMES: Final[dict[str, tuple[str, str]]] = {
     "factor": ("1", "factor of the motion"),
     "pga": ("m/s^2", "peak ground acceleration"),
     "pgv": ("m/s", "peak ground velocity"),
@@ -74,15 +74,15 @@ class Measure:
 
     def __post_init__(self) -> None:
         checks.one_of(self.name, "measure", InvalidOption, get_args(MeasureName))
-        damping = checked_damping(self.damping, InvalidOption)
+        damping = check_damping(self.damping, InvalidOption)
         object.__setattr__(self, "damping", damping)
         if self.name == "sa":
             if self.period is None:
                 raise InvalidOption('{} "sa" needs {}, in s', "measure", "period")
             object.__setattr__(self, "period", checks.positive(self.period, "period", InvalidOption, "s"))
         elif self.period is not None or damping != DAMPING:
-            wrong = "damping" if self.period is None else "period"
-            raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', wrong, "measure")
+            argument = "damping" if self.period is None else "period"
+            raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', argument, "measure")
 
     @classmethod
     def parse(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
@@ -98,7 +98,7 @@ class Measure:
     @property
     def units(self) -> str:
         """Units of the measure, or "1"."""
-        return _MEASURES[self.name][0]
+        return _UNITS_AND_NAMES[self.name][0]
 
     @property
     def column(self) -> str:
@@ -113,17 +113,17 @@ class Measure:
     @property
     def quantity(self) -> str:
         """Name in words, with the damping unless it is 5 %."""
-        return _MEASURES[self.name][1] + ("" if self.period is None else f" at {self._oscillator}")
+        return _UNITS_AND_NAMES[self.name][1] + ("" if self.period is None else f" at {self._oscillator_text}")
 
     @property
     def short_name(self) -> str:
         """Name for a table or a figure: PGA, PGV, SA(1 s), with the damping unless it is 5 %."""
         if self.period is not None:
-            return f"SA({self._oscillator})"
+            return f"SA({self._oscillator_text})"
         return self.name.upper() if self.name in ("pga", "pgv") else self.quantity
 
     @property
-    def _oscillator(self) -> str:
+    def _oscillator_text(self) -> str:
         return f"{self.period:g} s" + ("" if self.damping == DAMPING else f", damping {self.damping:g}")
 
     @property
@@ -152,7 +152,7 @@ class Measure:
         """Underlying measure of the motion alone."""
         return self if self.of_motion == self.name else Measure(self.of_motion, self.period, self.damping)
 
-    def value(self, motion: Measured) -> float:
+    def value(self, motion: MotionMeasures) -> float:
         """Return the measure of a motion alone, in SI units, or 1 if levels are factors."""
         if self.period is not None:
             return float(motion.spectral_acceleration(self.period, self.damping))
@@ -160,7 +160,7 @@ class Measure:
             return 1.0
         return motion.pga if self.of_motion == "pga" else motion.pgv
 
-    def positive(self, motion: Measured, name: str) -> float:
+    def positive(self, motion: MotionMeasures, name: str) -> float:
         """Return `value`, or raise an error for a motion `name` that is zero throughout."""
         value = self.value(motion)
         if not value > 0.0:
@@ -188,16 +188,16 @@ class Measure:
         if self.name == "factor":
             return f"scaled by {factor:.6g}"
         oscillator = "" if self.period is None else f" at {self.period:.6g} s, damping {self.damping:.6g}"
-        return f"scaled by {factor:.6g} to a {_MEASURES[self.name][1]} of {self.shown(level)}{oscillator}"
+        return f"scaled by {factor:.6g} to a {_UNITS_AND_NAMES[self.name][1]} of {self.shown(level)}{oscillator}"
 
 
 #: Factor on unscaled motions.
 FACTOR: Final = Measure("factor")
 
 
-def intensities(values: ArrayLike) -> Floats:
+def check_intensities(values: ArrayLike) -> Floats:
     """Return the intensities of a curve as an array of the same shape."""
-    at = checks.numbers(values, "intensities", InvalidOption)
-    if not np.all(at >= 0.0):
+    intensities = checks.numbers(values, "intensities", InvalidOption)
+    if not np.all(intensities >= 0.0):
         raise InvalidOption("intensities must be numbers that are not negative")
-    return at
+    return intensities

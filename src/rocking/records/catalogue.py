@@ -21,7 +21,7 @@ from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
 from rocking.records.units import choose_unit
 
-_FOLDER: Final = resources.files("rocking.records") / "data"
+_DATA_FOLDER: Final = resources.files("rocking.records") / "data"
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class Record:
     def title(self) -> str:
         """Short title: place and year of the event, station and direction."""
         year = re.search(r"(?:19|20)\d{2}", self.event)
-        place, *more = re.sub(r"^(?:[A-Z]{2}\.\w+|\d+) ", "", self.station).split(", ")
-        crossing = [part.partition(" / ")[2] for part in more if " / " in part]
+        place, *details = re.sub(r"^(?:[A-Z]{2}\.\w+|\d+) ", "", self.station).split(", ")
+        crossing = [part.partition(" / ")[2] for part in details if " / " in part]
         event = self.event.partition(",")[0] + (f" {year[0]}" if year else "")
         return f"{event}, {' '.join([place, *crossing])}, {self.direction}"
 
@@ -90,7 +90,7 @@ def names() -> tuple[str, ...]:
     >>> names()[:3]
     ('ridgecrest-clc-090', 'ridgecrest-clc-360', 'ridgecrest-clc-up')
     """
-    return tuple(_catalogue())
+    return tuple(_read_catalogue())
 
 
 def info(name: str) -> Record:
@@ -116,21 +116,21 @@ def info(name: str) -> Record:
     >>> record.dt, record.samples, record.units, record.terms
     (0.01, 31932, 'g', 'CC0 1.0')
     """
-    catalogue = _catalogue()
+    catalogue = _read_catalogue()
     if checks.text(name, "name of a shipped record", UnreadableRecord) not in catalogue:
-        hint = meant(name, f"there are {', '.join(catalogue)}")
+        hint = suggest_records(name, f"there are {', '.join(catalogue)}")
         raise UnreadableRecord(f"no shipped record is named {name!r}; {hint}")
     return Record(name=name, **catalogue[name])
 
 
-def meant(name: str, otherwise: str, what: str = "") -> str:
-    """Return the end of a message about an unknown name: similar records, horizontal unless "-up", or another hint."""
+def suggest_records(name: str, otherwise: str, prefix: str = "") -> str:
+    """Return a hint on an unknown name: similar records, horizontal unless "-up", or the other text."""
     vertical = name.endswith(("-u", "-up"))
-    offered = [each for each, facts in _catalogue().items() if (facts["direction"] == "up") == vertical]
-    begun = [each for each in offered if len(name) > 2 and each.startswith(name)]
-    if begun:
-        return f"did you mean {what}{' or '.join(begun)}?"
-    return checks.meant(name, {each: f"{what}{each}" for each in offered}, otherwise)
+    records = [record for record, facts in _read_catalogue().items() if (facts["direction"] == "up") == vertical]
+    completions = [record for record in records if len(name) > 2 and record.startswith(name)]
+    if completions:
+        return f"did you mean {prefix}{' or '.join(completions)}?"
+    return checks.meant(name, {record: f"{prefix}{record}" for record in records}, otherwise)
 
 
 def load(name: str) -> Motion:
@@ -164,23 +164,23 @@ def load(name: str) -> Motion:
     319.31 s, 0.344 g
     """
     record = info(name)
-    with (_FOLDER / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+    with (_DATA_FOLDER / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
         differences = archive[record.direction].astype(np.int64)
     published = np.cumsum(np.cumsum(differences)) / record.denominator
     facts = (record.event, record.station, f"direction {record.direction}", record.state, record.source)
     text = f"{'; '.join(facts)}; terms: {record.terms}"
-    known: dict[str, Any] = {
+    origin_fields: dict[str, Any] = {
         "event": record.event,
         "station": record.station,
         "units": record.units,
         "channel": record.direction,
     }
     azimuth = float(record.direction) if record.direction.isdecimal() else None
-    description = Description("record", text=text, origin=Origin(azimuth=azimuth, **known))
+    description = Description("record", text=text, origin=Origin(azimuth=azimuth, **origin_fields))
     samples = choose_unit(record.units).to_si(published)
     return Motion.from_samples(samples, record.dt, name=name, description=description)
 
 
-def _catalogue() -> dict[str, dict[str, Any]]:
-    catalogue: dict[str, dict[str, Any]] = json.loads((_FOLDER / "catalogue.json").read_text("utf-8"))
+def _read_catalogue() -> dict[str, dict[str, Any]]:
+    catalogue: dict[str, dict[str, Any]] = json.loads((_DATA_FOLDER / "catalogue.json").read_text("utf-8"))
     return catalogue

@@ -26,18 +26,18 @@ from rocking.records.formats.source import Request
 Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
 
 
-def one_motion(motion: Motion | None) -> Motion | None:
+def check_motion(motion: Motion | None) -> Motion | None:
     """Return a motion (None is free rocking), or raise an error."""
     if motion is not None and not isinstance(motion, Motion):
-        raise InvalidMotion(_refusal(motion))
+        raise InvalidMotion(_describe_wrong_type(motion))
     return motion
 
 
-def several_motions(motions: Motions) -> list[Motion]:
+def list_motions(motions: Motions) -> list[Motion]:
     """Return one motion or several as a list, renamed by the keys of a mapping."""
     if isinstance(motions, Mapping):
-        several = several_motions([*motions.values()])
-        return [replace(motion, name=name) for name, motion in zip(motions, several, strict=True)]
+        unnamed = list_motions([*motions.values()])
+        return [replace(motion, name=name) for name, motion in zip(motions, unnamed, strict=True)]
     gathered: list[Any] = [motions]
     if isinstance(motions, Iterable) and not isinstance(motions, (Motion, str, Path, np.ndarray)):
         gathered = list(motions)
@@ -45,36 +45,36 @@ def several_motions(motions: Motions) -> list[Motion]:
         raise InvalidOption("{} must hold at least one motion", "motions")
     for motion in gathered:
         if not isinstance(motion, Motion):
-            raise InvalidMotion(_refusal(motion))
+            raise InvalidMotion(_describe_wrong_type(motion))
     return gathered
 
 
-def motions_by_name(motions: Motions) -> dict[str, Motion]:
+def index_motions(motions: Motions) -> dict[str, Motion]:
     """Return motions by the names of a mapping, or else by their own."""
-    several = several_motions(motions)
+    motion_list = list_motions(motions)
     if isinstance(motions, Mapping):
         return dict(motions)
-    return dict(zip(names_of(several), several, strict=True))
+    return dict(zip(list_motion_names(motion_list), motion_list, strict=True))
 
 
-def names_of(motions: Sequence[Motion]) -> list[str]:
+def list_motion_names(motions: Sequence[Motion]) -> list[str]:
     """Return distinct names of motions, numbered if necessary."""
-    return numbered([motion.name for motion in motions])
+    return make_names_unique([motion.name for motion in motions])
 
 
-def numbered(given: Sequence[str]) -> list[str]:
+def make_names_unique(names: Sequence[str]) -> list[str]:
     """Return names, with repeated ones numbered."""
-    shared = {name for name, count in Counter(given).items() if count > 1}
-    taken = {*given}
-    names = []
-    for name in given:
-        ways = (f"{name} #{k}" for k in itertools.count(1))
-        names.append(next(each for each in ways if each not in taken) if name in shared else name)
-        taken.add(names[-1])
-    return names
+    repeated = {name for name, count in Counter(names).items() if count > 1}
+    used = {*names}
+    unique = []
+    for name in names:
+        candidates = (f"{name} #{k}" for k in itertools.count(1))
+        unique.append(next(new for new in candidates if new not in used) if name in repeated else name)
+        used.add(unique[-1])
+    return unique
 
 
-def distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
+def find_distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
     """Return distinct motions, and the index of each motion among them."""
     distinct: dict[tuple[bytes, ...], Motion] = {}
     keys = []
@@ -82,91 +82,91 @@ def distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]
         parts = [part for part in (motion, motion.vertical) if part is not None]
         keys.append(tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients)))
         distinct.setdefault(keys[-1], motion)
-    places = {key: place for place, key in enumerate(distinct)}
-    return [*distinct.values()], [places[key] for key in keys]
+    indices = {key: index for index, key in enumerate(distinct)}
+    return [*distinct.values()], [indices[key] for key in keys]
 
 
-def _refusal(given: Any) -> str:
-    if isinstance(given, (str, Path)):
-        how = "rocking.records.load" if str(given) in catalogue.names() else "rocking.read"
-        return f'a Motion is needed, not {str(given)!r}: load it with {how}("{given}")'
-    kind = "None" if given is None else f"a {type(given).__name__}"
-    return f"a Motion is needed, not {kind}: make one with Motion.from_samples(array, dt), in m/s^2 and s"
+def _describe_wrong_type(value: Any) -> str:
+    if isinstance(value, (str, Path)):
+        loader = "rocking.records.load" if str(value) in catalogue.names() else "rocking.read"
+        return f'a Motion is needed, not {str(value)!r}: load it with {loader}("{value}")'
+    type_name = "None" if value is None else f"a {type(value).__name__}"
+    return f"a Motion is needed, not {type_name}: make one with Motion.from_samples(array, dt), in m/s^2 and s"
 
 
 #: Name of a record on standard input.
 STANDARD_INPUT = "-"
 
 
-def named_motion(
-    name: str, *, vertical: str | None = None, scale: float = 1.0, several: bool = False, **about: Any
+def load_motion(
+    name: str, *, vertical: str | None = None, scale: float = 1.0, several: bool = False, **options: Any
 ) -> Motion:
     """Return the scaled motion of a record file ("-" is standard input), or of a shipped record if no file exists.
 
     Channel, dt and units are optional. With `several`, they apply to several files: files that state step and units
     keep them, and the name of a single channel does not matter.
     """
-    several = several or (vertical is not None and _stands_alone(vertical))
+    several = several or (vertical is not None and _is_file_or_record(vertical))
     if is_shipped(name):
-        refuse_what_is_known(name, **({} if several else about))
+        reject_redundant_arguments(name, **({} if several else options))
         motion = catalogue.load(name)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        motion = formats.chosen(file, Request.checked(**about, several=several)).motion()
+        motion = formats.read_channel(file, Request.create(**options, several=several)).motion()
     if vertical is not None:
-        motion = motion.with_vertical(named_vertical(vertical, name, several=several, **about))
+        motion = motion.with_vertical(load_vertical(vertical, name, several=several, **options))
     return motion if scale == 1.0 else motion.scaled(scale)
 
 
-def named_vertical(name: str, record: str, *, several: bool = False, **about: Any) -> Motion:
+def load_vertical(name: str, record: str, *, several: bool = False, **options: Any) -> Motion:
     """Return a vertical motion by name: a file, a shipped record, or else a channel of the horizontal file."""
-    about = {key: value for key, value in about.items() if key != "channel"}  # the channel of the horizontal motion
-    if _stands_alone(name):
-        return named_motion(name, several=True, **about)
-    if record == STANDARD_INPUT or not is_there(record):
+    options = {key: value for key, value in options.items() if key != "channel"}  # the channel of the horizontal motion
+    if _is_file_or_record(name):
+        return load_motion(name, several=True, **options)
+    if record == STANDARD_INPUT or not path_exists(record):
         text = f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels"
         raise UnreadableRecord(f"{text}; check the name")
-    return formats.chosen(record, Request.checked(**about, several=several), vertical=name).motion()
+    return formats.read_channel(record, Request.create(**options, several=several), vertical=name).motion()
 
 
-def _stands_alone(vertical: str) -> bool:
+def _is_file_or_record(vertical: str) -> bool:
     """Return whether a vertical motion is a file or shipped record, not a channel of the horizontal file."""
-    return os.path.isfile(vertical) or vertical in catalogue.names()  # noqa: PTH113 - see `is_there`
+    return os.path.isfile(vertical) or vertical in catalogue.names()  # noqa: PTH113 - see `path_exists`
 
 
-def refuse_what_is_known(name: str, **said: object) -> None:
-    """Raise an error if an argument specifies a known property of a shipped record."""
+def reject_redundant_arguments(name: str, **arguments: object) -> None:
+    """Raise an error if an argument specifies a property of a shipped record."""
     text = "a shipped record is one channel, with its step and units; leave {} out"
-    for argument in (each for each, value in said.items() if value is not None):
+    for argument in (key for key, value in arguments.items() if value is not None):
         raise UnreadableRecord(text, argument, path=name)
 
 
-def is_there(name: str | Path) -> bool:
+def path_exists(name: str | Path) -> bool:
     """Return whether a file or folder exists (False for overlong names)."""
     return os.path.exists(name)  # noqa: PTH110 - Path.exists() raises then
 
 
 def is_shipped(name: str) -> bool:
     """Return whether a name refers to a shipped record and not to a file."""
-    return name in catalogue.names() and not is_there(name)
+    return name in catalogue.names() and not path_exists(name)
 
 
-def expanded(names: Iterable[str]) -> list[str]:
+def expand_record_names(names: Iterable[str]) -> list[str]:
     """Return the distinct record names from files, folders, patterns and shipped records."""
-    return list(dict.fromkeys(itertools.chain.from_iterable(map(_files, names))))
+    return list(dict.fromkeys(itertools.chain.from_iterable(map(_find_records, names))))
 
 
-def _files(name: str) -> list[str]:
-    if os.path.isdir(name):  # noqa: PTH112 - see `is_there`
-        found = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
-    elif not glob.has_magic(name) or is_there(name):
+def _find_records(name: str) -> list[str]:
+    if os.path.isdir(name):  # noqa: PTH112 - see `path_exists`
+        matches = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
+    elif not glob.has_magic(name) or path_exists(name):
         return [name]
     else:
-        found = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
-        found = found or fnmatch.filter(catalogue.names(), name)
-    if not found:
+        matches = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
+        matches = matches or fnmatch.filter(catalogue.names(), name)
+    if not matches:
         raise UnreadableRecord("no file or shipped record matches this name; check the folder and the name", path=name)
-    return found
+    return matches
 
 
 @dataclass(frozen=True)
@@ -233,10 +233,10 @@ def shipped(name: str | None = None) -> Contents:
     ['ridgecrest-clc-090', 'ridgecrest-clc-360']
     """
     entries = []
-    for each in catalogue.names() if name is None else [name]:
-        record = catalogue.info(each)
-        known = {"name": each, "event": record.event, "station": record.station, "direction": record.direction}
-        entries.append(known | _measures(catalogue.load(each)) | {"terms": record.terms})
+    for record_name in catalogue.names() if name is None else [name]:
+        record = catalogue.info(record_name)
+        facts = {"name": record_name, "event": record.event, "station": record.station, "direction": record.direction}
+        entries.append(facts | _tabulate_motion(catalogue.load(record_name)) | {"terms": record.terms})
     return Contents("", {}, "records", entries)
 
 
@@ -278,19 +278,19 @@ def contents(
     >>> [entry["pga_g"] for entry in contents(path).entries]
     [0.5]
     """
-    identification, channels = formats.content(file, Request.checked(dt, units, channel, several=several))
-    motions = tuple(each.motion() for each in channels)
+    identification, channels = formats.read_content(file, Request.create(dt, units, channel, several=several))
+    motions = tuple(component.motion() for component in channels)
     name = "standard input" if hasattr(file, "read") else os.fsdecode(file)
     facts = {"file": name, "format": identification.format, "reason": identification.reason}
     title = f"{name}: {identification.format}, since {identification.reason}"
     entries = [
-        {"channel": each.number, "name": each.name, "units": each.units} | _measures(motion)
-        for each, motion in zip(channels, motions, strict=True)
+        {"channel": component.number, "name": component.name, "units": component.units} | _tabulate_motion(motion)
+        for component, motion in zip(channels, motions, strict=True)
     ]
     return Contents(title, facts, "channels", entries, motions)
 
 
-def _measures(motion: Motion) -> dict[str, Any]:
+def _tabulate_motion(motion: Motion) -> dict[str, Any]:
     return {
         named("step", "s"): motion.dt,
         named("duration", "s"): motion.duration,

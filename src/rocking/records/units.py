@@ -12,7 +12,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 
 #: Values of the argument `units=`.
-CHOICES = ("g", "m/s2", "cm/s2", "gal", "mm/s2", "mg")
+UNIT_NAMES = ("g", "m/s2", "cm/s2", "gal", "mm/s2", "mg")
 
 
 class Unit(NamedTuple):
@@ -31,12 +31,12 @@ class Unit(NamedTuple):
 SECOND = Unit("s", 1.0, 1.0)
 
 
-def _by_spelling(units: dict[Unit, str]) -> dict[str, Unit]:
+def _index_by_spelling(units: dict[Unit, str]) -> dict[str, Unit]:
     return {spelling: unit for unit, spellings in units.items() for spelling in spellings.split()}
 
 
 #: Units of time by spelling.
-TIMES = _by_spelling(
+TIME_UNITS = _index_by_spelling(
     {
         SECOND: "s sec secs second seconds seg segundos sek sekunden secondes secondi",
         Unit("ms", 1.0, 1e3): "ms msec msecs millis millisecond milliseconds",
@@ -49,7 +49,7 @@ TIMES = _by_spelling(
 )
 
 #: Units of acceleration by spelling without signs, such as "cms2" for "cm/s^2" and "cm_s2", "cmss" for "cm/sec/sec".
-ACCELERATIONS = _by_spelling(
+ACCELERATION_UNITS = _index_by_spelling(
     {
         Unit("g", STANDARD_GRAVITY, 1.0): "g gs",
         Unit("g/10", STANDARD_GRAVITY, 10.0): "g10",
@@ -68,10 +68,10 @@ ACCELERATIONS = _by_spelling(
 
 def find_unit(spelling: str) -> Unit | None:
     """Return the unit spelled "CM/SEC/SEC", "cm/sec2", "cm/s^2", "cm/s²", "cm_s2", "gal", "G", ..., or None."""
-    return ACCELERATIONS.get(plain_spelling(spelling))
+    return ACCELERATION_UNITS.get(normalise_spelling(spelling))
 
 
-def plain_spelling(spelling: str) -> str:
+def normalise_spelling(spelling: str) -> str:
     """Return a spelling without signs: "ms2" for "m/s^2", "mss" for "M/SEC/SEC"."""
     plain = re.sub(r"[\s^*._/·'’]", "", spelling.lower().replace("²", "2").replace("⁻", "-"))
     return plain.replace("sec", "s").replace("s-2", "s2")
@@ -79,13 +79,13 @@ def plain_spelling(spelling: str) -> str:
 
 def find_time_unit(spelling: str) -> Unit | None:
     """Return the unit of time spelled "ms", "Sec.", "minutes", ..., or None."""
-    return TIMES.get(spelling.strip().rstrip(".").lower())
+    return TIME_UNITS.get(spelling.strip().rstrip(".").lower())
 
 
 def choose_unit(units: str) -> Unit:
     """Return the unit named by a user."""
     unit = find_unit(units) if isinstance(units, str) else None
-    if unit is None or unit.name not in CHOICES:
-        text = f"the {{}} {units!r} are not known; give one of {', '.join(CHOICES)}"
+    if unit is None or unit.name not in UNIT_NAMES:
+        text = f"the {{}} {units!r} are not known; give one of {', '.join(UNIT_NAMES)}"
         raise UnreadableRecord(text, "units", value=units)
     return unit

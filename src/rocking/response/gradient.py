@@ -325,7 +325,7 @@ def _by_own_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
 
 def _by_samples(motion: Motion | None, values: Floats) -> Floats:
     """Convert derivatives by the coefficients of lines to accelerations at their ends."""
-    if motion is None or values.shape[1] != 2 or piecewise.jumps(motion):
+    if motion is None or values.shape[1] != 2 or piecewise.has_jumps(motion):
         raise InvalidOption("the motion is not linear between samples; take the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)
     found = np.zeros(len(values) + 1)

@@ -21,7 +21,6 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisected
 from rocking.errors import InvalidOption
-from rocking.kernels.ground import component_coefficients
 from rocking.kernels.state import Record
 from rocking.motion import piecewise
 from rocking.response.history import History, elongation, plastic_elongations
@@ -159,7 +158,9 @@ class Contact:
         anywhere = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
         piece = np.where(at_rest, anywhere, self.history.trail.nodes["piece"][rows])
         elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
-        push, *lift = (piecewise.value(coefficients, elapsed) for coefficients in component_coefficients(ground, piece))
+        push, *lift = (
+            piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in component_coefficients(ground, piece)
+        )
         return push, lift[0] if lift else np.zeros_like(push)
 
     def _samples(self) -> tuple[Floats, Integers]:

@@ -22,9 +22,9 @@ from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, parts_of, simulate_tasks
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.piecewise import STRONGEST
-from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
-from rocking.records.named import Motions, names_of, several_motions
+from rocking.motion.piecewise import MAX_ACCELERATION
+from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
+from rocking.records.named import Motions, list_motion_names, list_motions
 from rocking.response import COUNT, RELATIVE, factors_near
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class Scales:
     @classmethod
     def from_levels(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
         """Create scales from `levels` and `measure` as in `simulate_many`, or for unscaled motions."""
-        known = Measure.parse(measure, among=SCALES)
+        known = Measure.parse(measure, among=SCALING_MEASURES)
         if levels is None:
             if known.name != "factor":
                 raise InvalidOption("{} says what {} are: give those as well", "measure", "levels")
@@ -112,7 +112,7 @@ class Scales:
         with np.errstate(over="ignore"):
             factors = self.values / (self.measure or FACTOR).positive(motion, motion.name)
             largest = factors.max() * np.abs(motion.coefficients).max()
-        if not largest <= STRONGEST:
+        if not largest <= MAX_ACCELERATION:
             motion.scaled(float(factors.max()))  # raises for too strong motions, not only steep ones
         return factors
 
@@ -194,7 +194,7 @@ def product_of(
     duration: float | None,
 ) -> Product:
     """Create a product from the arguments of `simulate_many`."""
-    bodies, shaking = bodies_of(blocks), tuple(several_motions(motions))
+    bodies, shaking = bodies_of(blocks), tuple(list_motions(motions))
     return Product(
         bodies, shaking, Scales.from_levels(levels, measure), polarity, model, chattering_scheme(chattering), duration
     )
@@ -230,7 +230,7 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
         described["overturned"]["long_name"] = f"whether the {coordinate.name} passed its limit, where it has one"
     variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
     coordinates = {
-        "motion": ("motion", names_of(product.motions)),
+        "motion": ("motion", list_motion_names(product.motions)),
         **verticals_of(product.motions),
         "scale": ("scale", product.scales.values, product.scales.about),
         "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in product.signs]),

@@ -19,7 +19,7 @@ from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.records.named import one_motion
+from rocking.records.named import check_motion
 from rocking.response import Response, Solution
 
 _EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
@@ -109,7 +109,7 @@ def response_to(
     factor: float = 1.0,
 ) -> Response:
     """Compute a response like `simulate`, with `name` for the initial coordinate in messages."""
-    how, alone, motion = chattering_scheme(chattering), one_body(block).alone(), one_motion(motion)
+    how, alone, motion = chattering_scheme(chattering), one_body(block).alone(), check_motion(motion)
     setup, ground = Setup(alone, model, how, duration, initial), None
     if factor != 1.0:  # repeated simulations leave the cache unchanged
         ground = ground_of.__wrapped__(motion, block.gravity, factor)

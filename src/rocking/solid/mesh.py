@@ -18,14 +18,14 @@ from rocking.motion.processing import sine_cosine
 from rocking.solid import support as polygons
 from rocking.solid.repair import (
     Surface,
-    filled,
+    combine_moments,
+    combine_surfaces,
+    compute_moments,
+    describe_overlaps,
+    fill_holes,
     is_closed,
-    joined,
-    moments,
-    one_of,
-    oriented,
-    overlaps,
-    together,
+    merge_corners,
+    orient_surfaces,
 )
 
 if TYPE_CHECKING:
@@ -37,44 +37,44 @@ if TYPE_CHECKING:
     Mesh = str | PathLike[str] | BinaryIO | Trimesh | Scene
 
 #: Meshes included in the package, by name.
-SHIPPED: Final = {"statue": Path(__file__).with_name("data") / "statue.obj"}
+SHIPPED_MESHES: Final = {"statue": Path(__file__).with_name("data") / "statue.obj"}
 
 #: Units of length, m.
-UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+LENGTH_UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 
-class Part(NamedTuple):
-    """Part of a mesh: corners, shape (n, 3), and indices of the corners of triangles, shape (m, 3)."""
+class MeshPart(NamedTuple):
+    """Part of a mesh."""
 
-    name: str
-    vertices: Floats
-    faces: Integers
-
-
-class Parts(NamedTuple):
-    """All parts of a mesh, the name of the mesh, and its axis that points up."""
-
-    parts: tuple[Part, ...]
-    name: str
-    up: str
+    name: str  # name in the file
+    vertices: Floats  # corners, shape (n, 3)
+    faces: Integers  # indices of the corners of each triangle, shape (m, 3)
 
 
-def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
-    """Return the parts of a mesh, with unique names and in their order, of ``most`` triangles at most."""
+class MeshParts(NamedTuple):
+    """All parts of a mesh."""
+
+    parts: tuple[MeshPart, ...]  # parts with triangles
+    name: str  # name of the mesh
+    up: str  # axis that points up
+
+
+def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
+    """Return the parts of a mesh in their order, with unique names. Too many triangles are an error."""
     name, up, path = type(mesh).__name__, "z", ""
-    found: list[tuple[str, Any, Any]]
+    shapes: list[tuple[str, Any, Any]]
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
-        found = [("mesh", mesh, np.eye(4))]
+        shapes = [("mesh", mesh, np.eye(4))]
     else:
         scene: Any = mesh
         if not hasattr(mesh, "geometry"):
             file: PurePath
             if isinstance(mesh, (str, PathLike)):
-                file = SHIPPED.get(str(mesh)) or Path(mesh)
-                path, scene = str(mesh), _read(file, str(mesh))
+                file = SHIPPED_MESHES.get(str(mesh)) or Path(mesh)
+                path, scene = str(mesh), _read_file(file, str(mesh))
             elif hasattr(mesh, "read") and isinstance(getattr(mesh, "name", None), str):
                 file = PurePath(mesh.name)
-                path, scene = file.name, _streamed(mesh, file.name)
+                path, scene = file.name, _read_stream(mesh, file.name)
             else:
                 raise InvalidBlock(
                     "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, "
@@ -84,34 +84,37 @@ def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
                 )
             name, up = file.name, "y" if file.suffix.lower() in (".glb", ".gltf") else "z"
         graph, geometry = scene.graph, scene.geometry
-        placed = [(str(node), *graph[node]) for node in sorted(graph.nodes_geometry)]
-        found = [(node, geometry[shape], transform) for node, transform, shape in placed]
-    if most is not None and (count := sum(len(getattr(each, "faces", ())) for _, each, _ in found)) > most:
+        placements = [(str(node), *graph[node]) for node in sorted(graph.nodes_geometry)]
+        shapes = [(node, geometry[key], transform) for node, transform, key in placements]
+    if max_faces is not None and (count := sum(len(getattr(shape, "faces", ())) for _, shape, _ in shapes)) > max_faces:
         raise InvalidBlock(
-            f"holds {count} triangles, of which at most {most} are read here: make the mesh coarser", path=path or name
+            f"holds {count} triangles, of which at most {max_faces} are read here: make the mesh coarser",
+            path=path or name,
         )
-    parts = tuple(_part(node, each, transform) for node, each, transform in found if len(getattr(each, "faces", ())))
+    parts = tuple(
+        _place_part(node, shape, transform) for node, shape, transform in shapes if len(getattr(shape, "faces", ()))
+    )
     if not parts:
         raise InvalidBlock(
             "holds no faces: a mesh of triangles is needed, not points, lines or other text", path=path or name
         )
     if not all(np.all(np.isfinite(part.vertices)) for part in parts):
         raise InvalidBlock("has corners that are not finite numbers: export the mesh again", path=path or name)
-    return Parts(parts, name, up)
+    return MeshParts(parts, name, up)
 
 
-def _read(file: Path, named: str) -> Scene:
+def _read_file(file: Path, path: str) -> Scene:
     if file.is_dir():
-        raise InvalidBlock("this is a folder, not a file: name the file in it", path=named)
+        raise InvalidBlock("this is a folder, not a file: name the file in it", path=path)
     if not file.is_file():
-        known = f"; the mesh that ships is {', '.join(SHIPPED)}" if not file.suffix else ""
-        raise InvalidBlock(f"there is no such file{known}", path=named)
-    return _loaded(file, named)
+        hint = f"; the mesh that ships is {', '.join(SHIPPED_MESHES)}" if not file.suffix else ""
+        raise InvalidBlock(f"there is no such file{hint}", path=path)
+    return _load_scene(file, path)
 
 
-def _streamed(stream: BinaryIO, name: str) -> Scene:
+def _read_stream(stream: BinaryIO, name: str) -> Scene:
     """Read a stream, but no file or address named in it. An unnamed mesh has the name of the stream."""
-    scene = _loaded(stream, name, resolver={})
+    scene = _load_scene(stream, name, resolver={})
     if PurePath(name).suffix.lower() in (".ply", ".stl") and len(scene.geometry) == 1:
         (mesh,) = scene.geometry.values()
         scene = type(scene)()
@@ -119,7 +122,7 @@ def _streamed(stream: BinaryIO, name: str) -> Scene:
     return scene
 
 
-def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
+def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
     """Read a file or stream, and files named in it, with trimesh."""
     try:
         import trimesh
@@ -127,19 +130,19 @@ def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
         raise InvalidOption(f"meshes are read with trimesh, which is not installed: {install('mesh')}") from None
     suffix = PurePath(source.name).suffix.lower().removeprefix(".")
     # Objects and groups of OBJ files are parts, regardless of material. Corners are unchanged.
-    how |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
+    options |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
     try:
-        return trimesh.load_scene(source, file_type=suffix, process=False, **how)
+        return trimesh.load_scene(source, file_type=suffix, process=False, **options)
     except Exception as error:  # readers of foreign files raise any type
         formats = sorted(trimesh.available_formats())
-        said = f"it lacks {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
-        reason = f"{said or type(error).__name__}; is it whole, and what its name says?"
+        message = f"it lacks {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
+        reason = f"{message or type(error).__name__}; is it whole, and what its name says?"
         if suffix not in formats:
             reason = f"is of no format that trimesh reads ({', '.join(formats)})"
-        raise InvalidBlock(f"cannot be read: {literal(reason)}", path=named) from None
+        raise InvalidBlock(f"cannot be read: {literal(reason)}", path=path) from None
 
 
-def _part(name: str, mesh: Any, transform: Any) -> Part:
+def _place_part(name: str, mesh: Any, transform: Any) -> MeshPart:
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     matrix = np.asarray(transform, dtype=np.float64)
     faces = np.asarray(mesh.faces, dtype=np.int64)
@@ -147,17 +150,17 @@ def _part(name: str, mesh: Any, transform: Any) -> Part:
         vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirror image reverses the normals
             faces = faces[:, ::-1]
-    return Part(name, vertices, faces)
+    return MeshPart(name, vertices, faces)
 
 
-def length_of(unit: object) -> float:
+def parse_length_unit(unit: object) -> float:
     """Return the length of the unit of a mesh, m, from its name or a number."""
     if isinstance(unit, str):
-        return UNITS[checks.one_of(unit, "unit", InvalidBlock, [*UNITS])]
+        return LENGTH_UNITS[checks.one_of(unit, "unit", InvalidBlock, [*LENGTH_UNITS])]
     return checks.positive(unit, "unit", InvalidBlock, "m")
 
 
-def upright(up: object) -> Floats:
+def compute_upright_rotation(up: object) -> Floats:
     """Return the smallest rotation, shape (3, 3), of an axis of a mesh to z."""
     if isinstance(up, str):
         axis = checks.one_of(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
@@ -173,8 +176,8 @@ def upright(up: object) -> Floats:
     x, y, _ = u
     # Rodrigues' formula for the axis u x z: 1 + V + V^2/(1 + u_z), whose divisor loses digits near -z.
     v = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
-    share = 1.0 / (1.0 + u[2]) if u[2] > 0.0 else (1.0 - u[2]) / (x * x + y * y)
-    return np.asarray(np.eye(3) + v + v @ v * share)
+    factor = 1.0 / (1.0 + u[2]) if u[2] > 0.0 else (1.0 - u[2]) / (x * x + y * y)
+    return np.asarray(np.eye(3) + v + v @ v * factor)
 
 
 class Region(NamedTuple):
@@ -192,7 +195,7 @@ class Region(NamedTuple):
     density: float | None
 
 
-def properties(
+def compute_properties(
     mesh: Mesh,
     density: float | Mapping[str, float] | None,
     support: ArrayLike | None,
@@ -201,116 +204,123 @@ def properties(
     up: str | ArrayLike | None,
     unit: str | float,
     turn: float,
-    most: int | None = None,
+    max_faces: int | None = None,
 ) -> tuple[dict[str, Any], list[Surface]]:
     """Return the arguments of `Solid`, and closed surfaces of its parts with the lowest corner at height 0."""
     if support is not None and tolerance is not None:
         raise InvalidBlock("{} is how a support is looked for: leave it out where {} is given", "tolerance", "support")
-    found = parts_of(mesh, most)
+    scene = read_parts(mesh, max_faces)
     with np.errstate(over="ignore"):
-        extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in found.parts) * length_of(unit)
+        extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in scene.parts) * parse_length_unit(unit)
     if extent and not 1e-9 < extent < 1e9:
-        raise InvalidBlock(f"is {extent:.3g} m large, which no body is: correct {{}}", "unit", path=found.name)
+        raise InvalidBlock(f"is {extent:.3g} m large, which no body is: correct {{}}", "unit", path=scene.name)
     sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", InvalidBlock)))
     clockwise = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])  # seen from above
-    rotation = clockwise @ upright(found.up if up is None else up) * length_of(unit)
-    parts = [part._replace(vertices=part.vertices @ rotation.T) for part in found.parts]
-    every = np.vstack([part.vertices[np.unique(part.faces)] for part in parts])
-    ground = float(every[:, 2].min())
-    every[:, 2] -= ground
-    height = float(every[:, 2].max())
-    names, surfaces = _surfaces(parts, density, found.name)
-    densities = _densities(density, names, [part.name for part in parts])
-    inside = [moments(surface.vertices, surface.faces) for surface in surfaces]
-    for name, surface, each in zip(names, surfaces, inside, strict=True):
-        if not each.amount > 1e-9 * float(np.ptp(surface.vertices, axis=0).max()) ** 3:
-            what = "" if name == found.name else f"{name} "
+    rotation = clockwise @ compute_upright_rotation(scene.up if up is None else up) * parse_length_unit(unit)
+    parts = [part._replace(vertices=part.vertices @ rotation.T) for part in scene.parts]
+    corners = np.vstack([part.vertices[np.unique(part.faces)] for part in parts])
+    ground = float(corners[:, 2].min())
+    corners[:, 2] -= ground
+    height = float(corners[:, 2].max())
+    names, surfaces = _close_surfaces(parts, density, scene.name)
+    densities = _resolve_densities(density, names, [part.name for part in parts])
+    part_moments = [compute_moments(surface.vertices, surface.faces) for surface in surfaces]
+    for name, surface, moments in zip(names, surfaces, part_moments, strict=True):
+        if not moments.amount > 1e-9 * float(np.ptp(surface.vertices, axis=0).max()) ** 3:
+            prefix = "" if name == scene.name else f"{name} "
             raise InvalidBlock(
-                f"{what}encloses no volume: it is a surface without an inside; give it a thickness", path=found.name
+                f"{prefix}encloses no volume: it is a surface without an inside; give it a thickness", path=scene.name
             )
-    used = [densities[name] for name in names]
-    whole = together(inside, [1.0 if each is None else each for each in used])
-    within = 1e-3 * height if tolerance is None else checks.positive(tolerance, "tolerance", InvalidBlock, "m")
-    if within >= height:
+    part_densities = [densities[name] for name in names]
+    total = combine_moments(part_moments, [1.0 if value is None else value for value in part_densities])
+    max_height = 1e-3 * height if tolerance is None else checks.positive(tolerance, "tolerance", InvalidBlock, "m")
+    if max_height >= height:
         raise InvalidBlock(
-            f"{{}} must be below the height of the mesh, {height:.4g} m, not {within:g}", "tolerance", value=tolerance
+            f"{{}} must be below the height of the mesh, {height:.4g} m, not {max_height:g}",
+            "tolerance",
+            value=tolerance,
         )
-    polygon, notes = _support(every, support, within, found.name)
-    made = {
+    polygon, notes = _find_support(corners, support, max_height, scene.name)
+    arguments = {
         "support": polygon,
-        "centre": whole.centre - [0.0, 0.0, ground],
-        "inertia_over_mass": whole.inertia_over_amount(),
-        "mass": None if density is None else whole.amount,
-        "description": found.name,
+        "centre": total.centre - [0.0, 0.0, ground],
+        "inertia_over_mass": total.compute_inertia(),
+        "mass": None if density is None else total.amount,
+        "description": scene.name,
         "height": height,
-        "regions": [Region(*each) for each in zip(names, (each.amount for each in inside), used, strict=True)],
+        "regions": [
+            Region(*fields)
+            for fields in zip(names, (part.amount for part in part_moments), part_densities, strict=True)
+        ],
         "repairs": tuple(
             f"{name}: {sentence}" if len(names) > 1 else sentence
             for name, surface in zip(names, surfaces, strict=True)
             for sentence in surface.repairs
         ),
-        "notes": (*notes, *overlaps(names, surfaces), *height_notes(height), *density_notes(used)),
+        "notes": (*notes, *describe_overlaps(names, surfaces), *height_notes(height), *density_notes(part_densities)),
     }
-    return made, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
+    return arguments, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
 
 
-def _densities(
-    given: float | Mapping[str, float] | None, names: Sequence[str], every: Sequence[str]
+def _resolve_densities(
+    density: float | Mapping[str, float] | None, names: Sequence[str], known: Sequence[str]
 ) -> dict[str, float | None]:
     """Return the density of each surface, kg/m^3, by name. Every part of the mesh may have a density."""
-    if given is None:
+    if density is None:
         return dict.fromkeys(names)
-    if not isinstance(given, Mapping):
-        return dict.fromkeys(names, checks.positive(given, "density", InvalidBlock, "kg/m^3"))
-    known = f"its parts are {', '.join(every)}"
-    unknown, missing = [name for name in given if name not in every], [name for name in names if name not in given]
+    if not isinstance(density, Mapping):
+        return dict.fromkeys(names, checks.positive(density, "density", InvalidBlock, "kg/m^3"))
+    parts_text = f"its parts are {', '.join(known)}"
+    unknown, missing = [name for name in density if name not in known], [name for name in names if name not in density]
     if unknown:
-        hint = checks.meant(str(unknown[0]), every, known)
+        hint = checks.meant(str(unknown[0]), known, parts_text)
         raise InvalidBlock(
             f"{{}} has a part {checks.shown(unknown[0])}, which the mesh does not have; {hint}", "density"
         )
     if missing:
-        raise InvalidBlock(f"{{}} is missing for {', '.join(missing)}; {known}", "density")
-    return {name: checks.positive(given[name], "density", InvalidBlock, "kg/m^3") for name in names}
+        raise InvalidBlock(f"{{}} is missing for {', '.join(missing)}; {parts_text}", "density")
+    return {name: checks.positive(density[name], "density", InvalidBlock, "kg/m^3") for name in names}
 
 
-def _surfaces(
-    parts: Sequence[Part], density: float | Mapping[str, float] | None, file: str
+def _close_surfaces(
+    parts: Sequence[MeshPart], density: float | Mapping[str, float] | None, file: str
 ) -> tuple[list[str], list[Surface]]:
     """Close and name the surfaces of the parts. Open parts of one density are joined first."""
     names = [part.name for part in parts]
-    found = [joined(file, part.vertices, part.faces) for part in parts]
-    is_open = [not is_closed(surface.faces) for surface in found]
+    surfaces = [merge_corners(file, part.vertices, part.faces) for part in parts]
+    is_open = [not is_closed(surface.faces) for surface in surfaces]
     if not isinstance(density, Mapping) and sum(is_open) > 1:
-        some = [part for part, each in zip(parts, is_open, strict=True) if each]
-        rest = one_of([Surface(part.vertices, part.faces) for part in some])
-        kept = [k for k, each in enumerate(is_open) if not each]
-        names = [*(names[k] for k in kept), " + ".join(part.name for part in some)]
-        found = [*(found[k] for k in kept), joined(file, rest.vertices, rest.faces)]
-    given = density if isinstance(density, Mapping) else {}
-    whole = oriented([filled(each) for each in found], [name not in given for name in names])
-    left = [k for k, each in enumerate(whole) if len(each.faces)]
-    return [names[k] for k in left], [whole[k] for k in left]
+        open_parts = [part for part, has_gap in zip(parts, is_open, strict=True) if has_gap]
+        combined = combine_surfaces([Surface(part.vertices, part.faces) for part in open_parts])
+        closed_indices = [k for k, has_gap in enumerate(is_open) if not has_gap]
+        names = [*(names[k] for k in closed_indices), " + ".join(part.name for part in open_parts)]
+        surfaces = [*(surfaces[k] for k in closed_indices), merge_corners(file, combined.vertices, combined.faces)]
+    densities = density if isinstance(density, Mapping) else {}
+    closed = orient_surfaces([fill_holes(surface) for surface in surfaces], [name not in densities for name in names])
+    nonempty = [k for k, surface in enumerate(closed) if len(surface.faces)]
+    return [names[k] for k in nonempty], [closed[k] for k in nonempty]
 
 
-def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: str) -> tuple[Floats, tuple[str, ...]]:
+def _find_support(
+    corners: Floats, support: ArrayLike | None, tolerance: float, path: str
+) -> tuple[Floats, tuple[str, ...]]:
     """Return the support polygon, with notes, of a mesh whose lowest corner is at height zero."""
-    if given is not None:
-        polygon = polygons.given_polygon(given)
-        outline, beyond = polygons.hull(corners[:, :2]), 0.0
+    if support is not None:
+        polygon = polygons.check_polygon(support)
+        outline, excess = polygons.compute_hull(corners[:, :2]), 0.0
         if outline is not None:
-            facing, distances = polygons.edges(outline - outline[0])
-            beyond = float(np.max((polygon - outline[0]) @ polygons.directions(facing).T - distances))
-        if outline is None or beyond > 1e-6 * float(np.ptp(corners, axis=0).max()):
+            azimuths, distances = polygons.compute_edges(outline - outline[0])
+            excess = float(np.max((polygon - outline[0]) @ polygons.compute_directions(azimuths).T - distances))
+        if outline is None or excess > 1e-6 * float(np.ptp(corners, axis=0).max()):
             (west, south, _), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
             raise InvalidBlock(
-                f"{{}} reaches {beyond:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in the "
+                f"{{}} reaches {excess:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in the "
                 f"east and {south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, in the "
                 "mesh's own coordinates",
                 "support",
             )
         return polygon, ()
-    base = polygons.hull(corners[corners[:, 2] <= tolerance, :2])
+    base = polygons.compute_hull(corners[corners[:, 2] <= tolerance, :2])
     if base is None:
         raise InvalidBlock(
             f"stands on a point or a line: the corners within {{}}, {tolerance:.3g} m, of the lowest one span no "
@@ -319,9 +329,9 @@ def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: s
             "support",
             path=path,
         )
-    wider = polygons.hull(corners[corners[:, 2] <= 10.0 * tolerance, :2])
+    wider = polygons.compute_hull(corners[corners[:, 2] <= 10.0 * tolerance, :2])
     assert wider is not None
-    growth = polygons.area(wider) / polygons.area(base) - 1.0
+    growth = polygons.compute_area(wider) / polygons.compute_area(base) - 1.0
     if growth <= 0.02:
         return base, ()
     return base, (

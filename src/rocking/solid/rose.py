@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Default azimuths, degrees.
-EVERY: Final = np.arange(0.0, 360.0, 5.0)
+DEFAULT_AZIMUTHS: Final = np.arange(0.0, 360.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,21 +65,21 @@ class Rose(DatasetResult):
 
     def summary(self) -> str:
         data = self.data
-        shown = {"azimuth": "azimuth, deg", "acceleration": "uplift, g", "alpha": "alpha, rad", "p": "p, rad/s"} | {
+        titles = {"azimuth": "azimuth, deg", "acceleration": "uplift, g", "alpha": "alpha, rad", "p": "p, rad/s"} | {
             "restitution": "restitution", "coupling": "coupling", "aside": "pivot aside, m"
         }  # fmt: skip
-        rows = [*zip(*(data[name].values.tolist() for name in shown), strict=True)]
-        worst = {name: float(data[name].max()) for name in ("coupling", "aside", "gap")}
+        rows = [*zip(*(data[name].values.tolist() for name in titles), strict=True)]
+        largest = {name: float(data[name].max()) for name in ("coupling", "aside", "gap")}
         return "\n".join(
             [
                 self._headline(),
                 "",
-                table_of_some([*shown.values()], rows),
+                table_of_some([*titles.values()], rows),
                 "",
                 "planar rocking leaves out turning about the vertical and rolling over corners: over all azimuths "
-                f"products of inertia are up to {worst['coupling']:.2g} of the moment, pivots lie up to "
-                f"{worst['aside']:.2g} m to the side of the centre of mass, and those of both sides up to "
-                f"{worst['gap']:.2g} m from facing each other",
+                f"products of inertia are up to {largest['coupling']:.2g} of the moment, pivots lie up to "
+                f"{largest['aside']:.2g} m to the side of the centre of mass, and those of both sides up to "
+                f"{largest['gap']:.2g} m from facing each other",
             ]
         )
 
@@ -116,42 +116,42 @@ class Rose(DatasetResult):
         )
 
 
-def checked_azimuths(azimuths: ArrayLike | None) -> Floats:
+def check_azimuths(azimuths: ArrayLike | None) -> Floats:
     """Return unique, increasing azimuths in [0, 360), degrees, or raise `InvalidOption`."""
     if azimuths is None:
-        return EVERY
-    given = np.atleast_1d(checks.numbers(azimuths, "azimuths", InvalidOption))
-    if given.ndim != 1 or not given.size or not np.all(np.isfinite(given)):
+        return DEFAULT_AZIMUTHS
+    angles = np.atleast_1d(checks.numbers(azimuths, "azimuths", InvalidOption))
+    if angles.ndim != 1 or not angles.size or not np.all(np.isfinite(angles)):
         raise InvalidOption("{} must be one finite number or more, degrees clockwise from north", "azimuths")
-    return np.unique([decimal(value) % 360.0 for value in np.mod(given, 360.0).tolist()])
+    return np.unique([decimal(value) % 360.0 for value in np.mod(angles, 360.0).tolist()])
 
 
-def rose_of(
+def compute_rose(
     polygon: Floats, height: float, inertia: Floats, gravity: float, azimuths: Floats, description: str
 ) -> Rose:
     """Return the rose from the support about the centre of mass, its height, m, and `inertia_over_mass`, m^2."""
     import xarray as xr
 
-    here, there = (polygons.extents(polygon, turned) for turned in (azimuths, azimuths + 180.0))
-    radius, other = np.hypot(here.distance, height), np.hypot(there.distance, height)
-    squared, coupling = about_axes(inertia, azimuths)
-    facing, distances = polygons.edges(polygon)
-    least = int(np.argmin(distances))
+    front, back = (polygons.compute_extents(polygon, direction) for direction in (azimuths, azimuths + 180.0))
+    radius, back_radius = np.hypot(front.distance, height), np.hypot(back.distance, height)
+    squared, coupling = compute_axis_moments(inertia, azimuths)
+    edge_azimuths, distances = polygons.compute_edges(polygon)
+    weakest = int(np.argmin(distances))
     columns = {
-        "acceleration": (here.distance / height, "ground acceleration that lifts the body to this side", "g"),
-        "alpha": (np.arctan2(here.distance, height), "slenderness, at which a tilted table overturns it", "rad"),
+        "acceleration": (front.distance / height, "ground acceleration that lifts the body to this side", "g"),
+        "alpha": (np.arctan2(front.distance, height), "slenderness, at which a tilted table overturns it", "rad"),
         "p": (np.sqrt(gravity * radius / (squared + radius**2)), "frequency parameter", "rad/s"),
         "restitution": (
-            (squared + height**2 - here.distance * there.distance) / (squared + other**2),
+            (squared + height**2 - front.distance * back.distance) / (squared + back_radius**2),
             "factor on the angular speed on leaving this side, by angular momentum; not positive: too stocky to rock",
             "1",
         ),
         "radius": (radius, "distance from the pivot to the centre of mass", "m"),
         "rise": (radius - height, "rise of the centre of mass up to the unstable balance", "m"),
         "coupling": (coupling, "products of inertia about the axis of rocking over the moment of inertia", "1"),
-        "aside": (here.aside, "how far the pivot lies to the side of the centre of mass", "m"),
+        "aside": (front.aside, "how far the pivot lies to the side of the centre of mass", "m"),
         "gap": (
-            np.maximum(np.maximum(here.low + there.low, -here.high - there.high), 0.0),
+            np.maximum(np.maximum(front.low + back.low, -front.high - back.high), 0.0),
             "how far the pivots of both sides are from facing each other",
             "m",
         ),
@@ -159,15 +159,15 @@ def rose_of(
     return Rose(
         xr.Dataset(
             {
-                **{name: variable("azimuth", values, said, unit) for name, (values, said, unit) in columns.items()},
+                **{name: variable("azimuth", values, label, unit) for name, (values, label, unit) in columns.items()},
                 "east": variable("corner", polygon[:, 0], "support, east of the centre of mass", "m"),
                 "north": variable("corner", polygon[:, 1], "support, north of the centre of mass", "m"),
             },
             {"azimuth": variable("azimuth", azimuths, "clockwise from north", "deg")},
             {
                 "description": description,
-                "weakest_azimuth": float(facing[least]),
-                "weakest_acceleration": float(distances[least] / height),
+                "weakest_azimuth": float(edge_azimuths[weakest]),
+                "weakest_acceleration": float(distances[weakest] / height),
                 "height_of_mass": height,
                 "gravity": gravity,
             },
@@ -175,11 +175,11 @@ def rose_of(
     )
 
 
-def about_axes(inertia: Floats, azimuths: Floats) -> tuple[Floats, Floats]:
+def compute_axis_moments(inertia: Floats, azimuths: Floats) -> tuple[Floats, Floats]:
     """Return moments about horizontal axes perpendicular to azimuths, and ratios of products of inertia to them."""
-    towards = polygons.directions(azimuths)
-    axis = np.column_stack([towards[:, 1], -towards[:, 0], np.zeros(len(towards))])
+    directions = polygons.compute_directions(azimuths)
+    axis = np.column_stack([directions[:, 1], -directions[:, 0], np.zeros(len(directions))])
     torque = axis @ inertia
     squared = np.sum(torque * axis, axis=1)
-    products = np.hypot(np.sum(torque[:, :2] * towards, axis=1), torque[:, 2])
+    products = np.hypot(np.sum(torque[:, :2] * directions, axis=1), torque[:, 2])
     return squared, products / squared

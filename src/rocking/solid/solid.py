@@ -19,8 +19,8 @@ from rocking.core.result import Result, Row, dictionary_of, text_of
 from rocking.core.tables import counted
 from rocking.errors import InvalidBlock
 from rocking.solid import support as polygons
-from rocking.solid.mesh import Region, properties
-from rocking.solid.rose import Rose, about_axes, checked_azimuths, rose_of
+from rocking.solid.mesh import Region, compute_properties
+from rocking.solid.rose import Rose, check_azimuths, compute_axis_moments, compute_rose
 
 if TYPE_CHECKING:
     from rocking.solid.mesh import Mesh
@@ -87,27 +87,27 @@ class Solid(Result):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        held: dict[str, Any] = {
-            "support": polygons.given_polygon(self.support),
-            "centre": _shaped(self.centre, "centre", (3,)),
-            "inertia_over_mass": _checked_inertia(self.inertia_over_mass),
+        checked_fields: dict[str, Any] = {
+            "support": polygons.check_polygon(self.support),
+            "centre": _check_array(self.centre, "centre", (3,)),
+            "inertia_over_mass": _check_inertia(self.inertia_over_mass),
             "mass": None if self.mass is None else checked_mass(self.mass),
             "gravity": checked_gravity(self.gravity),
             "description": checks.text(self.description, "description", InvalidBlock),
         }
-        for name, value in held.items():
+        for name, value in checked_fields.items():
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
             object.__setattr__(self, name, value)
         for name in ("regions", "repairs", "notes"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         checks.positive(self.centre[2], "height of the centre of mass", InvalidBlock, "m")
-        facing, distances = polygons.edges(self._about_centre)
-        least = int(np.argmin(distances))
-        if not distances[least] > 0.0:
+        azimuths, distances = polygons.compute_edges(self._centred_support)
+        weakest = int(np.argmin(distances))
+        if not distances[weakest] > 0.0:
             raise InvalidBlock(
-                f"this body does not stand: its centre of mass lies {-distances[least]:.3g} m outside its support, "
-                f"towards {facing[least]:.0f} deg; correct which axis points up, the densities, or {{}}",
+                f"this body does not stand: its centre of mass lies {-distances[weakest]:.3g} m outside its support, "
+                f"towards {azimuths[weakest]:.0f} deg; correct which axis points up, the densities, or {{}}",
                 "support",
             )
 
@@ -180,8 +180,8 @@ class Solid(Result):
         >>> Solid.from_mesh("statue", density={"plinth": 2700.0, "figure": 2650.0, "head": 2650.0})
         <Solid: statue.obj: 1.73 m high, 0.1711 m^3, 455.4 kg>
         """
-        made, _ = properties(mesh, density, support, tolerance, up=up, unit=unit, turn=turn)
-        return cls(gravity=gravity, **made)
+        arguments, _ = compute_properties(mesh, density, support, tolerance, up=up, unit=unit, turn=turn)
+        return cls(gravity=gravity, **arguments)
 
     @property
     def volume(self) -> float | None:
@@ -191,11 +191,11 @@ class Solid(Result):
     @property
     def weakest_azimuth(self) -> float:
         """Direction of the first uplift, degrees clockwise from north, perpendicular to an edge of the support."""
-        facing, distances = polygons.edges(self._about_centre)
-        return float(facing[np.argmin(distances)])
+        azimuths, distances = polygons.compute_edges(self._centred_support)
+        return float(azimuths[np.argmin(distances)])
 
     @property
-    def _about_centre(self) -> Floats:
+    def _centred_support(self) -> Floats:
         """Support relative to the centre of mass."""
         return np.asarray(self.support - self.centre[:2])
 
@@ -224,7 +224,7 @@ class Solid(Result):
         --------
         Block.from_pivots : Create a block from its pivots and its radius of gyration.
         """
-        plane = plane_of(self, azimuth)
+        plane = compute_plane(self, azimuth)
         plus, minus = plane.pivots.distance.tolist()
         return Block.from_pivots(
             (plus, minus),
@@ -238,22 +238,24 @@ class Solid(Result):
 
     def rose(self, azimuths: ArrayLike | None = None) -> Rose:
         """Return the resistance at azimuths (degrees clockwise from north; by default every five) as a `Rose`."""
-        at = checked_azimuths(azimuths)
+        angles = check_azimuths(azimuths)
         height = float(self.centre[2])
-        return rose_of(self._about_centre, height, self.inertia_over_mass, self.gravity, at, self.description)
+        return compute_rose(
+            self._centred_support, height, self.inertia_over_mass, self.gravity, angles, self.description
+        )
 
     def _headline(self) -> str:
-        known = [
+        sizes = [
             None if self.height is None else f"{self.height:.4g} m high",
             None if self.volume is None else f"{self.volume:.4g} m^3",
             None if self.mass is None else f"{self.mass:.4g} kg",
         ]
-        return ": ".join(part for part in (self.description, ", ".join(filter(None, known))) if part)
+        return ": ".join(part for part in (self.description, ", ".join(filter(None, sizes))) if part)
 
     def summary(self) -> str:
         weakest = self.rose([self.weakest_azimuth])
-        one = {name: float(weakest.data[name][0]) for name in weakest.TABLES["rose"]}
-        east, north = (float(each) for each in self.centre[:2])
+        row = {name: float(weakest.data[name][0]) for name in weakest.TABLES["rose"]}
+        east, north = (float(coordinate) for coordinate in self.centre[:2])
         sizes = np.ptp(self.support, axis=0)
         radii = np.sqrt(np.diag(self.inertia_over_mass))
         rows = [
@@ -265,11 +267,11 @@ class Solid(Result):
             Row("radii of gyration", "about axes to the east, to the north and up "
                 + ", ".join(f"{radius:.4g} m" for radius in radii)),
             Row("support", f"{counted(len(self.support), 'corner')}, {sizes[0]:.4g} m by {sizes[1]:.4g} m, "
-                f"{polygons.area(self.support):.4g} m^2"),
-            Row("least resistance", f"towards {self.weakest_azimuth:.4g} deg: lifted at {one['acceleration']:.4g} g, "
-                f"alpha {one['alpha']:.4g} rad, p {one['p']:.4g} rad/s"),
-            Row("left out there", f"products of inertia, {one['coupling']:.2g} of the moment; pivot {one['aside']:.2g} "
-                f"m to the side of the centre of mass, {one['gap']:.2g} m from facing the other one"),
+                f"{polygons.compute_area(self.support):.4g} m^2"),
+            Row("least resistance", f"towards {self.weakest_azimuth:.4g} deg: lifted at {row['acceleration']:.4g} g, "
+                f"alpha {row['alpha']:.4g} rad, p {row['p']:.4g} rad/s"),
+            Row("left out there", f"products of inertia, {row['coupling']:.2g} of the moment; pivot {row['aside']:.2g} "
+                f"m to the side of the centre of mass, {row['gap']:.2g} m from facing the other one"),
             *(Row("repaired", sentence) for sentence in self.repairs),
             *(Row("note", sentence) for sentence in self.notes),
         ]  # fmt: skip
@@ -299,42 +301,42 @@ class Solid(Result):
 
 
 class Plane(NamedTuple):
-    """Body in the plane of an azimuth, deg: pivots of both sides, height of the mass, radius of gyration, m."""
+    """Body in a vertical plane."""
 
-    azimuth: float
-    pivots: polygons.Extent
-    height: float
-    gyration: float
+    azimuth: float  # direction of side +, deg
+    pivots: polygons.Extent  # pivots of both sides
+    height: float  # height of the centre of mass, m
+    gyration: float  # radius of gyration, m
 
 
-def plane_of(solid: Solid, azimuth: float) -> Plane:
+def compute_plane(solid: Solid, azimuth: float) -> Plane:
     """Return the body in the vertical plane of an azimuth."""
-    towards = checks.finite(azimuth, "azimuth", InvalidBlock)
-    pivots = polygons.extents(solid.support - solid.centre[:2], [towards, towards + 180.0])
-    middle, apart = pivots.distance.mean(), np.ptp(pivots.distance)
-    if apart <= 1e-12 * middle:  # rounding only: a symmetric body has equal sides at any position
-        pivots = pivots._replace(distance=np.full(2, middle))
-    squared, _ = about_axes(solid.inertia_over_mass, np.array([towards]))
-    return Plane(towards, pivots, float(solid.centre[2]), math.sqrt(float(squared[0])))
+    direction = checks.finite(azimuth, "azimuth", InvalidBlock)
+    pivots = polygons.compute_extents(solid.support - solid.centre[:2], [direction, direction + 180.0])
+    mean, difference = pivots.distance.mean(), np.ptp(pivots.distance)
+    if difference <= 1e-12 * mean:  # rounding only: a symmetric body has equal sides at any position
+        pivots = pivots._replace(distance=np.full(2, mean))
+    squared, _ = compute_axis_moments(solid.inertia_over_mass, np.array([direction]))
+    return Plane(direction, pivots, float(solid.centre[2]), math.sqrt(float(squared[0])))
 
 
-def _shaped(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
-    found = np.array(checks.numbers(value, name, InvalidBlock))
-    if found.shape != shape or not np.all(np.isfinite(found)):
+def _check_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
+    array = np.array(checks.numbers(value, name, InvalidBlock))
+    if array.shape != shape or not np.all(np.isfinite(array)):
         raise InvalidBlock(f"{{}} must be finite numbers of shape {shape}", name, value=value)
-    return found
+    return array
 
 
-def _checked_inertia(value: ArrayLike) -> Floats:
-    found = _shaped(value, "inertia_over_mass", (3, 3))
-    rounding = 1e-9 * float(np.abs(found).max())
+def _check_inertia(value: ArrayLike) -> Floats:
+    tensor = _check_array(value, "inertia_over_mass", (3, 3))
+    rounding = 1e-9 * float(np.abs(tensor).max())
     # No principal moment exceeds the sum of the other two.
-    least, middle, most = np.linalg.eigvalsh(0.5 * (found + found.T))
-    is_symmetric = np.allclose(found, found.T, rtol=0.0, atol=rounding)
-    if not (rounding > 0.0 and is_symmetric and least + middle >= most - rounding and least > -rounding):
+    smallest, middle, largest = np.linalg.eigvalsh(0.5 * (tensor + tensor.T))
+    is_symmetric = np.allclose(tensor, tensor.T, rtol=0.0, atol=rounding)
+    if not (rounding > 0.0 and is_symmetric and smallest + middle >= largest - rounding and smallest > -rounding):
         raise InvalidBlock(
             "{} is the tensor of no body: it must be symmetric, each principal moment at most the sum of the others",
             "inertia_over_mass",
             value=value,
         )
-    return found
+    return tensor

@@ -19,18 +19,18 @@ from rocking.motion.processing import sine_cosine
 from rocking.solid.repair import Surface
 
 #: Largest distance from the outermost corner, relative to the polygon, of corners on one edge.
-_ON_EDGE: Final = 1e-6
+_EDGE_TOLERANCE: Final = 1e-6
 
 #: Largest number of bands, each with sections just above its lower and just below its upper end.
-_BANDS: Final = 120
+_MAX_BANDS: Final = 120
 
 
 class Extent(NamedTuple):
-    """Reach of a support in n directions, and ends of the edge or corner there, 90 deg counterclockwise; m, (n,)."""
+    """Reach of a support in n directions, m, shape (n,) each."""
 
-    distance: Floats
-    low: Floats
-    high: Floats
+    distance: Floats  # distance of the outermost edge or corner
+    low: Floats  # lower lateral end of it, positive 90 deg counterclockwise
+    high: Floats  # upper lateral end of it
 
     @property
     def aside(self) -> Floats:
@@ -38,104 +38,104 @@ class Extent(NamedTuple):
         return np.asarray(np.maximum(np.maximum(self.low, -self.high), 0.0))
 
 
-def directions(azimuths: ArrayLike) -> Floats:
+def compute_directions(azimuths: ArrayLike) -> Floats:
     """Return unit vectors (east, north) of azimuths, degrees; shape (n, 2)."""
     sine, cosine = sine_cosine(np.atleast_1d(np.asarray(azimuths, dtype=np.float64)))
     return np.column_stack([sine, cosine])
 
 
-def hull(points: Floats) -> Floats | None:
+def compute_hull(points: Floats) -> Floats | None:
     """Return the convex hull of points in a plane, counterclockwise; None if it has no area."""
     from scipy.spatial import ConvexHull, QhullError
 
-    off = points - points.mean(axis=0)
-    if len(points) < 3 or np.linalg.matrix_rank(off, tol=_ON_EDGE * float(np.abs(off).max())) < 2:
+    offsets = points - points.mean(axis=0)
+    if len(points) < 3 or np.linalg.matrix_rank(offsets, tol=_EDGE_TOLERANCE * float(np.abs(offsets).max())) < 2:
         return None
     try:
-        return np.asarray(points[ConvexHull(off).vertices])
+        return np.asarray(points[ConvexHull(offsets).vertices])
     except QhullError:
         return None
 
 
-def area(polygon: Floats) -> float:
+def compute_area(polygon: Floats) -> float:
     """Compute the area of a polygon, m^2."""
     x, y = (polygon - polygon[0]).T
     return float(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
-def given_polygon(value: ArrayLike) -> Floats:
+def check_polygon(value: ArrayLike) -> Floats:
     """Return the convex hull of the corners from a user, shape (n, 2), or raise `InvalidBlock`."""
     points = checks.numbers(value, "support", InvalidBlock)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
         raise InvalidBlock("{} must be corners of a polygon, each a finite (east, north) in m", "support", value=value)
-    found = hull(points)
-    if found is None:
+    polygon = compute_hull(points)
+    if polygon is None:
         raise InvalidBlock("{} must have three corners or more that are not on one line", "support")
-    return found
+    return polygon
 
 
-def extents(polygon: Floats, azimuths: ArrayLike) -> Extent:
+def compute_extents(polygon: Floats, azimuths: ArrayLike) -> Extent:
     """Return the reach in each direction of a polygon around the centre of mass."""
-    towards = directions(azimuths)
-    reach, across = polygon @ towards.T, polygon @ np.column_stack([-towards[:, 1], towards[:, 0]]).T
-    most = reach.max(axis=0)
-    outermost = reach >= most - _ON_EDGE * float(np.ptp(polygon, axis=0).max())
+    directions = compute_directions(azimuths)
+    reach, across = polygon @ directions.T, polygon @ np.column_stack([-directions[:, 1], directions[:, 0]]).T
+    max_reach = reach.max(axis=0)
+    outermost = reach >= max_reach - _EDGE_TOLERANCE * float(np.ptp(polygon, axis=0).max())
     low, high = np.where(outermost, across, np.inf).min(axis=0), np.where(outermost, across, -np.inf).max(axis=0)
-    return Extent(most, low, high)
+    return Extent(max_reach, low, high)
 
 
-def edges(polygon: Floats) -> tuple[Floats, Floats]:
+def compute_edges(polygon: Floats) -> tuple[Floats, Floats]:
     """Return the azimuths of outward normals of edges, degrees, and distances of edges from the origin, m."""
-    along = np.roll(polygon, -1, axis=0) - polygon
-    outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+    vectors = np.roll(polygon, -1, axis=0) - polygon
+    outward = np.column_stack([vectors[:, 1], -vectors[:, 0]]) / np.linalg.norm(vectors, axis=1, keepdims=True)
     azimuth = np.mod(np.rad2deg(np.arctan2(outward[:, 0], outward[:, 1])), 360.0)
     return azimuth, np.sum(outward * polygon, axis=1)
 
 
 class Sections(NamedTuple):
-    """Sections in pairs: heights (m), and the corners of the convex hull of each (m, shape (n, 2))."""
+    """Horizontal sections of a body, in pairs."""
 
-    heights: Floats
-    hulls: tuple[Floats, ...]
+    heights: Floats  # heights, m
+    hulls: tuple[Floats, ...]  # corners of the convex hull of each section, m, shape (n, 2)
 
-    def across(self, azimuth: float) -> Floats:
+    def compute_outline(self, azimuth: float) -> Floats:
         """Return the outline across an azimuth as trapezoids: heights, ends below and ends above, m, shape (n, 6)."""
-        reach = [corners @ directions(azimuth)[0] for corners in self.hulls]
-        ends = np.array([(each.min(), each.max()) for each in reach])
+        reach = [corners @ compute_directions(azimuth)[0] for corners in self.hulls]
+        ends = np.array([(section_reach.min(), section_reach.max()) for section_reach in reach])
         return np.column_stack([self.heights.reshape(-1, 2), ends.reshape(-1, 4)])
 
 
-def sections_of(surfaces: Sequence[Surface]) -> Sections:
+def compute_sections(surfaces: Sequence[Surface]) -> Sections:
     """Return sections of closed surfaces at the heights of all or some corners."""
-    corners = np.unique(np.concatenate([np.unique(each.vertices[each.faces, 2]) for each in surfaces]))
+    corners = np.unique(np.concatenate([np.unique(surface.vertices[surface.faces, 2]) for surface in surfaces]))
     size = float(corners[-1] - corners[0])
-    first = np.unique(np.rint((corners - corners[0]) * (10.0 * _BANDS / size)), return_index=True)[1]
-    kept = np.append(corners[first[:-1]], corners[-1])
-    if len(kept) > _BANDS + 1:
-        kept = np.linspace(corners[0], corners[-1], _BANDS + 1)
-    within = 1e-6 * np.diff(kept)  # preserves a step in the outline
-    heights = np.column_stack([kept[:-1] + within, kept[1:] - within]).ravel()
-    reach = [(tall.min(axis=1), tall.max(axis=1)) for tall in (each.vertices[each.faces, 2] for each in surfaces)]
-    hulls = tuple(_section(surfaces, reach, float(height)) for height in heights)
-    return Sections(np.column_stack([kept[:-1], kept[1:]]).ravel(), hulls)
+    first = np.unique(np.rint((corners - corners[0]) * (10.0 * _MAX_BANDS / size)), return_index=True)[1]
+    bands = np.append(corners[first[:-1]], corners[-1])
+    if len(bands) > _MAX_BANDS + 1:
+        bands = np.linspace(corners[0], corners[-1], _MAX_BANDS + 1)
+    margin = 1e-6 * np.diff(bands)  # preserves a step in the outline
+    heights = np.column_stack([bands[:-1] + margin, bands[1:] - margin]).ravel()
+    reach = [(z.min(axis=1), z.max(axis=1)) for z in (surface.vertices[surface.faces, 2] for surface in surfaces)]
+    hulls = tuple(_cut_section(surfaces, reach, float(height)) for height in heights)
+    return Sections(np.column_stack([bands[:-1], bands[1:]]).ravel(), hulls)
 
 
-def _section(surfaces: Sequence[Surface], reach: Sequence[tuple[Floats, Floats]], height: float) -> Floats:
+def _cut_section(surfaces: Sequence[Surface], reach: Sequence[tuple[Floats, Floats]], height: float) -> Floats:
     """Return the convex hull of a section, or a polygon inside it that differs by at most 2e-4 of its size."""
-    places = []
+    points = []
     for (vertices, faces, _), (low, high) in zip(surfaces, reach, strict=True):
-        cut = faces[(low < height) & (high > height)]
-        edges = cut[:, [[0, 1], [1, 2], [2, 0]]]
+        cut_faces = faces[(low < height) & (high > height)]
+        edges = cut_faces[:, [[0, 1], [1, 2], [2, 0]]]
         is_above = vertices[edges, 2] > height
-        crossed = np.sort(edges[is_above[..., 0] != is_above[..., 1]], axis=1)
-        one, other = vertices[crossed[:, 0]], vertices[crossed[:, 1]]
-        part = (height - one[:, 2]) / (other[:, 2] - one[:, 2])
-        places.append(one[:, :2] + part[:, None] * (other[:, :2] - one[:, :2]))
-    every = np.vstack(places)
-    if not len(every):  # between separate pieces: no width
+        crossing_edges = np.sort(edges[is_above[..., 0] != is_above[..., 1]], axis=1)
+        start, end = vertices[crossing_edges[:, 0]], vertices[crossing_edges[:, 1]]
+        fraction = (height - start[:, 2]) / (end[:, 2] - start[:, 2])
+        points.append(start[:, :2] + fraction[:, None] * (end[:, :2] - start[:, :2]))
+    all_points = np.vstack(points)
+    if not len(all_points):  # between separate pieces: no width
         return surfaces[0].vertices[:1, :2]
-    around = hull(every)
-    if around is None:  # on one line: its ends
-        return every[np.lexsort(every.T)[[0, -1]]]
-    towards = directions(np.arange(0.0, 360.0, 2.0))
-    return around if len(around) <= len(towards) else around[np.unique(np.argmax(around @ towards.T, axis=0))]
+    polygon = compute_hull(all_points)
+    if polygon is None:  # on one line: its ends
+        return all_points[np.lexsort(all_points.T)[[0, -1]]]
+    directions = compute_directions(np.arange(0.0, 360.0, 2.0))
+    return polygon if len(polygon) <= len(directions) else polygon[np.unique(np.argmax(polygon @ directions.T, axis=0))]

@@ -25,7 +25,7 @@ from rocking.inputs.pulses import pulse_family
 from rocking.inputs.toml import Tables, in_line, nearest
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
-from rocking.records.named import expanded, is_there, named_motion
+from rocking.records.named import expand_record_names, load_motion, path_exists
 from rocking.simulation.ensemble import Product, Scales
 
 #: Template of a study file, with comments.
@@ -280,7 +280,7 @@ def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], l
             skipped.append(str(error))
         else:
             motions.append(motion)
-            beside = is_there(path) and Path(path).is_relative_to(folder)
+            beside = path_exists(path) and Path(path).is_relative_to(folder)
             names.append(str(Path(path).relative_to(folder)) if beside else path)
     for k in range(len(given.get("pulses", []))):
         motions += _pulses(tables, k)
@@ -296,8 +296,8 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
         about["channel"] = str(given["channel"])
     if "vertical" in given:  # a file beside the study file, or any other name
         beside = str(tables.file.parent / given["vertical"])
-        about["vertical"] = beside if is_there(beside) else given["vertical"]
-    motion = named_motion(path, **about, several=several)
+        about["vertical"] = beside if path_exists(beside) else given["vertical"]
+    motion = load_motion(path, **about, several=several)
     for sentence in motion_notes(motion):
         note(f"{path}: {sentence}")
     return motion
@@ -306,9 +306,9 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
 def _records_of(folder: Path, name: str) -> list[str]:
     """Return the matching files beside the study file, or a shipped record."""
     path = str(folder / name)
-    if glob.has_magic(name) and not is_there(path):
-        return expanded([str(Path(glob.escape(str(folder))) / name)])
-    if is_there(path):
-        return expanded([path])
+    if glob.has_magic(name) and not path_exists(path):
+        return expand_record_names([str(Path(glob.escape(str(folder))) / name)])
+    if path_exists(path):
+        return expand_record_names([path])
     # Not a file in the working folder; the bare name gives a better message.
-    return [path if is_there(name) and name not in records.names() else name]
+    return [path if path_exists(name) and name not in records.names() else name]

@@ -21,7 +21,7 @@ __all__ = ["Channel", "Identification", "channels", "identify", "read"]
 #: Formats with a header, in the order of recognition. Add a new format here.
 FORMATS: Final = (headed.AT2, csmip.COSMOS, csmip.V1, csmip.V2, headed.SMC, headed.ESM, headed.KNET)
 #: The last two accept content without a recognised header.
-_RECOGNISERS: Final = (*(each.recognise for each in FORMATS), table.recognise, through_obspy.recognise)
+_RECOGNISERS: Final = (*(form.recognise for form in FORMATS), table.recognise_table, through_obspy.recognise_with_obspy)
 
 
 def read(
@@ -78,26 +78,26 @@ def read(
     >>> motion.duration, motion.pga
     (0.02, 4.903325)
     """
-    return chosen(path, Request.checked(dt, units, channel)).motion()
+    return read_channel(path, Request.create(dt, units, channel)).motion()
 
 
-def chosen(path: str | os.PathLike[str] | BinaryIO, request: Request, vertical: str | None = None) -> Channel:
+def read_channel(path: str | os.PathLike[str] | BinaryIO, request: Request, vertical: str | None = None) -> Channel:
     """Return the channel of a record file for `read`, or the vertical channel by name."""
     source = open_source(path)
-    found = _recognised(source).read(request)
+    found = _recognise_format(source).read(request)
     if vertical is not None:
-        return _choose(source, found, vertical, "channel, file or shipped record")
-    return _choose(source, found, None if request.several and len(found) == 1 else request.channel)
+        return _choose_channel(source, found, vertical, "channel, file or shipped record")
+    return _choose_channel(source, found, None if request.several and len(found) == 1 else request.channel)
 
 
-def content(path: str | os.PathLike[str] | BinaryIO, request: Request) -> tuple[Identification, list[Channel]]:
+def read_content(path: str | os.PathLike[str] | BinaryIO, request: Request) -> tuple[Identification, list[Channel]]:
     """Return the format of a file, and its acceleration channels or the named one."""
     source = open_source(path)
-    recognised = _recognised(source)
-    found = recognised.read(request)
-    if request.channel is not None and not (request.several and len(found) == 1):
-        found = [_choose(source, found, request.channel)]
-    return Identification(recognised.format, recognised.reason), found
+    recognised = _recognise_format(source)
+    found_channels = recognised.read(request)
+    if request.channel is not None and not (request.several and len(found_channels) == 1):
+        found_channels = [_choose_channel(source, found_channels, request.channel)]
+    return Identification(recognised.format, recognised.reason), found_channels
 
 
 def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
@@ -129,7 +129,7 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     >>> [channel.name for channel in channels(file)]
     ['NS', 'EW']
     """
-    return tuple(content(path, Request.checked(dt, units))[1])
+    return tuple(read_content(path, Request.create(dt, units))[1])
 
 
 def identify(path: str | os.PathLike[str]) -> Identification:
@@ -163,46 +163,46 @@ def identify(path: str | os.PathLike[str]) -> Identification:
     >>> identify(file)
     Identification(format='text table', reason='from line 2 on each line holds one number')
     """
-    recognised = _recognised(open_source(path))
+    recognised = _recognise_format(open_source(path))
     return Identification(recognised.format, recognised.reason)
 
 
-def _recognised(source: Source) -> Recognised:
-    found = next((found for recognise in _RECOGNISERS if (found := recognise(source)) is not None), None)
-    if found is None:
-        raise _unknown(source)
-    return found
+def _recognise_format(source: Source) -> Recognised:
+    recognised = next((recognised for recognise in _RECOGNISERS if (recognised := recognise(source)) is not None), None)
+    if recognised is None:
+        raise _unknown_format_error(source)
+    return recognised
 
 
-def _unknown(source: Source) -> UnreadableRecord:
-    if refused := table.refusal(source):
-        return refused
+def _unknown_format_error(source: Source) -> UnreadableRecord:
+    if table_error := table.unreadable_table_error(source):
+        return table_error
     text = f"this is text in no format known here: none of its first {table.HEADING_LINES} lines holds numbers alone"
     advice = "get the whole file, and write times in seconds"
     if source.is_binary:
         text, advice = "this is a binary file in no format known here", "unpack an archive, save a workbook as CSV"
-    if not through_obspy.installed():
+    if not through_obspy.is_obspy_installed():
         advice += f", or if it is MiniSEED, SAC or another format that ObsPy reads, {install('formats')}"
     return source.error(f"{text}; {advice}")
 
 
-def _choose(source: Source, found: list[Channel], wanted: int | str | None, what: str = "channel") -> Channel:
-    listed = ", ".join(channel.label for channel in found[:30])
-    listed += f" and {len(found) - 30} more" if len(found) > 30 else ""
-    if wanted is None and len(found) > 1:
-        raise source.error(f"the file holds {len(found)} channels; give {{}} as one of {listed}", None, "channel")
-    matching = found if wanted is None else _matching(found, wanted)
+def _choose_channel(source: Source, channels: list[Channel], query: int | str | None, kind: str = "channel") -> Channel:
+    listing = ", ".join(channel.label for channel in channels[:30])
+    listing += f" and {len(channels) - 30} more" if len(channels) > 30 else ""
+    if query is None and len(channels) > 1:
+        raise source.error(f"the file holds {len(channels)} channels; give {{}} as one of {listing}", None, "channel")
+    matching = channels if query is None else _match_channels(channels, query)
     if not matching:
-        raise source.error(f"there is no {what} {wanted!r}; give one of {listed}")
+        raise source.error(f"there is no {kind} {query!r}; give one of {listing}")
     if len(matching) > 1:
-        raise source.error(f"{len(matching)} channels are called {wanted!r}; give another name or number of {listed}")
+        raise source.error(f"{len(matching)} channels are called {query!r}; give another name or number of {listing}")
     return matching[0]
 
 
-def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:
+def _match_channels(channels: list[Channel], query: int | str) -> list[Channel]:
     """Return the channels with that name, else number, else first word of the name."""
-    text = str(wanted).casefold().split()
-    by_number = [channel for channel in found if [str(channel.number)] == text]
-    by_name = [channel for channel in found if channel.name.casefold().split() == text]
-    by_word = [channel for channel in found if channel.name.casefold().split()[:1] == text]
-    return by_name or by_number or by_word if isinstance(wanted, str) else by_number or by_name or by_word
+    text = str(query).casefold().split()
+    by_number = [channel for channel in channels if [str(channel.number)] == text]
+    by_name = [channel for channel in channels if channel.name.casefold().split() == text]
+    by_word = [channel for channel in channels if channel.name.casefold().split()[:1] == text]
+    return by_name or by_number or by_word if isinstance(query, str) else by_number or by_name or by_word

@@ -17,7 +17,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.errors import UnreadableRecord, literal
-from rocking.records.formats.channel import Channel, Recognised, channel_of, missing_value, timing
+from rocking.records.formats.channel import Channel, Recognised, create_channel, missing_value_error, resolve_timing
 from rocking.records.formats.source import Line, Request, Source
 from rocking.records.units import SECOND
 
@@ -25,303 +25,293 @@ from rocking.records.units import SECOND
 NUMBER: Final = r"[+-]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[EeDd][+-]?\d{1,4})?"
 
 #: Fortran writes double precision with a D.
-_FORTRAN: Final = bytes.maketrans(b"Dd", b"EE")
-_IS_OTHER: Final = bytes(0 if c in b"0123456789+-.eEdD \t\n\v" else 1 for c in range(256))
+_FORTRAN_EXPONENTS: Final = bytes.maketrans(b"Dd", b"EE")
+_NOT_NUMERIC: Final = bytes(0 if c in b"0123456789+-.eEdD \t\n\v" else 1 for c in range(256))
 #: Bytes per block: numbers need some fifty times as much memory during conversion.
-_CHUNK: Final = 2**18
+_BLOCK_SIZE: Final = 2**18
 _SPACE: Final = re.compile(rb"\s")
 _LINE_END: Final = re.compile(rb"\n")
 #: Largest number of characters of a number.
-_LONGEST: Final = 400
+_MAX_NUMBER_LENGTH: Final = 400
 _END_OF_DATA: Final = re.compile(r"(?i)^\s*(/&|-*\s*end[ -]of[ -]data)")
 _LAYOUT: Final = re.compile(r"(?ia)\(\s*(\d{1,3})\s*[EFGI]\s*(\d{1,3})(?:\.\d+)?\s*\)")
-_NUMBER: Final = re.compile(rf"({NUMBER})\s*$")
+_SINGLE_NUMBER: Final = re.compile(rf"({NUMBER})\s*$")
 
 
 @dataclass
 class Header:
-    """Header of one channel, read line by line by a format, with the numbers from `end`."""
+    """Header of one channel, read line by line by a format."""
 
-    source: Source
-    form: Format
-    end: int
-    ordinal: int = 1
-    lines: list[Line] = field(default_factory=list)
+    source: Source  # file
+    record_format: Format  # format that reads the header
+    end: int  # offset of the numbers
+    ordinal: int = 1  # number of the channel in the file, from 1
+    lines: list[Line] = field(default_factory=list)  # lines read
 
     def skip(self, count: int) -> list[Line]:
         """Skip this many lines."""
-        lines = self.source.lines(self.end, count)
+        lines = self.source.read_lines(self.end, count)
         if len(lines) < count:
             last = lines[-1].start if lines else self.end
             raise self.source.error("the file ends within its header; get the whole file again", last)
-        self.end = lines[-1].next if lines else self.end
+        self.end = lines[-1].next_start if lines else self.end
         return lines
 
-    def take(self, count: int) -> None:
+    def read_lines(self, count: int) -> None:
         """Read this many lines of text."""
         self.lines += self.skip(count)
 
-    def expect(self, pattern: re.Pattern[str], what: str) -> re.Match[str]:
+    def expect(self, pattern: re.Pattern[str], content: str) -> re.Match[str]:
         """Read the next line, which must match."""
-        self.take(1)
-        found = pattern.search(self.lines[-1].text)
-        if found is None:
-            raise self.source.error(f"{what} should stand here; get the file again", self.lines[-1].start)
-        return found
+        self.read_lines(1)
+        match = pattern.search(self.lines[-1].text)
+        if match is None:
+            raise self.source.error(f"{content} should stand here; get the file again", self.lines[-1].start)
+        return match
 
-    def take_until(self, pattern: re.Pattern[str], most: int) -> re.Match[str] | None:
+    def read_until(self, pattern: re.Pattern[str], max_lines: int) -> re.Match[str] | None:
         """Read the lines up to the first match, within a limit and the same channel."""
-        for k, line in enumerate(self.source.lines(self.end, most)):
-            if found := pattern.search(line.text):
-                self.take(k + 1)
-                return found
-            if k > 0 and self.form.begins(line):
+        for k, line in enumerate(self.source.read_lines(self.end, max_lines)):
+            if match := pattern.search(line.text):
+                self.read_lines(k + 1)
+                return match
+            if k > 0 and self.record_format.begins_channel(line):
                 break
         return None
 
-    def numbers(self, rows: int, layout: Layout | None, count: int) -> Floats:
+    def read_numbers(self, rows: int, layout: Layout | None, count: int) -> Floats:
         """Read this many numbers in this many lines."""
         start = self.end
         self.skip(rows)
-        return read_values(self.source, start, self.end, layout, Stated(count, start))
+        return read_values(self.source, start, self.end, layout, Count(count, start))
 
-    def find(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+    def find_match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
         """Return the first match of a pattern in the lines."""
-        return next((found for line in self.lines if (found := pattern.search(line.text))), None)
+        return next((match for line in self.lines if (match := pattern.search(line.text))), None)
 
-    def text(self, pattern: re.Pattern[str]) -> str:
+    def find_text(self, pattern: re.Pattern[str]) -> str:
         """Return the first group of a match, or an empty text."""
-        found = self.find(pattern)
-        return found[1].strip() if found else ""
+        match = self.find_match(pattern)
+        return match[1].strip() if match else ""
 
-    def at(self, pattern: re.Pattern[str]) -> int:
+    def find_offset(self, pattern: re.Pattern[str]) -> int:
         """Return the offset of the first line that matches, or of the last line."""
         return next((line.start for line in self.lines if pattern.search(line.text)), self.end)
 
-    def positive(self, key: re.Pattern[str], form: re.Pattern[str] = _NUMBER) -> list[float]:
-        """Return the positive numbers that follow a key in this form."""
-        found = form.match(self.text(key))
-        numbers = [parse(group.encode("latin-1")) or 0.0 for group in found.groups()] if found else [0.0]
+    def find_positive_numbers(self, key: re.Pattern[str], pattern: re.Pattern[str] = _SINGLE_NUMBER) -> list[float]:
+        """Return the positive numbers that follow a key."""
+        match = pattern.match(self.find_text(key))
+        numbers = [parse_token(group.encode("latin-1")) or 0.0 for group in match.groups()] if match else [0.0]
         if not all(number > 0.0 for number in numbers):
-            line = self.source.line(self.at(key))
+            line = self.source.read_line(self.find_offset(key))
             text = f"{literal(repr(line.text))} gives no positive number; correct it, or get the record again"
             raise self.source.error(text, line.start)
         return numbers
 
 
 @dataclass(frozen=True)
-class Said:
-    """Contents of a channel's header: unit, labels, and layout of the numbers that follow.
+class HeaderData:
+    """Contents of a channel's header."""
 
-    Without a step (s) the numbers are pairs of time and value. A number that means 'unknown' is rejected. `scale`
-    converts the counts of an instrument to the unit: a factor and a divisor. `at` is the offset of the line with this
-    information.
-    """
-
-    at: int
-    units: str
-    step: float | None
-    count: Stated
-    labels: dict[str, Any]
-    layout: Layout | None = None
-    quantity: str = "acceleration"
-    facts: Mapping[str, str] = field(default_factory=dict)
-    padded: bool = False
-    unknown: float | None = None
-    scale: tuple[float, float] | None = None
+    offset: int  # offset of the line with this information
+    units: str  # unit of the numbers
+    step: float | None  # sampling step, s, or None for pairs of time and value
+    count: Count  # number of values
+    labels: dict[str, Any]  # fields of the channel
+    layout: Layout | None = None  # columns of the numbers
+    quantity: str = "acceleration"  # recorded quantity
+    facts: Mapping[str, str] = field(default_factory=dict)  # metadata of the channel
+    padded: bool = False  # whether the last row is filled up
+    missing_mark: float | None = None  # number for unknown values, which are rejected
+    scale: tuple[float, float] | None = None  # factor and divisor from the counts of an instrument to the unit
 
 
 class Format(NamedTuple):
-    """Format: name, marks in its first lines, and reader of a channel's header.
+    """Format with a header."""
 
-    Each mark occurs in one of the first `within` lines. If the file may contain `several` channels, each begins with
-    the first mark. Data of other quantities, which begin with a line that matches `other`, are skipped.
-    """
-
-    name: str
-    marks: tuple[re.Pattern[str], ...]
-    says: Callable[[Header], Said]
-    within: int = 1
-    several: bool = False
-    other: re.Pattern[str] = re.compile(r"(?!)")
+    name: str  # name for the user
+    marks: tuple[re.Pattern[str], ...]  # patterns in the first lines, of which the first one begins a channel
+    parse_header: Callable[[Header], HeaderData]  # reader of a channel's header
+    max_lines: int = 1  # number of lines that contain the marks
+    has_several_channels: bool = False  # whether a file may contain several channels
+    other_data: re.Pattern[str] = re.compile(r"(?!)")  # line that begins data of other quantities, which are skipped
 
     def recognise(self, source: Source) -> Recognised | None:
         """Return the format if each of its marks is found."""
-        lines = source.first_lines(self.within)
-        found = [next(filter(None, (mark.search(line.text) for line in lines)), None) for mark in self.marks]
-        if found[0] is None or None in found:
+        lines = source.find_first_lines(self.max_lines)
+        matches = [next(filter(None, (mark.search(line.text) for line in lines)), None) for mark in self.marks]
+        if matches[0] is None or None in matches:
             return None
-        at = next(line.start for line in lines if self.begins(line))
-        reason = f"line {source.line_number(at)} reads {found[0][0].strip()!r}"
-        return Recognised(self.name, reason, functools.partial(self._read, source, lines[0].start))
+        offset = next(line.start for line in lines if self.begins_channel(line))
+        reason = f"line {source.find_line_number(offset)} reads {matches[0][0].strip()!r}"
+        return Recognised(self.name, reason, functools.partial(self._read_channels, source, lines[0].start))
 
-    def begins(self, line: Line) -> bool:
+    def begins_channel(self, line: Line) -> bool:
         """Return whether a line begins a channel."""
         return self.marks[0].search(line.text) is not None
 
-    def _read(self, source: Source, start: int | None, request: Request) -> list[Channel]:
+    def _read_channels(self, source: Source, start: int | None, request: Request) -> list[Channel]:
         channels: list[Channel] = []
         while start is not None:
             header = Header(source, self, start, len(channels) + 1)
-            said = self.says(header)
-            end = self._end(source, header.end)
-            if said.quantity.lower().startswith("accel"):
-                channels.append(_channel(header, said, end, request))
-            start = self._next(source, end)
+            data = self.parse_header(header)
+            end = self._find_end(source, header.end)
+            if data.quantity.lower().startswith("accel"):
+                channels.append(_build_channel(header, data, end, request))
+            start = self._find_next(source, end)
         if not channels:
-            text = f"this {self.name} file holds {said.quantity.lower()!r}; give the file of the acceleration"
-            raise source.error(text, said.at)
+            text = f"this {self.name} file holds {data.quantity.lower()!r}; give the file of the acceleration"
+            raise source.error(text, data.offset)
         return channels
 
-    def _end(self, source: Source, start: int) -> int:
+    def _find_end(self, source: Source, start: int) -> int:
         """Return the end of a channel's numbers: the end of the file, or a line that begins other content."""
-        end = numeric_end(source, start) if self.several else len(source.data)
-        line = source.line(end)
-        ends = _END_OF_DATA.match(line.text) or self.begins(line) or self.other.search(line.text)
-        return end if ends else line.next  # such a line is not an end, but contains a damaged number
+        end = find_numeric_end(source, start) if self.has_several_channels else len(source.data)
+        line = source.read_line(end)
+        ends = _END_OF_DATA.match(line.text) or self.begins_channel(line) or self.other_data.search(line.text)
+        return end if ends else line.next_start  # such a line is not an end, but contains a damaged number
 
-    def _next(self, source: Source, end: int) -> int | None:
+    def _find_next(self, source: Source, end: int) -> int | None:
         """Return the offset of the next channel."""
-        line = source.first_line(end)
-        while line is not None and not self.begins(line):
-            if not (_END_OF_DATA.match(line.text) or self.other.search(line.text)):
+        line = source.find_first_line(end)
+        while line is not None and not self.begins_channel(line):
+            if not (_END_OF_DATA.match(line.text) or self.other_data.search(line.text)):
                 raise source.error("the title of another channel should stand here; correct the file", line.start)
-            line = source.first_line(numeric_end(source, line.next))
+            line = source.find_first_line(find_numeric_end(source, line.next_start))
         return None if line is None else line.start
 
 
-def _channel(header: Header, said: Said, end: int, request: Request) -> Channel:
+def _build_channel(header: Header, data: HeaderData, end: int, request: Request) -> Channel:
     source = header.source
-    unit = request.units(source, said.units, said.at)
-    dt = None if said.step is None else request.step(source, said.step, said.at)
-    values = read_values(source, header.end, end, said.layout, said.count)
-    if said.padded:
-        values = values[: int(said.count.values)]
-    if said.unknown is not None and (values == said.unknown).any():
-        raise missing_value(source, said.unknown, said.at)
-    times, facts = None, {**said.facts}
-    if said.scale is not None:
+    unit = request.resolve_unit(source, data.units, data.offset)
+    dt = None if data.step is None else request.check_step(source, data.step, data.offset)
+    values = read_values(source, header.end, end, data.layout, data.count)
+    if data.padded:
+        values = values[: int(data.count.values)]
+    if data.missing_mark is not None and (values == data.missing_mark).any():
+        raise missing_value_error(source, data.missing_mark, data.offset)
+    times, facts = None, {**data.facts}
+    if data.scale is not None:
         with np.errstate(over="ignore"):
-            values = values * said.scale[0] / said.scale[1]
+            values = values * data.scale[0] / data.scale[1]
             facts["offset"] = f"kept, the mean is {float(unit.to_si(values).mean()) if len(values) else 0.0:.4g} m/s^2"
     if dt is None:
         if len(values) % 2 or len(values) < 4:
-            raise source.error("the values are no pairs of time and acceleration; correct the file", said.at)
-        dt, times = timing(source, request, values[0::2], SECOND, said.at)
+            raise source.error("the values are no pairs of time and acceleration; correct the file", data.offset)
+        dt, times = resolve_timing(source, request, values[0::2], SECOND, data.offset)
         values = values[1::2]
-    known = {"number": header.ordinal, "dt": dt, "times": times, **said.labels}
-    return channel_of(source, header.form.name, values, unit, said.at, spelling=said.units, facts=facts, **known)
+    fields = {"number": header.ordinal, "dt": dt, "times": times, **data.labels}
+    return create_channel(
+        source, header.record_format.name, values, unit, data.offset, spelling=data.units, facts=facts, **fields
+    )
 
 
-def stated_layout(text: str) -> Layout | None:
+def parse_layout(text: str) -> Layout | None:
     """Return the Fortran columns stated by a header such as "... Format: (8f9.6)", or None."""
-    found = _LAYOUT.search(text)
-    layout = Layout(int(found[1]), int(found[2])) if found else None
+    match = _LAYOUT.search(text)
+    layout = Layout(int(match[1]), int(match[2])) if match else None
     return layout if layout and all(layout) else None
 
 
-def direction(pattern: re.Pattern[str], name: str) -> float | None:
+def parse_azimuth(pattern: re.Pattern[str], name: str) -> float | None:
     """Return the direction, degrees clockwise from north, at the start of a matching name, or None."""
-    found = pattern.match(name)
-    return float(found[1]) % 360.0 if found else None
+    match = pattern.match(name)
+    return float(match[1]) % 360.0 if match else None
 
 
-def number(text: str) -> float:
+def parse_number(text: str) -> float:
     """Return the number in a text, or 0."""
-    return parse(text.encode("latin-1")) or 0.0
+    return parse_token(text.encode("latin-1")) or 0.0
 
 
-def step_of(rate: float) -> float:
+def step_from_rate(rate: float) -> float:
     """Return the step, s, for this many samples per second, or 0 for 0."""
     return 1.0 / rate if rate else 0.0
 
 
-class Stated(NamedTuple):
-    """Number of values stated in a file, offset of its line, and name of its source.
+class Count(NamedTuple):
+    """Number of values stated in a file."""
 
-    Up to `more` additional values may fill the last row, or are not counted by a length in whole seconds.
-    """
-
-    values: float
-    at: int
-    by: str = "the header"
-    more: float = 0.0
+    values: float  # number
+    offset: int  # offset of its line
+    stated_by: str = "the header"  # name for messages
+    max_surplus: float = 0.0  # number of values that may fill the last row or the last second
 
     def fits(self, count: int) -> bool:
         """Return whether this many values may follow."""
-        return -0.5 < count - self.values < self.more + 0.5
+        return -0.5 < count - self.values < self.max_surplus + 0.5
 
 
 class Layout(NamedTuple):
-    """Fortran columns such as 8F10.3: numbers per line and characters per number."""
+    """Fortran columns such as 8F10.3."""
 
-    per_line: int
-    width: int
+    per_line: int  # numbers per line
+    width: int  # characters per number
 
-    def fields(self, line: bytes) -> list[bytes]:
+    def split_line(self, line: bytes) -> list[bytes]:
         """Return the fields of a line, or the unchanged line if it does not fit."""
         if len(line) > self.per_line * self.width or b"\t" in line:
             return [line.strip()]
         return [line[i : i + self.width] for i in range(0, len(line), self.width)]
 
 
-def numeric_end(source: Source, start: int) -> int:
+def find_numeric_end(source: Source, start: int) -> int:
     """Return the offset of the first line from `start` that is not numeric, or the file's end."""
     data = source.data
-    for begin in range(start, len(data), _CHUNK):
-        position = data[begin : begin + _CHUNK].translate(_IS_OTHER).find(1)
+    for block_start in range(start, len(data), _BLOCK_SIZE):
+        position = data[block_start : block_start + _BLOCK_SIZE].translate(_NOT_NUMERIC).find(1)
         if position >= 0:
-            return max(data.rfind(b"\n", start, begin + position) + 1, start)
+            return max(data.rfind(b"\n", start, block_start + position) + 1, start)
     return len(data)
 
 
-def read_values(source: Source, start: int, end: int, layout: Layout | None, stated: Stated) -> Floats:
+def read_values(source: Source, start: int, end: int, layout: Layout | None, stated: Count) -> Floats:
     """Return all numbers between the offsets `start` and `end` of lines, as many as stated."""
-    values, reached = _in_blocks(source, start, end, None)
-    further = reached
-    if layout is not None and not (reached == end and stated.fits(len(values))):
-        columns, further = _in_blocks(source, start, end, layout)
-        if further == end and (reached < end or stated.fits(len(columns))):
-            values, reached = columns, end
-    if reached < end:
+    values, values_end = _read_blocks(source, start, end, None)
+    columns_end = values_end
+    if layout is not None and not (values_end == end and stated.fits(len(values))):
+        column_values, columns_end = _read_blocks(source, start, end, layout)
+        if columns_end == end and (values_end < end or stated.fits(len(column_values))):
+            values, values_end = column_values, end
+    if values_end < end:
         # The reading that got further has the helpful error message.
-        bad = _first_bad(source, reached, None), _first_bad(source, further, layout)
-        raise not_a_number(source, *max(bad, key=lambda each: each[1]))
+        tokens = _find_first_invalid(source, values_end, None), _find_first_invalid(source, columns_end, layout)
+        raise invalid_number_error(source, *max(tokens, key=lambda token: token[1]))
     if not stated.fits(len(values)):
         advice = "remove what does not belong to it" if len(values) > stated.values else "get the whole file again"
-        said = f"{stated.by} says {stated.values:.15g} values but {len(values)} follow"
-        raise source.error(f"{said}; {advice}, or correct that number", stated.at)
+        mismatch = f"{stated.stated_by} says {stated.values:.15g} values but {len(values)} follow"
+        raise source.error(f"{mismatch}; {advice}, or correct that number", stated.offset)
     return values
 
 
-def not_a_number(source: Source, token: bytes, at: int) -> UnreadableRecord:
+def invalid_number_error(source: Source, token: bytes, offset: int) -> UnreadableRecord:
     """Return the error for text that should be a finite number."""
-    shown, number = repr(token[:40].decode("latin-1")), parse(token)
-    if b"," in token and parse(token.replace(b",", b".")) is not None:
-        return source.error(f"{shown} is not a number; write decimal points in place of commas", at)
+    token_text, number = repr(token[:40].decode("latin-1")), parse_token(token)
+    if b"," in token and parse_token(token.replace(b",", b".")) is not None:
+        return source.error(f"{token_text} is not a number; write decimal points in place of commas", offset)
     finite = "" if number is None or np.isfinite(number) else "finite "
-    return source.error(f"{shown} is not a {finite}number; correct it or get the record again", at)
+    return source.error(f"{token_text} is not a {finite}number; correct it or get the record again", offset)
 
 
-def parse(token: bytes) -> float | None:
+def parse_token(token: bytes) -> float | None:
     """Return the number written by `token` (also with D exponent, possibly not finite), or None."""
-    if len(token) > _LONGEST or b"_" in token:
+    if len(token) > _MAX_NUMBER_LENGTH or b"_" in token:
         return None
     try:
-        return float(token.translate(_FORTRAN))
+        return float(token.translate(_FORTRAN_EXPONENTS))
     except ValueError:
         return None
 
 
-def convert(tokens: list[bytes]) -> Floats | None:
+def convert_tokens(tokens: list[bytes]) -> Floats | None:
     """Return the numbers written by the tokens (also with D exponents), or None unless all are finite."""
     if not tokens:
         return np.empty(0)
     joined = b"\n".join(tokens)
-    if b"_" in joined or max(map(len, tokens)) > _LONGEST:
+    if b"_" in joined or max(map(len, tokens)) > _MAX_NUMBER_LENGTH:
         return None
     if b"D" in joined or b"d" in joined:
-        tokens = joined.translate(_FORTRAN).split(b"\n")
+        tokens = joined.translate(_FORTRAN_EXPONENTS).split(b"\n")
     try:
         values = np.array(tokens, dtype=np.float64)
     except ValueError:
@@ -329,13 +319,13 @@ def convert(tokens: list[bytes]) -> Floats | None:
     return values if np.isfinite(values).all() else None
 
 
-def _in_blocks(source: Source, start: int, end: int, layout: Layout | None) -> tuple[Floats, int]:
+def _read_blocks(source: Source, start: int, end: int, layout: Layout | None) -> tuple[Floats, int]:
     """Return the numbers of purely numeric blocks, and the offset of their end."""
     parts = [np.empty(0)]
     while start < end:
-        found = (_LINE_END if layout else _SPACE).search(source.data, min(start + _CHUNK, end) - 1, end)
-        stop = end if found is None else found.end()
-        values = convert(_tokens(source.data[start:stop], layout))
+        boundary = (_LINE_END if layout else _SPACE).search(source.data, min(start + _BLOCK_SIZE, end) - 1, end)
+        stop = end if boundary is None else boundary.end()
+        values = convert_tokens(_split_tokens(source.data[start:stop], layout))
         if values is None:
             break
         parts.append(values)
@@ -343,18 +333,18 @@ def _in_blocks(source: Source, start: int, end: int, layout: Layout | None) -> t
     return np.concatenate(parts), start
 
 
-def _tokens(text: bytes, layout: Layout | None) -> list[bytes]:
+def _split_tokens(text: bytes, layout: Layout | None) -> list[bytes]:
     """Split at blanks, or into columns, of which the last in a line may be missing."""
     if layout is None:
         return text.split()
-    return [field for line in text.split(b"\n") for field in layout.fields(line.rstrip())]
+    return [field for line in text.split(b"\n") for field in layout.split_line(line.rstrip())]
 
 
-def _first_bad(source: Source, at: int, layout: Layout | None) -> tuple[bytes, int]:
-    """Find the first piece of text from `at` that is not a finite number, and the start of its line."""
-    for line in source.data[at : at + 2 * _CHUNK].split(b"\n"):
-        for token in _tokens(line, layout):
-            if convert([token]) is None:
-                return token, at
-        at += len(line) + 1
+def _find_first_invalid(source: Source, offset: int, layout: Layout | None) -> tuple[bytes, int]:
+    """Find the first piece of text from `offset` that is not a finite number, and the start of its line."""
+    for line in source.data[offset : offset + 2 * _BLOCK_SIZE].split(b"\n"):
+        for token in _split_tokens(line, layout):
+            if convert_tokens([token]) is None:
+                return token, offset
+        offset += len(line) + 1
     raise AssertionError("in a block that does not convert one number is bad")

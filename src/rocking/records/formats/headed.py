@@ -7,7 +7,17 @@ import re
 from datetime import datetime
 from typing import Final
 
-from rocking.records.formats.engine import NUMBER, Format, Header, Layout, Said, Stated, direction, number, step_of
+from rocking.records.formats.engine import (
+    NUMBER,
+    Count,
+    Format,
+    Header,
+    HeaderData,
+    Layout,
+    parse_azimuth,
+    parse_number,
+    step_from_rate,
+)
 
 _DEGREES: Final = re.compile(r"(?a)(\d{1,3})$")
 
@@ -25,29 +35,29 @@ _AT2_OTHER: Final = re.compile(r"(?i)\b(VELOCITY|DISPLACEMENT)\s+TIME\b")
 _OWNER: Final = re.compile(r"(.*?)[\s,]*\(([^()]*)\)")
 
 
-def _at2(header: Header) -> Said:
-    sizes = header.take_until(_SIZES, 12)
+def _parse_at2_header(header: Header) -> HeaderData:
+    sizes = header.read_until(_SIZES, 12)
     assert sizes is not None
     points, dt = filter(None, sizes.groups())
-    at = header.lines[-1].start
+    offset = header.lines[-1].start
     # "event, date, station, component (owner)", "event, station, component" or "..., component, (owner)"
-    second = header.source.lines(0, 2)[1:]  # of the file, whose first line may be blank
-    title = next((line.text.strip() for line in second if line.start < at), "")
-    owned = _OWNER.fullmatch(title)
-    text, owner = owned.groups() if owned else (title, "")
+    title_lines = header.source.read_lines(0, 2)[1:]  # of the file, whose first line may be blank
+    title = next((line.text.strip() for line in title_lines if line.start < offset), "")
+    match = _OWNER.fullmatch(title)
+    text, owner = match.groups() if match else (title, "")
     event, station, name = title, "", "acceleration"
     if len(parts := [part.strip() for part in text.split(",")]) >= 3:
         event, station, name = ", ".join(parts[:-2]), parts[-2], parts[-1] or name
     else:
         owner = ""
-    return Said(
-        at,
-        header.text(_AT2_UNITS),
-        number(dt),
-        Stated(int(points), at, "NPTS"),
-        {"name": name, "azimuth": direction(_DEGREES, name), "station": station, "event": event},
+    return HeaderData(
+        offset,
+        header.find_text(_AT2_UNITS),
+        parse_number(dt),
+        Count(int(points), offset, "NPTS"),
+        {"name": name, "azimuth": parse_azimuth(_DEGREES, name), "station": station, "event": event},
         Layout(per_line=5, width=15),
-        quantity=header.text(_AT2_OTHER) or "acceleration",
+        quantity=header.find_text(_AT2_OTHER) or "acceleration",
         facts={"station line": owner},
     )
 
@@ -60,35 +70,35 @@ _SMC_TITLE: Final = re.compile(
 )
 _COMPONENT: Final = re.compile(r"(?i)component\s*=\s*(.*)$")
 _SMC_STATION: Final = re.compile(r"(?i)station\s*=\s*(.*?)\s*(?:component\s*=|$)")
-_UNKNOWN: Final = 1.7e38
+_SMC_MISSING: Final = 1.7e38
 
 
-def _smc(header: Header) -> Said:
+def _parse_smc_header(header: Header) -> HeaderData:
     kind = header.expect(_SMC_TITLE, "the title")
-    header.take(10)
-    at = header.end
-    integers = header.numbers(6, Layout(per_line=8, width=10), 48)
-    reals = header.numbers(10, Layout(per_line=5, width=15), 50)
+    header.read_lines(10)
+    offset = header.end
+    integers = header.read_numbers(6, Layout(per_line=8, width=10), 48)
+    reals = header.read_numbers(10, Layout(per_line=5, width=15), 50)
     header.skip(int(integers[15]))
     rate = float(reals[1])
-    name = header.text(_COMPONENT).strip(" *") or "acceleration"
+    name = header.find_text(_COMPONENT).strip(" *") or "acceleration"
     layout = Layout(per_line=5, width=14) if int(integers[46]) == 8 else Layout(per_line=8, width=10)
-    return Said(
-        at,
+    return HeaderData(
+        offset,
         "cm/s2",
-        None if rate == _UNKNOWN else step_of(rate),
-        Stated(int(integers[16]), at, more=layout.per_line),
+        None if rate == _SMC_MISSING else step_from_rate(rate),
+        Count(int(integers[16]), offset, max_surplus=layout.per_line),
         {
             "name": name,
-            "azimuth": direction(_DEGREES, name),
-            "station": header.text(_SMC_STATION),
+            "azimuth": parse_azimuth(_DEGREES, name),
+            "station": header.find_text(_SMC_STATION),
             "event": " ".join(header.lines[3].text.split()),
         },
         layout,
         quantity="acceleration" if kind[1] in "12" else kind[2],
         facts={"stage": kind[2].lower()},
         padded=True,
-        unknown=_UNKNOWN,
+        missing_mark=_SMC_MISSING,
     )
 
 
@@ -107,25 +117,25 @@ _SECONDS: Final = re.compile(r"(?a)\s*([\d.]{1,20})")
 _SENSORS: Final = {"1": "N-S borehole", "2": "E-W borehole", "3": "U-D borehole", "4": "N-S", "5": "E-W", "6": "U-D"}
 
 
-def _knet(header: Header) -> Said:
-    says = {key: header.expect(pattern, f"the header line {key!r}")[1].strip() for key, pattern in _KNET.items()}
-    (rate,) = header.positive(_KNET["Sampling Freq"], _RATE)
-    (seconds,) = header.positive(_KNET["Duration Time"], _SECONDS)
-    gal, counts = header.positive(_KNET["Scale Factor"], _SCALE)
-    name = _SENSORS.get(says["Dir."], says["Dir."]) or "acceleration"
-    return Said(
-        header.at(_KNET["Scale Factor"]),
+def _parse_knet_header(header: Header) -> HeaderData:
+    entries = {key: header.expect(pattern, f"the header line {key!r}")[1].strip() for key, pattern in _KNET.items()}
+    (rate,) = header.find_positive_numbers(_KNET["Sampling Freq"], _RATE)
+    (seconds,) = header.find_positive_numbers(_KNET["Duration Time"], _SECONDS)
+    gal, counts = header.find_positive_numbers(_KNET["Scale Factor"], _SCALE)
+    name = _SENSORS.get(entries["Dir."], entries["Dir."]) or "acceleration"
+    return HeaderData(
+        header.find_offset(_KNET["Scale Factor"]),
         "gal",
         1.0 / rate,
         # The duration is in whole seconds. Fewer samples, or a surplus of a second, are errors.
-        Stated(seconds * rate, header.at(_KNET["Duration Time"]), "the duration", more=rate - 1.0),
+        Count(seconds * rate, header.find_offset(_KNET["Duration Time"]), "the duration", max_surplus=rate - 1.0),
         {
             "name": name,
             "azimuth": {"N-S": 0.0, "E-W": 90.0}.get(name.split(" ")[0]),
-            "station": says["Station Code"],
-            "event": f"{says['Origin Time']}, magnitude {says['Mag.']}",
+            "station": entries["Station Code"],
+            "event": f"{entries['Origin Time']}, magnitude {entries['Mag.']}",
         },
-        facts={"record time": says["Record Time"]},
+        facts={"record time": entries["Record Time"]},
         scale=(gal, counts),
     )
 
@@ -137,39 +147,39 @@ _ESM_KEYS: Final = ("DATA_TYPE", "SAMPLING_INTERVAL_S", "NDATA", "UNITS")
 _ESM: Final = {key: re.compile(rf"^{key}\s*:(.*)$") for key in _ESM_KEYS}
 
 
-def _esm(header: Header) -> Said:
-    found = (_ESM_LINE.match(line.text) for line in header.source.lines(header.end, 200))
-    entries = [each.groups() for each in itertools.takewhile(bool, found) if each]
-    header.take(len(entries))
-    says = {key: value.strip() for key, value in entries if value.strip()}
+def _parse_esm_header(header: Header) -> HeaderData:
+    matches = (_ESM_LINE.match(line.text) for line in header.source.read_lines(header.end, 200))
+    pairs = [match.groups() for match in itertools.takewhile(bool, matches) if match]
+    header.read_lines(len(pairs))
+    entries = {key: value.strip() for key, value in pairs if value.strip()}
     for key in _ESM_KEYS[:3]:
-        if key not in says:
-            raise header.source.error(f"the header gives no {key}; get the record again", header.at(_ESM[key]))
-    (step,), (count,) = (header.positive(_ESM[key]) for key in ("SAMPLING_INTERVAL_S", "NDATA"))
-    name = says.get("STREAM", "acceleration")
-    first_sample = says.get("DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS", "")
+        if key not in entries:
+            raise header.source.error(f"the header gives no {key}; get the record again", header.find_offset(_ESM[key]))
+    (step,), (count,) = (header.find_positive_numbers(_ESM[key]) for key in ("SAMPLING_INTERVAL_S", "NDATA"))
+    name = entries.get("STREAM", "acceleration")
+    first_sample = entries.get("DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS", "")
     try:
         start = datetime.strptime(f"{first_sample}+0000", "%Y%m%d_%H%M%S.%f%z").timestamp()
     except ValueError:
         start = None
-    return Said(
-        header.at(_ESM["UNITS"]),
-        says.get("UNITS", ""),
+    return HeaderData(
+        header.find_offset(_ESM["UNITS"]),
+        entries.get("UNITS", ""),
         step,
-        Stated(count, header.at(_ESM["NDATA"]), "NDATA"),
+        Count(count, header.find_offset(_ESM["NDATA"]), "NDATA"),
         {
             "name": name,
             "azimuth": {"N": 0.0, "E": 90.0}.get(name[-1]),
-            "station": ".".join(says[key] for key in ("NETWORK", "STATION_CODE") if key in says),
-            "event": says.get("EVENT_ID", says.get("EVENT_NAME", "")),
+            "station": ".".join(entries[key] for key in ("NETWORK", "STATION_CODE") if key in entries),
+            "event": entries.get("EVENT_ID", entries.get("EVENT_NAME", "")),
             "start": start,
         },
-        quantity=says.get("DATA_TYPE", ""),
-        facts={"processing": says.get("PROCESSING", "")},
+        quantity=entries.get("DATA_TYPE", ""),
+        facts={"processing": entries.get("PROCESSING", "")},
     )
 
 
-AT2: Final = Format("PEER AT2", (_SIZES,), _at2, within=12)
-SMC: Final = Format("USGS SMC", (_SMC_TITLE,), _smc)
-KNET: Final = Format("K-NET/KiK-net", (_KNET["Origin Time"], _KNET["Scale Factor"]), _knet, within=34)
-ESM: Final = Format("ESM", tuple(_ESM.values())[:3], _esm, within=200)
+AT2: Final = Format("PEER AT2", (_SIZES,), _parse_at2_header, max_lines=12)
+SMC: Final = Format("USGS SMC", (_SMC_TITLE,), _parse_smc_header)
+KNET: Final = Format("K-NET/KiK-net", (_KNET["Origin Time"], _KNET["Scale Factor"]), _parse_knet_header, max_lines=34)
+ESM: Final = Format("ESM", tuple(_ESM.values())[:3], _parse_esm_header, max_lines=200)

@@ -16,7 +16,7 @@ from typing import BinaryIO, NamedTuple
 from rocking.core import checks
 from rocking.errors import InvalidMotion, UnreadableRecord, literal
 from rocking.records import catalogue
-from rocking.records.units import CHOICES, Unit, choose_unit, find_unit
+from rocking.records.units import UNIT_NAMES, Unit, choose_unit, find_unit
 
 #: Largest accepted file, bytes, a hundred times the longest strong-motion records.
 SIZE_LIMIT = 512 * 2**20
@@ -29,11 +29,11 @@ _VISIBLE = re.compile(rb"\S")
 
 
 class Line(NamedTuple):
-    """Line: text (cut at LINE_LIMIT), its offset in the file, and the offset of the next line."""
+    """Line of a file."""
 
-    text: str
-    start: int
-    next: int
+    text: str  # text, cut at LINE_LIMIT
+    start: int  # offset in the file
+    next_start: int  # offset of the next line
 
 
 @dataclass(frozen=True)
@@ -54,52 +54,52 @@ class Source:
     raw: bytes
     data: bytes
 
-    def line(self, start: int) -> Line:
+    def read_line(self, start: int) -> Line:
         """Return the line that starts at the offset `start`."""
         end = self.data.find(b"\n", start)
         end = len(self.data) if end < 0 else end
         text = self.data[start : min(end, start + LINE_LIMIT)].decode("latin-1")
         return Line(text.rstrip(), start, min(end + 1, len(self.data)))
 
-    def lines(self, start: int, count: int) -> list[Line]:
+    def read_lines(self, start: int, count: int) -> list[Line]:
         """Return up to `count` lines from the offset `start`."""
-        found: list[Line] = []
-        while len(found) < count and start < len(self.data):
-            found.append(self.line(start))
-            start = found[-1].next
-        return found
+        lines: list[Line] = []
+        while len(lines) < count and start < len(self.data):
+            lines.append(self.read_line(start))
+            start = lines[-1].next_start
+        return lines
 
-    def first_line(self, start: int = 0) -> Line | None:
+    def find_first_line(self, start: int = 0) -> Line | None:
         """Return the first line from `start` that is not blank, or None."""
-        found = _VISIBLE.search(self.data, start)
-        return None if found is None else self.line(self.data.rfind(b"\n", 0, found.start()) + 1)
+        match = _VISIBLE.search(self.data, start)
+        return None if match is None else self.read_line(self.data.rfind(b"\n", 0, match.start()) + 1)
 
-    def first_lines(self, count: int) -> list[Line]:
+    def find_first_lines(self, count: int) -> list[Line]:
         """Return up to `count` lines from the first nonblank one."""
-        first = self.first_line()
-        return [] if first is None else self.lines(first.start, count)
+        first = self.find_first_line()
+        return [] if first is None else self.read_lines(first.start, count)
 
-    def line_number(self, at: int) -> int:
-        """Return the number (from 1) of the line that contains the offset `at`."""
-        return self.data.count(b"\n", 0, at) + 1
+    def find_line_number(self, offset: int) -> int:
+        """Return the number (from 1) of the line that contains an offset."""
+        return self.data.count(b"\n", 0, offset) + 1
 
     @cached_property
     def is_binary(self) -> bool:
         """Whether at least one byte in a hundred cannot occur in a text file."""
         return len(self.data.translate(None, _CONTROL)) < 0.99 * len(self.data)
 
-    def error(self, message: str, at: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
-        """Return an error with this message about the file's line at the offset `at`."""
-        line = None if at is None else self.line_number(at)
+    def error(self, message: str, offset: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
+        """Return an error with this message about the file's line at an offset."""
+        line = None if offset is None else self.find_line_number(offset)
         return UnreadableRecord(message, *arguments, path=self.path, line=line, value=value)
 
 
-def unreadable(name: str, error: Exception) -> UnreadableRecord:
+def unreadable_file_error(name: str, error: Exception) -> UnreadableRecord:
     """Return an error for a file that could not be opened, with any similar shipped record."""
     text = f"this file could not be read ({getattr(error, 'strerror', None) or error}); check the name and the disk"
     if isinstance(error, FileNotFoundError):
-        meant = catalogue.meant(name, "check the name and the folder", "the shipped record ")
-        text = f"there is no such file; {meant}"
+        hint = catalogue.suggest_records(name, "check the name and the folder", "the shipped record ")
+        text = f"there is no such file; {hint}"
     return UnreadableRecord(text, path=name)
 
 
@@ -114,19 +114,19 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     else:
         name = os.fsdecode(path)
     try:
-        raw = _content(name) if read is None else read(SIZE_LIMIT + 1)
+        raw = _read_bytes(name) if read is None else read(SIZE_LIMIT + 1)
     except (OSError, ValueError) as error:
-        raise unreadable(name, error) from error
+        raise unreadable_file_error(name, error) from error
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
         raise UnreadableRecord(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
-    data = _text(raw)
+    data = _normalise_text(raw)
     if not data.strip():
         raise UnreadableRecord("this file is empty; get the record again", path=name)
     return Source(name, raw, data)
 
 
-def _content(name: str) -> bytes:
+def _read_bytes(name: str) -> bytes:
     status = os.stat(name)  # noqa: PTH116 - Path() would turn an empty name into the current folder
     if not stat.S_ISREG(status.st_mode):
         text = "this is a folder" if stat.S_ISDIR(status.st_mode) else "this is not a regular file"
@@ -136,7 +136,7 @@ def _content(name: str) -> bytes:
         return file.read(min(status.st_size, SIZE_LIMIT) + 1)
 
 
-def _text(raw: bytes) -> bytes:
+def _normalise_text(raw: bytes) -> bytes:
     data = raw
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", "replace").encode("latin-1", "replace")
@@ -148,20 +148,20 @@ def _text(raw: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class Request:
-    """Arguments `dt` (s), `units` and `channel` of a read, or None if the file should state them.
+    """Arguments of a read, or None for those that the file should state.
 
-    ``most`` limits the number of samples unpacked from a compressed file, unless None. For several files, the arguments
-    apply to files that do not state the values or contain several channels. They must not contradict a single file.
+    For several files, the arguments apply to files that do not state the values or contain several channels. They must
+    not contradict a single file.
     """
 
-    dt: float | None = None
-    unit: Unit | None = None
-    channel: int | str | None = None
-    several: bool = False
-    most: int | None = None
+    dt: float | None = None  # sampling step, s
+    unit: Unit | None = None  # unit of the numbers
+    channel: int | str | None = None  # number or name
+    several: bool = False  # whether the arguments apply to several files
+    max_samples: int | None = None  # limit of the samples unpacked from a compressed file
 
     @classmethod
-    def checked(
+    def create(
         cls,
         dt: float | None = None,
         units: str | None = None,
@@ -173,26 +173,26 @@ class Request:
         step = None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s")
         return cls(step, None if units is None else choose_unit(units), channel, several)
 
-    def step(self, source: Source, stated: float, at: int | None) -> float:
-        """Return the checked step (s) that the file states at the offset `at`."""
+    def check_step(self, source: Source, stated: float, offset: int | None) -> float:
+        """Return the step (s) that the file states at an offset, or raise an error."""
         # Files contain no more samples than bytes, so this also bounds the record's duration.
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
-            raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
+            raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", offset)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):
             text = f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out"
-            raise source.error(text, at, "dt", "dt", value=self.dt)
+            raise source.error(text, offset, "dt", "dt", value=self.dt)
         return stated
 
-    def units(self, source: Source, stated: Unit | str | None, at: int | None) -> Unit:
-        """Return the unit that the file states at the offset `at`, or else the requested one."""
+    def resolve_unit(self, source: Source, stated: Unit | str | None, offset: int | None) -> Unit:
+        """Return the unit that the file states at an offset, or else the requested one."""
         spelling = stated.strip() if isinstance(stated, str) else ""
         unit = find_unit(spelling) if isinstance(stated, str) else stated
         unit = unit or (None if spelling and self.several else self.unit)
         if unit is None:
             unknown = f"the units {literal(repr(spelling))} are not known"
             fault = unknown if spelling else "the file does not say its units"
-            raise source.error(f"{fault}; give {{}} as one of {', '.join(CHOICES)}", at, "units")
+            raise source.error(f"{fault}; give {{}} as one of {', '.join(UNIT_NAMES)}", offset, "units")
         if self.unit is not None and not self.several and unit != self.unit:
             text = f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out"
-            raise source.error(text, at, "units", "units", value=self.unit.name)
+            raise source.error(text, offset, "units", "units", value=self.unit.name)
         return unit

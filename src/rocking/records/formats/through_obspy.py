@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from rocking.records.formats.channel import Channel, Recognised, channel_of
+from rocking.records.formats.channel import Channel, Recognised, create_channel
 from rocking.records.formats.source import Request, Source
 from rocking.records.units import Unit
 
 #: PICKLE executes code from a file. The other two open files named in a file.
-_REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
-_TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
+_EXCLUDED_READERS = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
+_SERIES_TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
 
-def installed() -> bool:
+def is_obspy_installed() -> bool:
     """Return whether ObsPy can be imported."""
     with warnings.catch_warnings(), contextlib.suppress(ImportError):
         warnings.simplefilter("ignore")
@@ -31,37 +31,37 @@ def installed() -> bool:
     return False
 
 
-def recognise(source: Source) -> Recognised | None:
+def recognise_with_obspy(source: Source) -> Recognised | None:
     """Return the first format whose ObsPy reader claims the file (and, of several, can read it)."""
-    claims = _claims(source) if installed() else []
-    able = (name for name in claims if len(claims) == 1 or not isinstance(_traces(source, name), str))
+    claims = _find_claiming_readers(source) if is_obspy_installed() else []
+    readable = (name for name in claims if len(claims) == 1 or not isinstance(_read_traces(source, name), str))
     if not claims:
         return None
-    name = next(able, claims[0])
+    name = next(readable, claims[0])
     reason = f"ObsPy's {name} reader recognises it"
-    return Recognised(f"{name} (through ObsPy)", reason, functools.partial(_read, source, name))
+    return Recognised(f"{name} (through ObsPy)", reason, functools.partial(_read_channels, source, name))
 
 
-def _read(source: Source, name: str, request: Request) -> list[Channel]:
+def _read_channels(source: Source, name: str, request: Request) -> list[Channel]:
     """Return all traces of the file times their calibration factor."""
-    unit = request.units(source, None, None)
-    if request.most is not None:  # the file states its number of samples before they are unpacked
-        heads = _traces(source, name, headonly=True)
-        samples = sum(int(trace.stats.npts) for trace in heads if not isinstance(trace, str))
-        if samples > request.most:
-            text = f"{samples} samples, of which at most {request.most} are read here; cut it into smaller files"
+    unit = request.resolve_unit(source, None, None)
+    if request.max_samples is not None:  # the file states its number of samples before they are unpacked
+        headers = _read_traces(source, name, headonly=True)
+        samples = sum(int(trace.stats.npts) for trace in headers if not isinstance(trace, str))
+        if samples > request.max_samples:
+            text = f"{samples} samples, of which at most {request.max_samples} are read here; cut it into smaller files"
             raise source.error(text)
-    traces = _traces(source, name)
+    traces = _read_traces(source, name)
     if isinstance(traces, str):
         raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
-    _refuse_cut(source, traces)
-    for each, pieces in Counter(str(trace.id) for trace in traces).most_common(1):
+    _reject_truncated(source, traces)
+    for trace_id, pieces in Counter(str(trace.id) for trace in traces).most_common(1):
         if pieces > 1:
-            raise source.error(f"{each} is in {pieces} pieces, with gaps or overlaps; get a record without gaps")
-    return [_channel(source, request, unit, trace, name, number) for number, trace in enumerate(traces, 1)]
+            raise source.error(f"{trace_id} is in {pieces} pieces, with gaps or overlaps; get a record without gaps")
+    return [_convert_trace(source, request, unit, trace, name, number) for number, trace in enumerate(traces, 1)]
 
 
-def _channel(source: Source, request: Request, unit: Unit, trace: Any, name: str, number: int) -> Channel:
+def _convert_trace(source: Source, request: Request, unit: Unit, trace: Any, name: str, number: int) -> Channel:
     stats = trace.stats
     if np.ma.is_masked(trace.data) or not np.issubdtype(trace.data.dtype, np.number):
         raise source.error(f"trace {number} has gaps, or no numbers; get a record without gaps")
@@ -70,7 +70,7 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, name: str
     # SAC states azimuth and angle from the vertical, about 90 degrees if horizontal.
     sac = {"cmpaz": None, "cmpinc": None, **stats.get("sac", {})}
     horizontal = None not in (sac["cmpaz"], sac["cmpinc"]) and abs(sac["cmpinc"] - 90.0) <= 5.0
-    return channel_of(
+    return create_channel(
         source,
         f"{name} (through ObsPy)",
         values,
@@ -78,24 +78,24 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, name: str
         None,
         name=str(stats.channel) or f"trace {number}",
         number=number,
-        dt=request.step(source, float(stats.delta), None),
+        dt=request.check_step(source, float(stats.delta), None),
         azimuth=float(sac["cmpaz"]) % 360.0 if horizontal else None,
         station=f"{stats.network}.{stats.station}".strip("."),
         start=float(stats.starttime.timestamp),
     )
 
 
-def _refuse_cut(source: Source, traces: Any) -> None:
+def _reject_truncated(source: Source, traces: Any) -> None:
     """Reject a truncated file if ObsPy reads the rest silently."""
-    titles = _TITLE.findall(source.data)
+    titles = _SERIES_TITLE.findall(source.data)
     lengths = {int(trace.stats.mseed.record_length) for trace in traces if "mseed" in trace.stats}
-    held = [len(trace.data) for trace in traces]
-    is_other = len(titles) == len(held) and [*map(int, titles)] != held
-    if is_other or (len(lengths) == 1 and len(source.raw) % lengths.pop()):
+    counts = [len(trace.data) for trace in traces]
+    is_truncated = len(titles) == len(counts) and [*map(int, titles)] != counts
+    if is_truncated or (len(lengths) == 1 and len(source.raw) % lengths.pop()):
         raise source.error("the file does not hold as many values as it says; get the whole file again")
 
 
-def _claims(source: Source) -> list[str]:
+def _find_claiming_readers(source: Source) -> list[str]:
     """Return the names of the formats whose readers claim the file."""
     from obspy.core.util.base import ENTRY_POINTS
     from obspy.core.util.misc import buffered_load_entry_point
@@ -103,21 +103,21 @@ def _claims(source: Source) -> list[str]:
     claims = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for name in (each for each in ENTRY_POINTS["waveform"] if each not in _REFUSED):
+        for name in (reader for reader in ENTRY_POINTS["waveform"] if reader not in _EXCLUDED_READERS):
             # A reader that fails on foreign bytes (with any exception) does not claim them.
             with contextlib.suppress(Exception):
                 is_format = buffered_load_entry_point("obspy", f"obspy.plugin.waveform.{name}", "isFormat")
-                if is_format(_opened(source)):
+                if is_format(_open_copy(source)):
                     claims.append(str(name))
     return claims
 
 
-def _opened(source: Source) -> io.BytesIO:
+def _open_copy(source: Source) -> io.BytesIO:
     """Return a copy of the file's bytes, because ObsPy's check for GCF writes to its input."""
     return io.BytesIO(bytearray(source.raw))
 
 
-def _traces(source: Source, name: str, *, headonly: bool = False) -> Any:
+def _read_traces(source: Source, name: str, *, headonly: bool = False) -> Any:
     """Return ObsPy's traces (only headers if supported and requested), or the reason for their absence."""
     import obspy
     from obspy.io.mseed import InternalMSEEDWarning
@@ -127,7 +127,7 @@ def _traces(source: Source, name: str, *, headonly: bool = False) -> Any:
         # A failure of MiniSEED's own check of its numbers is only a warning.
         warnings.simplefilter("error", InternalMSEEDWarning)
         try:
-            traces = obspy.read(_opened(source), format=name, headonly=headonly)
+            traces = obspy.read(_open_copy(source), format=name, headonly=headonly)
         except Exception as error:
             # ObsPy's readers raise any exception from their parsing.
             return " ".join(str(error).split())[:200] or type(error).__name__
