@@ -8,7 +8,8 @@ from kernel_records import long_uncompiled, rocking_block, state_of
 
 import rocking
 from rocking.engine.problem import ground_of
-from rocking.kernels.state import AT_REST, new_scratch
+from rocking.kernels.state import AT_REST, new_records, new_scratch
+from rocking.kernels.uplift import write_completeness
 from rocking.motion.motion import find_exceedances
 
 Pair = tuple[float, float]

@@ -21,6 +21,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisected
 from rocking.errors import InvalidOption
+from rocking.kernels.ground import component_coefficients
 from rocking.kernels.state import Record
 from rocking.motion import piecewise
 from rocking.response.history import History, elongation, plastic_elongations
