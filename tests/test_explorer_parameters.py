@@ -12,7 +12,7 @@ from rocking.explorer.parameters import (
     field_label,
     specification,
 )
-from rocking.explorer.payload import english
+from rocking.explorer.payload import load_english_texts
 from rocking.inputs import quantities
 from rocking.inputs.pulses import FAMILIES, named_pulse
 
@@ -94,7 +94,10 @@ def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():
     judged = 0
     for name, pulse in PULSES.items():
         for parameter in pulse["parameters"]:
-            assert field_label(parameter.name, f"{name}:frequency=1") == f"“{english()[f'field.{parameter.text}']}”"
+            assert (
+                field_label(parameter.name, f"{name}:frequency=1")
+                == f"“{load_english_texts()[f'field.{parameter.text}']}”"
+            )
             judged += 1
     assert judged >= 20
     assert field_label("amplitude") == "amplitude"  # of the acceleration, or of the velocity
