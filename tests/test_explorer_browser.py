@@ -492,7 +492,7 @@ def test_a_block_by_its_parameters_with_two_sides(opened):
     assert found["alpha"].endswith(",9deg")
     block = rocking.Block.from_parameters(
         [float(each) for each in found["p"].split(",")],
-        [quantities.angle(each, "alpha") for each in found["alpha"].split(",")],
+        [quantities.read_angle(each, "alpha") for each in found["alpha"].split(",")],
         [float(each) for each in found["restitution"].split(",")],
     )
     response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665))
@@ -879,7 +879,7 @@ def test_a_map_has_the_units_of_the_page_and_its_address_those_of_the_axes(opene
     complete(page)
     page.rested(lambda: page.page.click("#map-open"))
     found = query_of(page)
-    assert quantities.acceleration(found["pga"], "pga") == pytest.approx(0.5375 * 9.80665)
+    assert quantities.read_acceleration(found["pga"], "pga") == pytest.approx(0.5375 * 9.80665)
 
 
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):

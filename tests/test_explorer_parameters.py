@@ -71,7 +71,7 @@ def test_two_sides_are_read_where_a_parameter_may_have_them_and_refused_elsewher
 def test_the_page_reads_every_unit_as_the_program_does():
     judged = 0
     for parameter in (*PARAMETERS.values(), *(each for pulse in PULSES.values() for each in pulse["parameters"])):
-        described = parameter.described()
+        described = parameter.describe()
         kind = "acceleration" if parameter.name == "sa" else parameter.kind
         if kind == "text":
             continue

@@ -23,7 +23,7 @@ from rocking.core.tables import as_written, cell, named, records_of, text_table
 from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
 from rocking.engine.treatment import Certified
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.inputs.pulses import pulse_family
+from rocking.inputs.pulses import find_family
 from rocking.motion.motion import Motion
 from rocking.records.named import one_motion
 
@@ -362,14 +362,14 @@ def _pulse_function(
                 f"a {{}} given as a function takes no {', '.join(parameters)}: bind them to it", "pulse"
             )
         return pulse
-    family = pulse_family(pulse)
+    family = find_family(pulse)
     if family.name not in PULSES:
         raise InvalidOption(
             f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse", value=pulse
         )
 
     def named_pulse(amplitude: float, frequency: float) -> Motion:
-        made = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
+        made = family.create_motion({"amplitude": 1.0, "frequency": frequency} | parameters)
         return made.scaled_to(amplitude) if family.is_of_velocity else made.scaled(amplitude)
 
     return named_pulse

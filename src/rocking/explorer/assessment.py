@@ -22,7 +22,7 @@ from rocking.explorer.motions import WrittenMotion, read_motion
 from rocking.explorer.parameters import ASSESSMENT, Texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.uploads import UploadStore
-from rocking.inputs.quantities import number
+from rocking.inputs.quantities import read_number
 from rocking.motion.motion import Motion, lifting_factors
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.response.mechanics import friction_coefficient
@@ -95,7 +95,7 @@ def read_assessment(case: Case, texts: Texts, uploads: UploadStore) -> Assessmen
         raise InvalidOption("an entry of the list of {} names no motion: take it out", "records")
     require_rest(side.restitution for side in case.block.sides)
     measure = _read_measure(nonempty)
-    count = number(nonempty.get("levels", "16"), "levels")
+    count = read_number(nonempty.get("levels", "16"), "levels")
     if not (_MIN_LEVELS <= count <= _MAX_LEVELS and count == int(count)):
         raise InvalidOption(
             f"{{}} are from {_MIN_LEVELS} to {_MAX_LEVELS} in number, not {count:g}", "levels", value=nonempty["levels"]
@@ -109,7 +109,7 @@ def read_assessment(case: Case, texts: Texts, uploads: UploadStore) -> Assessmen
     low, high = chosen_ends.get("level_from", default_range[0]), chosen_ends.get("level_to", default_range[1])
     if not 0.0 < low < high < math.inf:
         raise InvalidOption("{} must be positive, and below the last of the levels", "level_from")
-    friction = friction_coefficient(number(nonempty["friction"], "friction")) if "friction" in nonempty else None
+    friction = friction_coefficient(read_number(nonempty["friction"], "friction")) if "friction" in nonempty else None
     return Assessment(
         case, entries, number_stations(entries, uploads), uploads, measure, np.linspace(low, high, int(count)), friction
     )

@@ -10,7 +10,7 @@ from rocking.explorer.maps import Axis, MapGrid, read_polarity
 from rocking.explorer.motions import is_pulse, read_pulse_arguments, write_pulse_call
 from rocking.explorer.parameters import BLOCK_NAMES, NAMES
 from rocking.explorer.periodic import STORED_STATES, TRANSIENT_PERIODS, Sweep, write_sine_call
-from rocking.inputs.texts import command_line
+from rocking.inputs.texts import write_command
 
 _MAP: Final = """\
 import math
@@ -143,7 +143,7 @@ def case_as_command(case: Case) -> str | None:
         return None
     excluded = {*BLOCK_NAMES, "motion", "vertical"}
     options = {**case.block_options} | {name: case.texts[name] for name in NAMES if name in {*case.texts} - excluded}
-    return command_line(["rocking", "simulate", *case.words], options)
+    return write_command(["rocking", "simulate", *case.words], options)
 
 
 def map_as_python(grid: MapGrid, quantity: str) -> str:

@@ -19,7 +19,7 @@ from rocking.explorer.meshes import MeshBody, find_pivots
 from rocking.explorer.motions import motion_to_texts, read_motion_values
 from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, clean_texts
 from rocking.explorer.uploads import UploadStore
-from rocking.inputs.bodies import block_of, call_of
+from rocking.inputs.bodies import create_block, write_block_call
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST, TOO_STRONG
 from rocking.response import Response
@@ -182,7 +182,7 @@ def _read_block(texts: Texts, values: Values, uploads: UploadStore) -> _WrittenB
         return _read_mesh_block(texts, values, uploads)
     block_values = {name: values[name] for name in NAMES if name in BLOCK_NAMES or name == "gravity" if name in values}
     options = {name: texts[name] for name in block_values if name != "gravity"}
-    return _WrittenBlock(block_of(block_values), call_of(block_values), options)
+    return _WrittenBlock(create_block(block_values), write_block_call(block_values), options)
 
 
 def _read_mesh_block(texts: Texts, values: Values, uploads: UploadStore) -> _WrittenBlock:

@@ -26,8 +26,8 @@ from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_argument
 from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, list_names
 from rocking.explorer.payload import phrase
 from rocking.inputs.declared import SCALINGS
-from rocking.inputs.pulses import pulse_texts
-from rocking.inputs.quantities import number
+from rocking.inputs.pulses import split_pulse
+from rocking.inputs.quantities import read_number
 from rocking.motion.motion import Motion
 
 #: Minimum and maximum number of points of an axis.
@@ -221,7 +221,7 @@ def _compute_peak(grid: MapGrid, point: Mapping[str, float]) -> float | None:
 
 def read_polarity(texts: Texts) -> float:
     """Return -1 if the scale of a case reverses its motion, else 1."""
-    return math.copysign(1.0, number(texts.get("scale", "1"), "scale"))
+    return math.copysign(1.0, read_number(texts.get("scale", "1"), "scale"))
 
 
 def describe_map(grid: MapGrid) -> dict[str, Any]:
@@ -264,7 +264,8 @@ def _read_axis(direction: str, case: Case, texts: Texts) -> Axis:
 def read_range(name: str, texts: Texts, keys: tuple[str, str, str], default_ends: tuple[float, float]) -> Axis:
     """Read the values of a parameter; the texts of the keys are its ends (by default `ends`) and number of values."""
     low, high, count = (
-        number(texts.get(key) or repr(default), key) for key, default in zip(keys, (*default_ends, 200), strict=True)
+        read_number(texts.get(key) or repr(default), key)
+        for key, default in zip(keys, (*default_ends, 200), strict=True)
     )
     if not (_MIN_POINTS <= count <= _MAX_POINTS and count == int(count)):
         raise InvalidOption(
@@ -360,14 +361,14 @@ def change_pulse(texts: dict[str, str], **numbers: float) -> None:
     arguments = read_pulse_arguments(texts["motion"])
     if "duration" in arguments and "frequency" in numbers:
         numbers["duration"] = arguments["duration"] * arguments["frequency"] / numbers["frequency"]
-    _, written = pulse_texts(texts["motion"])
+    _, written = split_pulse(texts["motion"])
     current: dict[str, Any] = {name: ",".join(values) for name, values in written.items() if name in arguments}
     texts["motion"] = write_pulse(texts["motion"], current | numbers)
 
 
 def _change_amplitude(texts: dict[str, str], grid: MapGrid, peak: float) -> None:
     """Scale the motion to a peak acceleration, m/s^2, in its polarity: pulses by amplitude, records by scale."""
-    scale, sign = number(texts.get("scale", "1"), "scale"), read_polarity(texts)
+    scale, sign = read_number(texts.get("scale", "1"), "scale"), read_polarity(texts)
     for name in SCALINGS:
         texts.pop(name, None)
     if is_pulse(texts["motion"]):

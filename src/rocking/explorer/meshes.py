@@ -15,7 +15,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import RockingError
 from rocking.explorer.apart import read_mesh, read_mesh_in_process
 from rocking.explorer.payload import Payload, phrase
-from rocking.inputs.quantities import densities, number
+from rocking.inputs.quantities import read_densities, read_number
 from rocking.solid import Rose, Solid
 from rocking.solid.solid import Plane, plane_of
 from rocking.solid.support import directions
@@ -37,9 +37,9 @@ _MAX_NAMED_PARTS: Final = 6
 
 #: Texts that describe a body, and how each is read as an argument of `rocking.Solid.from_mesh`.
 _READERS: Final[Mapping[str, Callable[[str], Any]]] = {
-    "density": lambda text: densities(text, "density"),
+    "density": lambda text: read_densities(text, "density"),
     "up": str,
-    "unit": lambda text: text if text.isalpha() else number(text, "unit"),
+    "unit": lambda text: text if text.isalpha() else read_number(text, "unit"),
 }
 
 

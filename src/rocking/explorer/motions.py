@@ -14,10 +14,10 @@ from rocking.errors import InvalidMotion, InvalidOption
 from rocking.explorer.parameters import PARAMETERS, PULSES, Texts, Values, clean_texts, list_names
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.declared import SCALINGS
-from rocking.inputs.pulses import FAMILIES, pulse_values
-from rocking.inputs.quantities import acceleration, scaling
-from rocking.inputs.texts import arguments as written_arguments
-from rocking.inputs.texts import as_option, as_path
+from rocking.inputs.pulses import FAMILIES, read_pulse
+from rocking.inputs.quantities import read_acceleration, read_scaling
+from rocking.inputs.texts import write_arguments as written_arguments
+from rocking.inputs.texts import write_option, write_path
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
@@ -44,7 +44,7 @@ def read_motion(texts: Texts, uploads: UploadStore) -> WrittenMotion:
 
 def read_motion_values(texts: Texts, values: Values, uploads: UploadStore) -> WrittenMotion:
     """Create the motion of a case, scaled and with its vertical component."""
-    target = scaling({name: texts[name] for name in SCALINGS if name in texts}, _read_level)
+    target = read_scaling({name: texts[name] for name in SCALINGS if name in texts}, _read_level)
     name = values["motion"]
     read = _read_unscaled(name, values, uploads)
     if "vertical" in values:
@@ -58,7 +58,7 @@ def read_motion_values(texts: Texts, values: Values, uploads: UploadStore) -> Wr
 
 
 def _read_level(text: str, name: str) -> float:
-    return checks.positive(acceleration(text, name), name, InvalidOption, "m/s^2")
+    return checks.positive(read_acceleration(text, name), name, InvalidOption, "m/s^2")
 
 
 def _write_scaling(level: float, measure: Measure) -> str:
@@ -94,7 +94,7 @@ def _add_vertical(
     return WrittenMotion(
         _combine(horizontal.motion, vertical.motion),
         f"{horizontal.python}.with_vertical({vertical.python})",
-        (*horizontal.words, *as_option("vertical", *words)) if horizontal.words and words else (),
+        (*horizontal.words, *write_option("vertical", *words)) if horizontal.words and words else (),
     )
 
 
@@ -126,7 +126,7 @@ def _read_file(key: str, values: Values, channel: str | None, uploads: UploadSto
     file, read_options = uploads.file(key).name, {"channel": channel, "dt": None, "units": None} | options
     arguments = written_arguments({name: value for name, value in read_options.items() if value is not None})
     call = f"rocking.read({file!r}{', ' if arguments else ''}{arguments})"
-    return WrittenMotion(uploads.read(key, **read_options), call, (as_path(file),))
+    return WrittenMotion(uploads.read(key, **read_options), call, (write_path(file),))
 
 
 def is_pulse(text: str) -> bool:
@@ -142,7 +142,7 @@ def read_pulse_arguments(text: str) -> dict[str, Any]:
     >>> read_pulse_arguments("sine:amplitude=2, frequency=1Hz, cycles=5,")
     {'amplitude': 2.0, 'frequency': 1.0, 'cycles': 5.0}
     """
-    family, arguments = pulse_values(text)
+    family, arguments = read_pulse(text)
     for name in ("cycles", "gamma"):
         if arguments.get(name, 0.0) > MAX_CYCLES:
             raise InvalidMotion(
@@ -152,25 +152,27 @@ def read_pulse_arguments(text: str) -> dict[str, Any]:
             )
     if "duration" in arguments and "duration" in family.optional:
         without_duration = {name: value for name, value in arguments.items() if name != "duration"}
-        return without_duration if family.motion(without_duration).duration == arguments["duration"] else arguments
+        return (
+            without_duration if family.create_motion(without_duration).duration == arguments["duration"] else arguments
+        )
     return arguments
 
 
 def write_pulse(text: str, arguments: Mapping[str, Any]) -> str:
     """Write a pulse of the family of a text with these parameters, in SI units."""
     written_arguments = ",".join(f"{name}={value}" for name, value in arguments.items())
-    return f"{pulse_values(text)[0].name}:{written_arguments}"
+    return f"{read_pulse(text)[0].name}:{written_arguments}"
 
 
 def create_pulse(text: str) -> Motion:
     """Create the pulse that a text names."""
-    return pulse_values(text)[0].motion(read_pulse_arguments(text))
+    return read_pulse(text)[0].create_motion(read_pulse_arguments(text))
 
 
 def write_pulse_call(text: str, arguments: Mapping[str, str]) -> str:
     """Write the call that creates a pulse of the same family with these arguments, as Python expressions."""
     written_arguments = ", ".join(f"{name}={value}" for name, value in arguments.items())
-    return f"rocking.pulses.{pulse_values(text)[0].make.__name__}({written_arguments})"
+    return f"rocking.pulses.{read_pulse(text)[0].make.__name__}({written_arguments})"
 
 
 def write_motion_as_pulse(motion: Motion) -> str | None:

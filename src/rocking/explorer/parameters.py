@@ -15,7 +15,7 @@ from rocking.core.constants import VERSION
 from rocking.engine.treatment import treatment
 from rocking.errors import InvalidOption
 from rocking.explorer.payload import load_english_texts
-from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
+from rocking.inputs.declared import INPUTS, SCALINGS, Input, index_by_name
 from rocking.inputs.declared import SHAPES as ALL_SHAPES
 from rocking.inputs.pulses import FAMILIES
 from rocking.records.units import CHOICES
@@ -58,12 +58,12 @@ MAP: Final = _declare(
 SWEEP: Final = _declare("sweep", "sweep sweep_from sweep_to sweep_points", sweep="a")
 
 #: Text for the time of a reading.
-READING: Final = by_name(Input("at", "reading", "duration", "", "s"))
+READING: Final = index_by_name(Input("at", "reading", "duration", "", "s"))
 
 #: File name extensions of meshes.
 MESH_KINDS: Final = ("obj", "ply", "stl", "glb", "gltf")
 #: Texts for an assessment and its list of records.
-ASSESSMENT: Final = by_name(
+ASSESSMENT: Final = index_by_name(
     Input("records", "assessment", "text"),
     Input("measure", "assessment", "text", default="pga"),
     Input("measure_period", "assessment", "duration", "", "s", "1"),
@@ -127,7 +127,7 @@ PULSES: Final[Mapping[str, dict[str, Any]]] = {
 def _declare_limited_treatment(name: str, unit: str, default: str, text: str) -> dict[str, Any]:
     """Return a treatment with the field of its limit, and its default limit."""
     limit = Input("limit", "treatment", "number", "", unit, default, 1e-9, 0.1, True, text=text)
-    return {"name": name, "limit": limit.described(), "unnamed": str(treatment(name)).partition("=")[2]}
+    return {"name": name, "limit": limit.describe(), "unnamed": str(treatment(name)).partition("=")[2]}
 
 
 _TREATMENTS: Final = (
@@ -185,7 +185,7 @@ def field_label(name: str, motion: str = "", texts: Mapping[str, Any] | None = N
     ('“Amplitude”', '“Velocity amplitude”')
     """
     pulse_in_motion = PULSES.get(motion.partition(":")[0])
-    inputs = PARAMETERS | MAP | SWEEP | READING | ASSESSMENT | by_name(_PERIOD)
+    inputs = PARAMETERS | MAP | SWEEP | READING | ASSESSMENT | index_by_name(_PERIOD)
     labels = load_english_texts() if texts is None else texts
     fields = {
         field.text
@@ -204,16 +204,16 @@ def specification() -> dict[str, Any]:
     return {
         "version": VERSION,
         "default": DEFAULT,
-        "parameters": [parameter.described() for parameter in PARAMETERS.values()],
+        "parameters": [parameter.describe() for parameter in PARAMETERS.values()],
         "map": list(MAP),
         "sweep": list(SWEEP),
         "assessment": list(ASSESSMENT),
         "shown_in": {name: list(units) for name, units in SHOWN_IN.items()},
         "shapes": [shape._asdict() for shape in SHAPES],
         "scalings": ["", *SCALINGS],
-        "period": _PERIOD.described(),
+        "period": _PERIOD.describe(),
         "pulses": {
-            name: {**pulse, "parameters": [parameter.described() for parameter in pulse["parameters"]]}
+            name: {**pulse, "parameters": [parameter.describe() for parameter in pulse["parameters"]]}
             for name, pulse in PULSES.items()
         },
         "meshes": [*SHIPPED],

@@ -33,7 +33,7 @@ from rocking.explorer.parameters import PARAMETERS, QUANTITIES, field_label, spe
 from rocking.explorer.payload import Payload, fill_page, pack, phrase
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import MAX_FILE_SIZE, TOO_LARGE_MESSAGE
-from rocking.inputs.quantities import number
+from rocking.inputs.quantities import read_number
 
 T = TypeVar("T")
 
@@ -96,7 +96,7 @@ class Query:
         text = self.fields.get(name)
         if not text:
             return None
-        value = number(text[:40], name)
+        value = read_number(text[:40], name)
         if not math.isfinite(value):
             raise InvalidOption("{} must be a finite number", name, value=value)
         return value

@@ -19,8 +19,8 @@ from rocking.errors import InvalidOption, StudyError
 from rocking.explorer.motions import motion_to_texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.uploads import UploadStore
-from rocking.inputs.quantities import number
-from rocking.inputs.texts import as_path
+from rocking.inputs.quantities import read_number
+from rocking.inputs.texts import write_path
 from rocking.motion.scaling import FACTOR
 
 #: Largest map, points.
@@ -123,7 +123,7 @@ class StudyView:
             "quantity": quantity,
             "shape": values.shape,
             "python": f"import rocking\n\n{script}",
-            "command": shlex.join(["rocking", "study", "report", as_path(self.name)]),
+            "command": shlex.join(["rocking", "study", "report", write_path(self.name)]),
         }
         return Payload(header, {"values": values.ravel()})
 
@@ -149,7 +149,7 @@ class StudyView:
 
     def _read_coordinate(self, texts: Mapping[str, str], direction: str) -> float:
         """Return a coordinate of a point of a slice; on an axis of indices it must be one of them."""
-        coordinate = number(texts.get(f"at_{direction}", ""), f"at_{direction}")
+        coordinate = read_number(texts.get(f"at_{direction}", ""), f"at_{direction}")
         last = {"motion": len(self.study.product.motions), "block": len(self.study.product.blocks)}.get(
             texts.get(direction, ""), 0
         )
@@ -176,12 +176,12 @@ class StudyView:
         """Return the value of the study that is nearest to a text, or the first."""
         values = np.unique(self._columns[name])
         text = texts.get(f"fix_{name}")
-        return float(values[0] if not text else values[np.argmin(np.abs(values - number(text, name)))])
+        return float(values[0] if not text else values[np.argmin(np.abs(values - read_number(text, name)))])
 
     def _read_index(self, texts: Mapping[str, str], name: str) -> int:
         """Return the index of the scale, motion or polarity in a text, or 0."""
         count = len(self._choices[name])
-        index = number(texts.get(name) or "0", name)
+        index = read_number(texts.get(name) or "0", name)
         if not (0 <= index < count and math.floor(index) == index):
             raise InvalidOption(f"{{}} must be a whole number from 0 to {count - 1}, not {index:g}", name, value=index)
         return int(index)
