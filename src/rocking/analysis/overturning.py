@@ -183,7 +183,7 @@ def overturning_map(
     # Blocks of one shape with values of p that correspond to the ratios for a pulse of the block's frequency.
     blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
     setup, threshold = Setup(blocks, model, Certified(width * unit.end)), min(block.uplift_thresholds(model))
-    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, minimum=1)
 
     def followed(
         column: Integers, level: Floats, done: Callable[[int], None] = lambda count: None
@@ -278,7 +278,7 @@ class OverturningMap(DatasetResult):
     POOLED = ("boundary",)
 
     @staticmethod
-    def _kept_of(data: xr.Dataset) -> xr.Dataset:
+    def _restrict(data: xr.Dataset) -> xr.Dataset:
         at, level = data.boundary_frequency.values, data.boundary_amplitude.values
         low, high = data.amplitude.values.min(), data.amplitude.values.max()
         return data.isel(boundary=np.isin(at, data.frequency.values) & (low < level) & (level <= high))

@@ -424,7 +424,7 @@ def critical_amplitude_nonlinear(
     '-7.3e-06'
     """
     parameters = checked_frequency(omega), checked_restitution(eta), checked_slenderness(alpha)
-    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, minimum=1)
     shape, flat = broadcast(*parameters)
     cases = list(zip(*(values.tolist() for values in flat), strict=True))
     found = np.empty(len(cases))

@@ -156,7 +156,7 @@ def chattering_map(
     checks.mapping(parameters, "parameters", InvalidOption, '{"a": [1.0, 1.1], "omega": [1.0, 2.0]}')
     if len(parameters) != 2:
         raise InvalidOption(f"{{}} must be two, not {len(parameters)}", "parameters", value=parameters)
-    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, minimum=1)
     if not callable(family):
         raise InvalidOption(
             f"{{}} must be a function of two numbers, as rocking.chattering.families.sine(block), not {family!r}",

@@ -1,4 +1,4 @@
-"""Parallel work on many items in threads that stops cleanly when interrupted."""
+"""Parallel computation in threads that stops cleanly on an interrupt."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Final, TypeVar
 
 Item = TypeVar("Item")
-Found = TypeVar("Found")
+Output = TypeVar("Output")
 
 #: Items per thread that are submitted ahead of the oldest pending result.
-AHEAD: Final = 16
+LOOKAHEAD: Final = 16
 
 
 def cores() -> int:
@@ -23,12 +23,12 @@ def cores() -> int:
 
 
 def in_threads(
-    work: Callable[[Item], Found],
+    function: Callable[[Item], Output],
     items: Iterable[Item],
     *,
     threads: int | None = None,
     cancelled: threading.Event | None = None,
-) -> Iterator[Found]:
+) -> Iterator[Output]:
     """Yield the results of some work on each item, in order, by default with one thread per core.
 
     Items are consumed as needed, some per thread ahead of the results. The first of several failed items determines the
@@ -37,14 +37,14 @@ def in_threads(
     """
     count = min(cores() if threads is None else threads, len(items) if isinstance(items, Sized) else 2**16)
     if count < 2:
-        yield from map(work, items)
+        yield from map(function, items)
         return
-    left, pending = iter(items), deque[Future[Found]]()
+    remaining, pending = iter(items), deque[Future[Output]]()
     pool = ThreadPoolExecutor(count)
     try:
         while True:
-            for item in itertools.islice(left, AHEAD * count - len(pending)):
-                pending.append(pool.submit(work, item))
+            for item in itertools.islice(remaining, LOOKAHEAD * count - len(pending)):
+                pending.append(pool.submit(function, item))
             if not pending:
                 return
             yield pending.popleft().result()

@@ -121,7 +121,7 @@ def continue_orbit(
         raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
     start = checks.within(value, "value", InvalidOption, low, high)
     longest = checks.positive(step, "step", InvalidOption)
-    count = checks.whole(most, "most", InvalidOption, least=1)
+    count = checks.whole(most, "most", InvalidOption, minimum=1)
     equations = OrbitEquations.of(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
     backward, forward = (_Walk(equations, z, direction, longest) for direction in (-1.0, 1.0))

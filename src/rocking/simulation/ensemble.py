@@ -361,7 +361,7 @@ def outcomes_of(
     near: float = 1.0,
 ) -> dict[str, NDArray[np.generic]]:
     """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME`."""
-    count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, minimum=1)
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
         for task, outcomes in simulate_tasks(setup, _tasks(product, near), threads=count):

@@ -188,7 +188,7 @@ class Study:
         OutputError
             If a unit cannot be written.
         """
-        number = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+        number = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, minimum=1)
         first, step = (1, 1) if part is None else _part(part)
         self._store.check_program()
         with locked(self.place, shared=part is not None):
