@@ -15,7 +15,7 @@ import httpx
 
 from rocking.explorer.authentication import EXCHANGE
 from rocking.explorer.core import Explorer
-from rocking.explorer.launch import served
+from rocking.explorer.launch import start_listening
 
 CASE = "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=0.4g"
 SINE = "view=map&width=0.24&height=1.1&motion=sine:amplitude%3D0.2247g,frequency%3D1.15,cycles%3D2.5"
@@ -46,7 +46,7 @@ def main():
     if shutil.which("chromium") is None:
         print("no browser: install Chromium")
         return
-    here = served(Explorer(), {})
+    here = start_listening(Explorer(), {})
     here.run_in_background()
     flags = ["--disable-gpu", "--disable-background-networking", *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with sync_playwright() as player:

@@ -18,7 +18,7 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 from rocking.explorer.core import Explorer
-from rocking.explorer.launch import served
+from rocking.explorer.launch import start_listening
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "_static"
 
@@ -47,7 +47,7 @@ FRAMES, RATE, SIZE = 120, 12, (720, 660)
 def main() -> None:
     """Take all pictures, or those of the views that are named."""
     wanted = sys.argv[1:] or [*VIEWS, "film"]
-    here = served(Explorer(), {})
+    here = start_listening(Explorer(), {})
     here.run_in_background()
     flags = ["--disable-gpu", "--disable-background-networking", *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with sync_playwright() as player:

@@ -3,7 +3,7 @@
 import math
 import re
 
-from rocking.explorer.payload import english
+from rocking.explorer.payload import load_english_texts
 
 #: Kinds of quantities in texts: the unit in which the page shows them unless another is chosen, in SI units.
 MEASURES = {"angle": (math.radians(1.0), "°"), "acceleration": (9.80665, " g"), "length": (1.0, " m")}
@@ -14,7 +14,7 @@ def in_english(said):
     if isinstance(said, str):
         return said
     values = said["values"]
-    form = english()[said["phrase"]]
+    form = load_english_texts()[said["phrase"]]
     if isinstance(form, dict):
         count = values["count"]
         form = form.get(str(count)) or form.get("one" if count == 1 else "other") or form["other"]

@@ -24,7 +24,9 @@ def test_spectrum_json_is_the_spectrum(run):
     assert (code, err) == (0, "")
     result = json.loads(out)
     motions = [rocking.records.load(name) for name in (RECORD, OTHER)]
-    dataset = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.2], p=quantities.values("1:4:5:log", "--p")), motions)
+    dataset = rocking_spectrum(
+        rocking.Blocks.grid(alpha=[0.1, 0.2], p=quantities.read_values("1:4:5:log", "--p")), motions
+    )
     assert result["motions"] == [RECORD, OTHER]
     assert result["axes"] == ["alpha", "p"]
     assert result["overturned_share"] == dataset.data.overturned_share.values.tolist()

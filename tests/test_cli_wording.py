@@ -101,8 +101,8 @@ def test_no_suggestion_leads_to_another_quantity(run, option):
 
 
 def test_angles_that_may_be_radians_are_taken_for_them(run):
-    assert quantities.tilt("1.5", "--alpha") == 1.5
-    assert quantities.tilt("12deg", "--alpha") == pytest.approx(np.radians(12.0))
+    assert quantities.read_tilt("1.5", "--alpha") == 1.5
+    assert quantities.read_tilt("12deg", "--alpha") == pytest.approx(np.radians(12.0))
     # A phase may be any number of radians.
     assert (
         run("map", "sine", "--cycles", 1, "--phase", 3, "--alpha", 0.2, "--amplitudes", "1,2", "--frequencies", 5)[0]

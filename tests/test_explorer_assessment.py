@@ -5,7 +5,7 @@ import pytest
 from explorer_texts import in_english
 
 import rocking
-from rocking.explorer.assessment import assessment_of, described, parts
+from rocking.explorer.assessment import describe_assessment, read_assessment, simulate_records
 from rocking.explorer.inputs import read_case
 from rocking.explorer.uploads import UploadStore
 
@@ -19,11 +19,11 @@ LEVELS = {"level_from": "0.2g", "level_to": "0.9g", "levels": "6"}
 
 def assessed(case, **texts):
     store = UploadStore()
-    return assessment_of(read_case(case, store), texts, store)
+    return read_assessment(read_case(case, store), texts, store)
 
 
 def last(found):
-    *_, part = parts(found)
+    *_, part = simulate_records(found)
     return part
 
 
@@ -39,7 +39,7 @@ def last(found):
 def test_the_curve_is_that_of_the_script_to_the_last_bit(case, texts):
     found = assessed(case, **texts)
     names = {}
-    exec(described(found)["python"], names)
+    exec(describe_assessment(found)["python"], names)
     curve, part = names["found"].curves[0], last(found)
     fit = part.header["fit"]
     assert (fit["median"], fit["dispersion"]) == (curve.median, curve.dispersion)
@@ -57,7 +57,7 @@ def test_the_curve_is_that_of_the_script_to_the_last_bit(case, texts):
 
 def test_every_record_adds_a_row_of_its_own_and_the_curve_so_far():
     found = assessed(STATUE, records=RISING, friction="0.22", **LEVELS)
-    block, rows = rocking.Block(width=0.24, height=1.1), [part.header for part in parts(found)]
+    block, rows = rocking.Block(width=0.24, height=1.1), [part.header for part in simulate_records(found)]
     assert [row["share"] for row in rows] == [0.2, 0.4, 0.6, 0.8, 1.0]
     up = rocking.records.load("el-centro-meloland-up")
     motions = [rocking.records.load(name) for name in ("el-centro-meloland-270",) * 2 + ("ridgecrest-tow2-360",)]
@@ -72,7 +72,7 @@ def test_every_record_adds_a_row_of_its_own_and_the_curve_so_far():
         assert len(row["overturned_levels"]) == 6
         judged += 1
     assert judged == 3
-    about = described(found)
+    about = describe_assessment(found)
     assert about["friction_to_rock"] == pytest.approx(0.24 / 1.1, rel=1e-12)
     assert about["thresholds"] == list(block.uplift_thresholds())
     assert [each["phrase"] for each in about["notes"]] == [
@@ -101,7 +101,7 @@ def test_the_margin_is_the_lowest_band_of_an_incremental_dynamic_analysis(width,
     found = rocking.incremental_dynamic_analysis(block, motion)
     bands = found.bands()
     assert len(bands) > 2 and margin["pga"] == pytest.approx(bands[0][0], rel=1e-6)
-    (note,) = (each for each in described(assessment)["notes"] if each["phrase"] == "assessment.first")
+    (note,) = (each for each in describe_assessment(assessment)["notes"] if each["phrase"] == "assessment.first")
     levels = found.data.level.values
     assert levels[1] / levels[0] == pytest.approx(1.0 + note["values"]["step"] / 100.0)
 

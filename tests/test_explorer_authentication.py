@@ -12,7 +12,7 @@ from starlette.routing import Route
 
 from rocking.explorer.authentication import EXCHANGE, LOOPBACK, RequestAuthentication
 from rocking.explorer.core import Explorer
-from rocking.explorer.launch import served
+from rocking.explorer.launch import start_listening
 from rocking.explorer.server import App
 
 PORT = 8123
@@ -203,7 +203,7 @@ def test_links_that_nobody_opened_are_forgotten_in_the_end(application, client):
 
 
 def test_the_printed_link_has_a_token_of_its_own_where_no_browser_sends_it():
-    here = served(Explorer(), {})
+    here = start_listening(Explorer(), {})
     try:
         first, second = (urlsplit(here.link({"p": "2"})) for _ in range(2))
         assert first.query == second.query == "p=2"
@@ -238,7 +238,7 @@ def test_a_server_is_known_by_its_name_as_browsers_send_it(port, hosts, sent, st
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="macOS has one address of this machine alone")
 def test_an_address_is_known_as_a_browser_writes_it(capsys):
-    here = served(Explorer(), {}, address="127.2")
+    here = start_listening(Explorer(), {}, address="127.2")
     try:
         assert here.socket.getsockname()[0] == "127.0.0.2" and capsys.readouterr().err == ""
         names = here.authentication._hosts

@@ -30,7 +30,7 @@ from rocking.chattering.families import sine
 from rocking.explorer import maps
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
-from rocking.explorer.launch import served
+from rocking.explorer.launch import start_listening
 from rocking.explorer.studies import StudyView
 from rocking.inputs import quantities
 from rocking.plot.canvas import cell_edges
@@ -69,7 +69,7 @@ def explorer():
 
 @pytest.fixture(scope="module")
 def here(explorer):
-    running = served(explorer, {})
+    running = start_listening(explorer, {})
     running.run_in_background()
     yield running
     running.server.should_exit = True
@@ -492,7 +492,7 @@ def test_a_block_by_its_parameters_with_two_sides(opened):
     assert found["alpha"].endswith(",9deg")
     block = rocking.Block.from_parameters(
         [float(each) for each in found["p"].split(",")],
-        [quantities.angle(each, "alpha") for each in found["alpha"].split(",")],
+        [quantities.read_angle(each, "alpha") for each in found["alpha"].split(",")],
         [float(each) for each in found["restitution"].split(",")],
     )
     response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665))
@@ -857,7 +857,7 @@ def test_a_small_response_is_shown_where_the_pointer_lies_still(opened, explorer
     x, y = map(float, small.get_attribute("data-at").split(","))
     grid = {"x": "omega", "y": "a", "y_from": "1", "y_to": "1.1", "points": "8"}
     case = read_case(dict(parse_qsl(SINE)), explorer.uploads)
-    verdict = explorer.case(maps.texts_at(maps.grid_of(case, grid), x, y)).header["verdict"]
+    verdict = explorer.case(maps.map_point_to_texts(maps.read_grid(case, grid), x, y)).header["verdict"]
     assert page.text("#map-small p").startswith(in_english(verdict))
 
 
@@ -879,7 +879,7 @@ def test_a_map_has_the_units_of_the_page_and_its_address_those_of_the_axes(opene
     complete(page)
     page.rested(lambda: page.page.click("#map-open"))
     found = query_of(page)
-    assert quantities.acceleration(found["pga"], "pga") == pytest.approx(0.5375 * 9.80665)
+    assert quantities.read_acceleration(found["pga"], "pga") == pytest.approx(0.5375 * 9.80665)
 
 
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
@@ -920,7 +920,7 @@ def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(
     assert page.page.locator("#map-quantity").input_value() == "mode"
     texts = {"width": "0.24", "height": "1.1", "motion": "el-centro-meloland-270"}
     axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "2", "points": "40"}
-    found = [part.values for part in maps.parts(maps.grid_of(read_case(texts, explorer.uploads), axes))]
+    found = [part.values for part in maps.simulate_grid(maps.read_grid(read_case(texts, explorer.uploads), axes))]
     outcome, mode = np.concatenate(found, axis=1)[[0, 3]]
     falls, at_once = (mode >= 0) | (mode == -4), outcome == 4
     shares = [as_number(each) for each in re.findall(r"overturns [^,]*, (\S+) %", page.text("#map-legend"))]
@@ -948,7 +948,7 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
         unit_blocks=512,
     )
     made.run()
-    running = served(Explorer(), {"view": "map"}, StudyView(folder))
+    running = start_listening(Explorer(), {"view": "map"}, StudyView(folder))
     running.run_in_background()
     page = opened(server=running)
     complete(page)
@@ -996,7 +996,7 @@ def test_uneven_cells_of_a_study_lie_where_their_values_do(opened, tmp_path_fact
     made = rocking.create_study(folder, blocks, rocking.pulses.one_sine(1.0, 1.0), levels=levels, measure="pga")
     made.run()
     falls = made.results().overturned.transpose("scale", "motion", "block").values[[1, 2, 0], 0]
-    running = served(Explorer(), {"view": "map"}, StudyView(folder))
+    running = start_listening(Explorer(), {"view": "map"}, StudyView(folder))
     running.run_in_background()
     page = opened("view=map&x=p&y=scale&quantity=overturned", server=running)
     complete(page)
@@ -1271,7 +1271,7 @@ LISTED = "Number(document.body.dataset.listed ?? 0) > 0 && document.querySelecto
 
 def emptied(explorer):
     """Forget the files of other tests."""
-    for key in explorer.uploads.kept():
+    for key in explorer.uploads.list_records():
         explorer.uploads.remove(key)
 
 

@@ -8,7 +8,7 @@ import pytest
 import rocking
 from rocking.errors import InvalidOption, UnreadableRecord
 from rocking.explorer import uploads
-from rocking.explorer.catalogue import clusters_of, entries_of, listing, title_of
+from rocking.explorer.catalogue import find_title, list_records, number_stations, read_entries
 from rocking.explorer.motions import read_motion
 from rocking.explorer.uploads import UploadStore
 
@@ -20,11 +20,11 @@ def samples(seed, count=400):
 
 
 def groups_of(store, answers=()):
-    return [group for group in listing(store, answers)["groups"] if group["rows"][0]["key"]]
+    return [group for group in list_records(store, answers)["groups"] if group["rows"][0]["key"]]
 
 
 def test_shipped_records_are_listed_by_station_with_their_measures():
-    groups = listing(UploadStore())["groups"]
+    groups = list_records(UploadStore())["groups"]
     assert [group["title"] for group in groups] == [
         "Ridgecrest 2019, China Lake", "Ridgecrest 2019, Tower 2", "Imperial Valley 1979, El Centro Meloland overpass",
     ]  # fmt: skip
@@ -79,9 +79,9 @@ def test_another_length_or_step_is_another_station_and_headings_are_believed():
     key = store.add_file("two.v2", (FORMATS / "two.v2").read_bytes())
     (group,) = groups_of(store)
     assert group["reason"] == "" and len(group["rows"]) == 2
-    assert title_of(group["rows"][1]["texts"], store) == "two.v2, 90 Deg"
+    assert find_title(group["rows"][1]["texts"], store) == "two.v2, 90 Deg"
     assert read_motion(group["rows"][1]["texts"], store).motion.pga == group["rows"][1]["measures"]["pga"]
-    assert store.kept() == (key,)
+    assert store.list_records() == (key,)
 
 
 def test_entries_of_one_station_have_one_number():
@@ -95,7 +95,7 @@ def test_entries_of_one_station_have_one_number():
     entries += [{"motion": f"file:{two}", "channel": channel} for channel in ("1", "2")]
     shipped = ("el-centro-meloland-360", "ridgecrest-clc-090", "el-centro-meloland-270", "el-centro-meloland-360")
     entries += [{"motion": name} for name in shipped]
-    assert clusters_of(entries, store) == [0, 1, 0, 2, 2, 3, 3, 4, 5, 4, 4]
+    assert number_stations(entries, store) == [0, 1, 0, 2, 2, 3, 3, 4, 5, 4, 4]
 
 
 @pytest.mark.parametrize("said", ["names", "headings", "both"])
@@ -107,7 +107,7 @@ def test_a_sensor_in_a_borehole_and_one_at_the_surface_have_a_vertical_component
         number = {"NS1": b"1", "EW1": b"2", "UD1": b"3", "NS2": b"4", "EW2": b"5", "UD2": b"6"}[kind]
         data = samples(seed).encode() if said == "names" else record.replace(b"N-S", number)
         store.add_file(f"file {seed}" if said == "headings" else f"TST0019901021800.{kind}", data)
-    keys = dict(zip(kinds, store.kept(), strict=True))
+    keys = dict(zip(kinds, store.list_records(), strict=True))
     groups = groups_of(store)
     assert [[row["key"] for row in group["rows"]] for group in groups] == [
         [keys[f"{direction}{sensor}"] for direction in ("EW", "NS", "UD")] for sensor in (1, 2)
@@ -143,7 +143,7 @@ def test_what_is_said_of_a_file_is_said_for_the_step_and_the_units_that_are_give
     store = UploadStore()
     key = store.add_file("a.txt", samples(1).encode())
     for dt, units, size in ((0.01, "g", 9.80665), (0.01, "gal", 0.01), (0.02, "gal", 0.01), (0.01, "g", 9.80665)):
-        ((told,),) = [store.contents(key, dt, units)["channels"]]
+        ((told,),) = [store.describe_file(key, dt, units)["channels"]]
         assert told["measures"]["duration"] == pytest.approx(399 * dt)
         assert told["measures"]["pga"] == pytest.approx(size * np.max(np.abs(np.array(samples(1).split(), float))))
 
@@ -172,30 +172,30 @@ def test_a_wrong_answer_is_said_of_its_file_and_leaves_the_list(answer, words):
 
 
 def test_entries_of_an_address_are_those_of_motions_and_not_too_many():
-    assert entries_of("") == []
+    assert read_entries("") == []
     with pytest.raises(InvalidOption, match="not 'width'"):
-        entries_of("motion=none&width=1")
+        read_entries("motion=none&width=1")
     with pytest.raises(InvalidOption, match="has 160 entries"):
-        entries_of("motion=none;" * 161)
-    assert entries_of("motion=" + "n" * 39_993) == [{"motion": "n" * 39_993}]
+        read_entries("motion=none;" * 161)
+    assert read_entries("motion=" + "n" * 39_993) == [{"motion": "n" * 39_993}]
     with pytest.raises(InvalidOption, match="40000 letters at most"):
-        entries_of("motion=" + "n" * 39_994)
+        read_entries("motion=" + "n" * 39_994)
 
 
 def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch):
     store = UploadStore()
-    monkeypatch.setattr(uploads, "MOST", 3)
+    monkeypatch.setattr(uploads, "MAX_FILES", 3)
     keys = [store.add_file(f"{seed}.txt", samples(seed).encode()) for seed in range(3)]
     with pytest.raises(UnreadableRecord, match="3 files and 256 MiB are kept at most; take some out of the list"):
         store.add_file("4.txt", samples(4).encode())
     assert store.add_file("again.txt", samples(1).encode()) == keys[1]
-    store.contents(keys[0])
+    store.describe_file(keys[0])
     store.read(keys[0], None, 0.01, "g")
     store.remove(keys[0])
     assert store.usage()["files"] == 2
     with pytest.raises(UnreadableRecord, match="not here any more"):
         store.file(keys[0])
-    monkeypatch.setattr(uploads, "ALL", store.usage()["bytes"] + 10)
+    monkeypatch.setattr(uploads, "MAX_BYTES", store.usage()["bytes"] + 10)
     with pytest.raises(UnreadableRecord, match="cannot be kept"):
         store.add_file("4.txt", samples(4).encode())
 
@@ -203,10 +203,10 @@ def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch
 def test_new_files_take_none_out_and_of_what_was_read_what_was_used_longest_ago_goes_first(monkeypatch):
     """A motion that is asked for again stays, though it was read first; what goes is read anew from its file."""
     count = 100
-    monkeypatch.setattr(uploads, "READ", 3 * count)
+    monkeypatch.setattr(uploads, "MAX_CACHED_SAMPLES", 3 * count)
     store = UploadStore()
     keys = [store.add_file(f"{seed}.txt", samples(seed, count).encode()) for seed in range(5)]
-    assert store.kept() == tuple(keys)
+    assert store.list_records() == tuple(keys)
     first, *_ = [store.read(key, None, 0.01, "g") for key in keys[:3]]
     assert store.read(keys[0], None, 0.01, "g") is first
     third = store.read(keys[2], None, 0.01, "g")
@@ -215,6 +215,6 @@ def test_new_files_take_none_out_and_of_what_was_read_what_was_used_longest_ago_
         assert len(again.breakpoints) == count and (k != 0 or again is first)
     assert store.read(keys[2], None, 0.01, "g") is not third
     store.remove(keys[2])
-    assert store.kept() == (keys[0], keys[1], keys[3], keys[4])
+    assert store.list_records() == (keys[0], keys[1], keys[3], keys[4])
     assert store.add_file("2.txt", samples(2, count).encode()) == keys[2]
-    assert store.kept() == (keys[0], keys[1], keys[3], keys[4], keys[2])
+    assert store.list_records() == (keys[0], keys[1], keys[3], keys[4], keys[2])

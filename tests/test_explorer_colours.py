@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import rocking.explorer
-from rocking.explorer.payload import english
+from rocking.explorer.payload import load_english_texts
 
 PAGE = Path(rocking.explorer.__file__).parent / "page"
 STYLE = (PAGE / "style.css").read_text("utf-8")
@@ -81,7 +81,7 @@ def test_orange_means_overturning_and_nothing_else():
     modes = re.findall(r'\[(-?\d|AFTER_REST), "(#[0-9a-f]{6})"\]', OUTCOMES.partition("VERDICTS")[0])
     assert len(modes) >= 7
     for mode, ink in modes:
-        text = english()[f"mode.{mode.replace('AFTER_REST', '-4')}"]
+        text = load_english_texts()[f"mode.{mode.replace('AFTER_REST', '-4')}"]
         assert is_orange(ink) == text.startswith("overturns"), text
     assert [is_orange(ink) for ink in constant("OUTCOMES")] == [False] * 4 + [True, False]
     assert not any(map(is_orange, constant("RAMP")[:-1]))

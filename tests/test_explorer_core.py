@@ -20,14 +20,14 @@ from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingEr
 from rocking.explorer import maps, readings
 from rocking.explorer.code import case_as_command, case_as_python, map_as_python
 from rocking.explorer.core import Explorer
-from rocking.explorer.inputs import read_case, texts_of
-from rocking.explorer.motions import pulse_of
+from rocking.explorer.inputs import read_case, response_to_texts
+from rocking.explorer.motions import create_pulse
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.payload import pack
-from rocking.explorer.periodic import sweep_of
-from rocking.explorer.simulated import extremes
+from rocking.explorer.periodic import read_sweep
+from rocking.explorer.simulated import thin_line
 from rocking.explorer.studies import StudyView
-from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
+from rocking.explorer.uploads import MAX_FILE_SIZE, MAX_FILES, UploadStore, clean_file_name
 from rocking.motion.motion import find_exceedances
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
@@ -156,7 +156,7 @@ def test_a_g_is_the_standard_one_whatever_gravity_a_block_has(explorer):
     moon = 1.62
     texts = {"p": "1", "alpha": "0.2", "restitution": "0.9", "gravity": repr(moon), "motion": "ridgecrest-clc-090"}
     texts |= {"vertical": "ridgecrest-clc-up", "pga": "0.1g"}
-    found, response = explorer.case(texts, (225.0, 240.0)), explorer.show(texts).response
+    found, response = explorer.case(texts, (225.0, 240.0)), explorer.simulate(texts).response
     header, vertical = found.header, response.motion.vertical
     assert header["motion"]["pga_g"] == pytest.approx(0.1, rel=1e-12)
     assert header["motion"]["vertical"]["pga_g"] == pytest.approx(vertical.pga / 9.80665, rel=1e-12)
@@ -167,7 +167,7 @@ def test_a_g_is_the_standard_one_whatever_gravity_a_block_has(explorer):
     drawn = header["block"]["gravity_g"] * (found.arrays["weight"] - 1.0)
     times = 225.0 + found.arrays["ground_time"]
     assert drawn == pytest.approx(vertical.acceleration(times) / 9.80665, abs=1e-12)
-    now = readings.at(explorer, texts, "232.5")
+    now = readings.find_state(explorer, texts, "232.5")
     for name, motion in (("ground_g", response.motion), ("vertical_g", vertical)):
         assert now[name] == pytest.approx(float(motion.acceleration(232.5)) / 9.80665, rel=1e-12)
     still = {**texts, "pga": "0.02g", "scale": None, "vertical": None}
@@ -180,7 +180,7 @@ def test_a_g_is_the_standard_one_whatever_gravity_a_block_has(explorer):
 def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
     texts = {**STATUE, "vertical": "ridgecrest-clc-up"}
     arrays = explorer.case(texts, (228.0, 236.0)).arrays
-    response = explorer.show(texts).response
+    response = explorer.simulate(texts).response
     lift = response.block.uplift_thresholds()[0] / 9.80665
     beyond = np.abs(arrays["ground_g"]) > lift * arrays["weight"]
     stretches = find_exceedances(response.motion, response.block.uplift_thresholds())
@@ -296,7 +296,7 @@ def test_code_names_a_motion_of_the_program_on_a_line_of_its_own(tmp_path):
     motion = rocking.Motion.from_samples(np.sin(np.arange(400) / 9.0), 0.02, name="my\nmotion")
     texts = {"p": "2", "alpha": "0.2", "motion": f"given:{uploads.add_motion(motion)}", "pga": "3"}
     case = read_case(texts, uploads)
-    grid = maps.grid_of(case, {"x": "p", "y": "pga", "points": "8"})
+    grid = maps.read_grid(case, {"x": "p", "y": "pga", "points": "8"})
     for code, peak in ((case_as_python(case), 3.0), *((map_as_python(grid, name), None) for name in maps.QUANTITIES)):
         (line,) = [
             line for line in code.splitlines() if "# mymotion: the motion that this page was opened with" in line
@@ -341,7 +341,7 @@ RESPONSES = {
 def test_a_response_written_as_a_case_is_the_same_response_bit_for_bit(name):
     response = RESPONSES[name]()
     uploads = UploadStore()
-    texts = texts_of(response, uploads)
+    texts = response_to_texts(response, uploads)
     again = read_case(texts, uploads).simulate()
     assert np.array_equal(again.impacts, response.impacts)
     assert np.array_equal(again.events, response.events)
@@ -354,7 +354,7 @@ def test_a_response_written_as_a_case_is_the_same_response_bit_for_bit(name):
 
 @pytest.mark.parametrize("width", [300.0, 3.0, 1e-3, 1e-6, 1e-9])
 def test_a_window_has_the_engines_own_values_however_narrow_it_is(explorer, width):
-    response = explorer.show(STATUE).response
+    response = explorer.simulate(STATUE).response
     middle = float(response.impacts["time"][-20])
     start, end = max(0.0, middle - 0.4 * width), min(response.duration, middle + 0.6 * width)
     arrays = explorer.window(STATUE, (start, end)).arrays
@@ -372,23 +372,23 @@ def test_a_window_has_the_engines_own_values_however_narrow_it_is(explorer, widt
 
 @pytest.mark.parametrize("width", [1e-4, 1e-6, 1e-8])
 def test_a_window_close_to_a_rest_is_resolved_as_far_as_it_shows(explorer, width):
-    case = explorer.show(STATUE).case
+    case = explorer.simulate(STATUE).case
     fine = rocking.simulate(case.block, case.motion, chattering=rocking.Certified(1e-40))
-    rest = float(explorer.show(STATUE).response.sequences["end"][-1])
+    rest = float(explorer.simulate(STATUE).response.sequences["end"][-1])
     payload = explorer.window(STATUE, (rest - width, rest + 0.1 * width))
     start, arrays = payload.header["window"]["from"], payload.arrays
     assert len(arrays["impact"]) == payload.header["window"]["impacts"] > 10
     assert np.array_equal(arrays["rotation"], fine.rotation(start + arrays["time"]))
     assert np.abs(arrays["rotation"]).max() > 0.0
     # What is resolved in both is the same to rounding.
-    coarse = explorer.show(STATUE).response.impacts["time"]
+    coarse = explorer.simulate(STATUE).response.impacts["time"]
     nearest = np.abs(fine.impacts["time"][:, None] - coarse).min(axis=0)
     assert nearest.max() < 1e-12
-    assert fine.sequences["end"] == pytest.approx(explorer.show(STATUE).response.sequences["end"], abs=1e-12)
+    assert fine.sequences["end"] == pytest.approx(explorer.simulate(STATUE).response.sequences["end"], abs=1e-12)
 
 
 def test_peaks_survive_the_thinning_of_a_wide_window(explorer):
-    shown = explorer.show(STATUE)
+    shown = explorer.simulate(STATUE)
     arrays = explorer.window(STATUE, (0.0, shown.response.duration)).arrays
     assert arrays["rotation"].max() > 0.98 * shown.response.peak_rotation
     assert np.abs(arrays["ground_g"]).max() == pytest.approx(0.4, rel=1e-12)
@@ -397,7 +397,7 @@ def test_peaks_survive_the_thinning_of_a_wide_window(explorer):
 def test_a_thinned_line_keeps_its_extremes_and_its_order():
     rng = np.random.default_rng(1)
     time, values = np.sort(rng.uniform(size=50_001)), rng.normal(size=50_001)
-    chosen = extremes(values, 1000)
+    chosen = thin_line(values, 1000)
     kept_time, kept = time[chosen], values[chosen]
     assert len(kept) <= 1000
     assert (kept.min(), kept.max()) == (values.min(), values.max())
@@ -419,7 +419,7 @@ def test_ratios_of_intervals_tend_to_the_product_of_both_restitutions(explorer):
 
 def test_what_a_millionth_of_the_motion_moves_a_rest_by_is_told_beside_its_bracket(explorer):
     rows = explorer.case(STATUE).arrays["sequence"].reshape(-1, 6)
-    response = explorer.show(STATUE).response
+    response = explorer.simulate(STATUE).response
     assert np.array_equal(rows[:, 1], response.sequences["end"]) and len(rows) == 4
     moved = []
     for sign in (1.0, -1.0):
@@ -511,8 +511,10 @@ def test_whatever_an_address_says_is_answered_with_numbers_or_a_sentence():
 def test_a_comparison_holds_both_cases(explorer):
     payload = explorer.compare(STATUE, {"chattering": "velocity=0.05"})
     first, second = payload.header["cases"]
-    assert first["peak_rotation"] == explorer.show(STATUE).response.peak_rotation
-    assert second["peak_rotation"] == explorer.show({**STATUE, "chattering": "velocity=0.05"}).response.peak_rotation
+    assert first["peak_rotation"] == explorer.simulate(STATUE).response.peak_rotation
+    assert (
+        second["peak_rotation"] == explorer.simulate({**STATUE, "chattering": "velocity=0.05"}).response.peak_rotation
+    )
     assert first["peak_rotation"] > 2.0 * second["peak_rotation"]
     larger = explorer.compare(STATUE, {"p": "2", "alpha": "0.2"}).header["cases"][1]
     assert larger["block"]["sides"][0]["p"] == 2.0
@@ -524,12 +526,12 @@ def test_another_motion_begins_as_its_own_texts_say(explorer):
     shaken = {"motion": "el-centro-meloland-270", "pga": "0.25g"}
     for one, other in ((released, shaken), (shaken, released), (released, {**shaken, "initial_rotation": "1deg"})):
         second = explorer.compare(size | one, other).header["cases"][1]
-        alone = explorer.show(size | other).response
+        alone = explorer.simulate(size | other).response
         assert (second["peak_rotation"], second["overturned"]) == (alone.peak_rotation, alone.overturned)
     # Another block is released as the first one is, and another start alone is that of the same motion.
     for other in ({"width": "0.3", "height": "1.1"}, {"initial_rotation": "2deg"}):
         second = explorer.compare(size | released, other).header["cases"][1]
-        assert second["peak_rotation"] == explorer.show(size | released | other).response.peak_rotation
+        assert second["peak_rotation"] == explorer.simulate(size | released | other).response.peak_rotation
 
 
 # Files
@@ -537,15 +539,15 @@ def test_another_motion_begins_as_its_own_texts_say(explorer):
 
 def test_a_content_has_the_name_under_which_it_came_first(explorer):
     table = "time (s), a (m/s2)\n" + "\n".join(f"{0.01 * k:.2f}, {math.cos(0.1 * k):.6f}" for k in range(500))
-    names = [explorer.take_record(name, table.encode())["name"] for name in ("first.csv", "second.csv")]
-    key = explorer.take_record("third.csv", table.encode())["key"]
+    names = [explorer.add_record(name, table.encode())["name"] for name in ("first.csv", "second.csv")]
+    key = explorer.add_record("third.csv", table.encode())["key"]
     assert names == ["first.csv"] * 2
     assert "rocking.read('first.csv'" in explorer.code({**_BLOCK, "motion": f"file:{key}"})["python"]
 
 
 def test_a_file_says_what_must_be_told(explorer):
     key = explorer.uploads.add_file("one column.txt", "\n".join(["0.1", "-0.2", "0.3"] * 50).encode())
-    found = explorer.uploads.contents(key)
+    found = explorer.uploads.describe_file(key)
     assert set(found["missing"]) == {"units", "dt"}
     assert found["channels"][0]["choices"] == {
         "units": [
@@ -568,7 +570,7 @@ def test_a_file_says_what_must_be_told(explorer):
 def test_messages_about_a_file_name_it_and_no_path(explorer):
     key = explorer.uploads.add_file("/home/somebody/bad.txt", b"1.0\n2.0\nthree\n")
     with pytest.raises(RockingError) as caught:
-        explorer.uploads.contents(key)
+        explorer.uploads.describe_file(key)
     assert "bad.txt" in str(caught.value)
     assert "/" not in str(caught.value).replace("m/s2", "").replace("m/s", "").replace("cm/s2", "")
 
@@ -576,18 +578,18 @@ def test_messages_about_a_file_name_it_and_no_path(explorer):
 def test_files_are_known_by_their_content_and_so_many_at_most():
     uploads = UploadStore()
     assert uploads.add_file("a.txt", b"1 2 3") == uploads.add_file("b.txt", b"1 2 3")
-    for k in range(MOST - 1):
+    for k in range(MAX_FILES - 1):
         uploads.add_file("x", str(k).encode())
     with pytest.raises(UnreadableRecord, match="x: it cannot be kept: 120 files and 256 MiB are kept at most"):
         uploads.add_file("x", b"another")
-    assert uploads.add_file("c.txt", b"1 2 3") in uploads.kept() and len(uploads.kept()) == MOST
+    assert uploads.add_file("c.txt", b"1 2 3") in uploads.kept() and len(uploads.kept()) == MAX_FILES
     with pytest.raises(UnreadableRecord, match="may be 16 MiB large"):
-        uploads.add_file("big", bytes(LARGEST + 1))
+        uploads.add_file("big", bytes(MAX_FILE_SIZE + 1))
 
 
 @pytest.mark.parametrize("name", ["../../x", "..\\..\\x", "/etc/x", "C:\\x", "a/b/../x", "\x00x\n"])
 def test_no_folder_is_left_of_a_files_name(name):
-    assert bare_name(name) == "x"
+    assert clean_file_name(name) == "x"
 
 
 # Maps
@@ -597,7 +599,7 @@ def filled(grid):
     """Every quantity at every point of a map, each point once."""
     values = np.full((len(maps.QUANTITIES), grid.shape[0] * grid.shape[1]), -9.0)
     count = np.zeros(values.shape[1], int)
-    for part in maps.parts(grid):
+    for part in maps.simulate_grid(grid):
         values[:, part.points] = part.values
         count[part.points] += 1
     assert (count == 1).all()
@@ -605,14 +607,14 @@ def filled(grid):
 
 
 def _mapped(texts, axes):
-    grid = maps.grid_of(read_case(texts, UploadStore()), {"points": "8", **axes})
+    grid = maps.read_grid(read_case(texts, UploadStore()), {"points": "8", **axes})
     return grid, filled(grid)
 
 
 @pytest.mark.thorough
 def test_a_map_of_a_sine_is_the_packages_chattering_map():
     case = read_case(SINE, UploadStore())
-    grid = maps.grid_of(
+    grid = maps.read_grid(
         case, {"x": "omega", "y": "a", "x_from": "0.7", "x_to": "5", "y_from": "0.95", "y_to": "1.3", "points": "12"}
     )
     found = filled(grid)
@@ -627,7 +629,7 @@ def test_a_map_of_a_record_is_the_packages_chattering_map():
     case = read_case(
         {"p": "3", "alpha": "0.2", "restitution": "0.9", "motion": "el-centro-meloland-270"}, UploadStore()
     )
-    grid = maps.grid_of(
+    grid = maps.read_grid(
         case, {"x": "p", "y": "a", "x_from": "2", "x_to": "6", "y_from": "0.9", "y_to": "2", "points": "8"}
     )
     found = filled(grid)
@@ -638,7 +640,7 @@ def test_a_map_of_a_record_is_the_packages_chattering_map():
 
 def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
     case = read_case({**SINE, "motion": "one-sine:amplitude=2,frequency=0.5"}, UploadStore())
-    grid = maps.grid_of(
+    grid = maps.read_grid(
         case, {"x": "omega", "y": "a", "x_from": "1", "x_to": "4", "y_from": "0.9", "y_to": "6", "points": "8"}
     )
     found = filled(grid)
@@ -656,20 +658,20 @@ def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
 def test_an_eccentric_block_is_not_mapped_over_one_slenderness_of_both_sides(block):
     texts = {**block, "motion": "one-sine:amplitude=4,frequency=1"}
     with pytest.raises(InvalidOption, match="is mapped over omega, p, restitution, a, pga, not over 'alpha'"):
-        maps.grid_of(read_case(texts, UploadStore()), {"x": "alpha", "y": "a"})
-    assert "alpha" in maps.axes_of(read_case({**texts, "restitution": "0.9"}, UploadStore()))
+        maps.read_grid(read_case(texts, UploadStore()), {"x": "alpha", "y": "a"})
+    assert "alpha" in maps.list_axes(read_case({**texts, "restitution": "0.9"}, UploadStore()))
 
 
 def test_the_curves_over_a_map_are_the_critical_amplitudes():
     case = read_case(SINE, UploadStore())
-    grid = maps.grid_of(case, {"x": "omega", "y": "a", "x_from": "0.3", "x_to": "9", "points": "20"})
-    found = maps.curves(grid)
+    grid = maps.read_grid(case, {"x": "omega", "y": "a", "x_from": "0.3", "x_to": "9", "points": "20"})
+    found = maps.compute_critical_curves(grid)
     assert np.array_equal(found["exact"], critical_amplitude(grid.x.values, 0.92))
     inside = (grid.x.values >= 0.5) & (grid.x.values <= 8.0)
     assert 10 <= np.count_nonzero(inside) < 20
     assert np.array_equal(np.isfinite(found["eq76"]), inside)
     assert np.array_equal(found["eq76"][inside], critical_amplitude(grid.x.values[inside], 0.92, method="eq76"))
-    assert maps.curves(maps.grid_of(case, {"x": "omega", "y": "restitution", "points": "8"})) == {}
+    assert maps.compute_critical_curves(maps.read_grid(case, {"x": "omega", "y": "restitution", "points": "8"})) == {}
 
 
 @pytest.mark.parametrize(
@@ -686,12 +688,12 @@ def test_the_curves_over_a_map_are_the_critical_amplitudes():
 )
 def test_axes_that_are_none_are_refused(axes, words):
     with pytest.raises(InvalidOption, match=words):
-        maps.grid_of(read_case(SINE, UploadStore()), axes)
+        maps.read_grid(read_case(SINE, UploadStore()), axes)
 
 
 def test_a_map_that_is_not_read_on_stops():
-    grid = maps.grid_of(read_case(SINE, UploadStore()), {"x": "omega", "y": "a", "points": "400"})
-    found = maps.parts(grid)
+    grid = maps.read_grid(read_case(SINE, UploadStore()), {"x": "omega", "y": "a", "points": "400"})
+    found = maps.simulate_grid(grid)
     next(found)
     found.close()
     with pytest.raises(StopIteration):
@@ -746,7 +748,7 @@ def test_points_and_scripts_of_a_map_are_what_it_shows(texts, axes, tmp_path):
     rests, judged = np.argwhere(np.isfinite(mapped["rest"])), 0
     points = [*np.random.default_rng(1).integers(0, 8, (12, 2)), *rests[:: max(1, len(rests) // 3)]]
     for row, column in points:
-        at = maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row]))
+        at = maps.map_point_to_texts(grid, float(grid.x.values[column]), float(grid.y.values[row]))
         response = read_case(at, UploadStore()).simulate()
         smaller = min(side.alpha for side in response.block.sides)
         peak = math.inf if response.overturned else response.peak_rotation / smaller
@@ -773,8 +775,8 @@ def test_a_map_says_what_is_other_than_in_the_case():
         ({**_BLOCK, "chattering": "velocity"}, ["map.begins"]),
         (_SIDES, ["map.smaller_alpha"]),
     ):
-        grid = maps.grid_of(read_case(texts | sine, UploadStore()), {"x": "p", "y": "pga", "points": "8"})
-        assert [note["phrase"] for note in maps.described(grid)["notes"]] == keys
+        grid = maps.read_grid(read_case(texts | sine, UploadStore()), {"x": "p", "y": "pga", "points": "8"})
+        assert [note["phrase"] for note in maps.describe_map(grid)["notes"]] == keys
         assert "the smaller one of two" in map_as_python(grid, "peak")
 
 
@@ -782,7 +784,7 @@ def test_a_map_says_what_is_other_than_in_the_case():
 def test_a_map_of_a_motion_that_shakes_nothing_is_refused(motion):
     case = read_case({**_BLOCK, "motion": motion, "scale": "0"}, UploadStore())
     with pytest.raises(InvalidOption, match="something that shakes the block"):
-        maps.grid_of(case, {"x": "p", "y": "pga"})
+        maps.read_grid(case, {"x": "p", "y": "pga"})
 
 
 @pytest.mark.cases(fast=2)
@@ -795,12 +797,12 @@ def test_a_map_of_a_motion_that_shakes_nothing_is_refused(motion):
 def test_the_critical_amplitude_is_drawn_where_it_parts_complete_chattering_from_other(cycles, phase, valid):
     texts = {**SINE, "motion": f"sine:amplitude=3,frequency=0.3,cycles={cycles},phase={phase}"}
     case = read_case(texts, UploadStore())
-    grid = maps.grid_of(case, {"x": "omega", "x_from": "1", "x_to": "4", "y": "a", "points": "8"})
-    found = maps.curves(grid)
+    grid = maps.read_grid(case, {"x": "omega", "x_from": "1", "x_to": "4", "y": "a", "points": "8"})
+    found = maps.compute_critical_curves(grid)
     assert bool(found) is valid
 
     def at(a, omega):
-        motion = pulse_of(maps.texts_at(grid, omega, a)["motion"])
+        motion = create_pulse(maps.map_point_to_texts(grid, omega, a)["motion"])
         return families.SimulationInput(case.block, motion, "linear")
 
     parted = []
@@ -823,9 +825,9 @@ def test_a_motion_beyond_all_mechanics_is_refused_before_it_is_simulated():
         {"y": "pga", "y_to": "1e40"}, {"y": "a", "y_to": "1e40"}, {"x": "alpha", "y": "a", "y_to": "1e33"}
     ):  # fmt: skip
         with pytest.raises(InvalidMotion, match="must stay below"):
-            maps.grid_of(case, {"x": "p", **axes, "points": "8"})
+            maps.read_grid(case, {"x": "p", **axes, "points": "8"})
     with pytest.raises(InvalidMotion, match="must stay below"):
-        sweep_of(case, {"sweep": "a", "sweep_to": "1e40"})
+        read_sweep(case, {"sweep": "a", "sweep_to": "1e40"})
 
 
 @pytest.mark.parametrize("duration", ["5e-324", "1e-13"])
@@ -842,11 +844,11 @@ def test_a_block_that_hardly_comes_to_rest_is_mapped_over_no_points_that_would_b
         {**_BLOCK, "restitution": "1", "duration": "10", "motion": "el-centro-meloland-270"}, UploadStore()
     )
     with pytest.raises(InvalidOption, match="hardly comes to rest"):
-        maps.grid_of(case, {"x": "p", "y": "pga"})
+        maps.read_grid(case, {"x": "p", "y": "pga"})
     axes = {"x": "restitution", "y": "pga", "x_to": "0.9989"}
-    assert maps.grid_of(case, axes)
+    assert maps.read_grid(case, axes)
     with pytest.raises(InvalidOption, match="hardly comes to rest"):
-        maps.grid_of(case, {**axes, "x_to": "0.9991"})
+        maps.read_grid(case, {**axes, "x_to": "0.9991"})
 
 
 # Studies
@@ -1007,9 +1009,9 @@ def test_a_study_that_varies_too_little_is_refused_with_a_sentence(tmp_path):
 
 def test_another_case_is_compared_with_as_a_whole(explorer):
     texts = {**STATUE, "model": "linear"}
-    header = explorer.compare(texts, STATUE, whole=True).header
+    header = explorer.compare(texts, STATUE, complete=True).header
     assert [case["peak_rotation"] for case in header["cases"]] == [
-        explorer.show(each).response.peak_rotation for each in (texts, STATUE)
+        explorer.simulate(each).response.peak_rotation for each in (texts, STATUE)
     ]
 
 
@@ -1031,7 +1033,7 @@ def test_a_slice_of_more_points_than_a_map_may_have_is_refused(study, monkeypatc
     axes = study.axes()
     size = axes["p"].size * axes["alpha"].size
     for most, fits in ((size, True), (size - 1, False)):
-        monkeypatch.setattr("rocking.explorer.studies._MOST", most)
+        monkeypatch.setattr("rocking.explorer.studies._MAX_POINTS", most)
         if fits:
             assert study.slice({"x": "p", "y": "alpha"}).arrays
         else:
@@ -1044,7 +1046,7 @@ def test_a_slice_of_more_points_than_a_map_may_have_is_refused(study, monkeypatc
 )
 def test_what_only_rounding_leaves_of_a_number_is_shown_as_zero(explorer, pulse):
     texts = {"width": "0.24", "height": "1.1", "motion": pulse}
-    found = [readings.at(explorer, texts, time)["ground_g"] for time in ("0", "0.25", "0.5", "1")]
+    found = [readings.find_state(explorer, texts, time)["ground_g"] for time in ("0", "0.25", "0.5", "1")]
     assert [abs(each) > 0.2 for each in found] == [False, True, False, False]
     assert [found[k] for k in (0, 2, 3)] == [0.0, 0.0, 0.0]
     drawn = np.abs(explorer.window(texts, (0.0, 1.0)).arrays["ground_g"])

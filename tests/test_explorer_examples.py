@@ -12,7 +12,7 @@ import pytest
 import rocking
 from rocking.chattering import critical_amplitude
 from rocking.explorer.core import Explorer
-from rocking.explorer.parameters import PARAMETERS, names_of
+from rocking.explorer.parameters import PARAMETERS, list_names
 
 EXAMPLES = json.loads((Path(rocking.__file__).parent / "explorer" / "page" / "examples.json").read_text("utf-8"))
 STEPS = {(example["name"], k + 1): step for example in EXAMPLES for k, step in enumerate(example["steps"])}
@@ -30,19 +30,19 @@ class Shown:
         known = {"view", "from", "to", "at", "compare", *(f"other.{name}" for name in case)}
         assert given.keys() <= known and given.get("view", "response") in ("response", "block", "compare")
         self.header = explorer.case(self.texts).header
-        self.response = explorer.show(self.texts).response
+        self.response = explorer.simulate(self.texts).response
         self.start = self.end = math.nan
         if "from" in given:
             self.start, self.end = float(given["from"]), float(given["to"])
             self.window = explorer.window(self.texts, (self.start, self.end)).header["window"]
-            times = explorer.show(self.texts).resolved(self.start, self.end).impacts["time"]
+            times = explorer.simulate(self.texts).resolved(self.start, self.end).impacts["time"]
             self.impacts = times[(times > self.start) & (times < self.end)]
         if given.get("view") == "compare":
             other = {name[6:]: text for name, text in given.items() if name.startswith("other.")}
             self.other = explorer.compare(self.texts, other).header["cases"][1]
-            kept = {} if "motion" in other else {n: t for n, t in self.texts.items() if n in names_of("motion")}
-            block = {name: text for name, text in self.texts.items() if name not in names_of("motion")}
-            self.second = explorer.show(block | kept | other).response
+            kept = {} if "motion" in other else {n: t for n, t in self.texts.items() if n in list_names("motion")}
+            block = {name: text for name, text in self.texts.items() if name not in list_names("motion")}
+            self.second = explorer.simulate(block | kept | other).response
 
     @property
     def size(self):

@@ -10,7 +10,7 @@ from explorer_browser import Watched, launched
 import rocking
 from rocking.explorer.assessment import RULES
 from rocking.explorer.core import Explorer
-from rocking.explorer.launch import served
+from rocking.explorer.launch import start_listening
 from rocking.explorer.server import page_files
 
 pytestmark = pytest.mark.browser
@@ -70,7 +70,7 @@ def opened(browser):
 
     def open_page(query="", locale="en-US", allowed=()):
         if not servers:
-            servers.append(served(Explorer(), {}))
+            servers.append(start_listening(Explorer(), {}))
             servers[0].run_in_background()
         contexts.append(browser.new_context(viewport={"width": 1280, "height": 900}, locale=locale))
         page = Watched(contexts[-1].new_page(), allowed)

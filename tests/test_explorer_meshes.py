@@ -21,7 +21,7 @@ from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
 from rocking.explorer.server import App
-from rocking.explorer.uploads import LARGEST, MOST, UploadStore
+from rocking.explorer.uploads import MAX_FILE_SIZE, MAX_FILES, UploadStore
 from rocking.solid.mesh import SHIPPED_MESHES
 
 STATUE = {"mesh": "statue", "azimuth": "30", "motion": "ridgecrest-clc-090", "pga": "0.6g"}
@@ -45,10 +45,10 @@ def here(monkeypatch):
     """Read files in this process: what reads them apart is tested by itself."""
 
     def made(name, data, options):
-        found = apart.answered(json.dumps({"name": name, "options": dict(options)}).encode() + b"\n" + data)
-        return apart.made_of(json.dumps(found))
+        found = apart.answer_request(json.dumps({"name": name, "options": dict(options)}).encode() + b"\n" + data)
+        return apart.decode_answer(json.dumps(found))
 
-    monkeypatch.setattr(meshes, "made_apart", made)
+    monkeypatch.setattr(meshes, "read_mesh_in_process", made)
 
 
 def test_a_case_of_a_mesh_is_the_packages_block_of_that_azimuth():
@@ -139,7 +139,7 @@ def test_what_was_mended_is_said_and_what_looks_wrong_is_noted(here):
     scan = box((300.0, 200.0, 1000.0))
     scan.update_faces(scan.triangles_center[:, 2] > 0.0)
     scan.invert()
-    taken = explorer.take_mesh("scan.obj", content(scan, "obj"))
+    taken = explorer.add_mesh("scan.obj", content(scan, "obj"))
     texts = {**STATUE, "mesh": f"file:{taken['key']}", "azimuth": str(taken["azimuth"])}
     assert in_english(explorer.body(texts).header["repaired"]).startswith("Repaired in the mesh: 1 hole filled")
     assert "the body is 1000 m high" in explorer.case(texts).header["block"]["notes"][-1]
@@ -152,12 +152,12 @@ def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
     key = store.add_mesh("box.stl", data)
     first = read_case({**STATUE, "mesh": f"file:{key}"}, store).block
     store.remove(key)
-    others = [store.add_file(f"{k}.txt", str(k).encode()) for k in range(MOST)]
-    with pytest.raises(UnreadableRecord, match=f"{MOST} files and 256 MiB are kept at most"):
+    others = [store.add_file(f"{k}.txt", str(k).encode()) for k in range(MAX_FILES)]
+    with pytest.raises(UnreadableRecord, match=f"{MAX_FILES} files and 256 MiB are kept at most"):
         store.add_mesh("box.stl", data)
     with pytest.raises(UnreadableRecord, match="this mesh is not here any more: drop its file on the page again"):
         read_case({**STATUE, "mesh": f"file:{key}"}, store)
-    assert len({*others, key}) == MOST + 1
+    assert len({*others, key}) == MAX_FILES + 1
     store.remove(others[0])
     assert store.add_mesh("again.stl", data) == key
     assert read_case({**STATUE, "mesh": f"file:{key}"}, store).block.sides == first.sides
@@ -166,7 +166,7 @@ def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
 def test_a_mesh_that_is_refused_is_not_kept(here):
     explorer = Explorer()
     with pytest.raises(InvalidBlock):
-        explorer.take_mesh("flat.stl", content(trimesh.creation.box((1.0, 1.0, 1e-9))))
+        explorer.add_mesh("flat.stl", content(trimesh.creation.box((1.0, 1.0, 1e-9))))
     assert explorer.uploads.usage()["files"] == 0
 
 
@@ -227,7 +227,7 @@ def test_a_hostile_mesh_is_answered_in_one_sentence(name, here, tmp_path, monkey
     data, words = HOSTILE[name]
     explorer = Explorer()
     with pytest.raises(InvalidBlock, match=words) as caught:
-        taken = explorer.take_mesh(name, data)
+        taken = explorer.add_mesh(name, data)
         explorer.case({**STATUE, "mesh": f"file:{taken['key']}"})  # what a choice on the page may correct is taken
     said = str(caught.value)
     assert said.startswith(f"{name}: ") or name == "point.obj"
@@ -241,7 +241,7 @@ def test_files_that_are_no_meshes_or_too_large_are_refused():
         with pytest.raises(UnreadableRecord, match="is no mesh by its name: files of obj, ply, stl, glb, gltf"):
             store.add_mesh(name, b"PK")
     with pytest.raises(UnreadableRecord, match="may be 16 MiB large"):
-        store.add_mesh("a.stl", bytes(LARGEST + 1))
+        store.add_mesh("a.stl", bytes(MAX_FILE_SIZE + 1))
     for name in ("statu", "../statue", "/etc/passwd", "statue.obj"):
         with pytest.raises(InvalidBlock, match=r"must be (one of )?.?statue|did you mean"):
             read_case({**STATUE, "mesh": name}, store)
@@ -252,7 +252,7 @@ def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned(here):
     lying = box((0.2, 1.0, 3.0))
     lying.vertices[lying.vertices[:, 2] < 0.1] *= [0.1, 0.1, 1.0]
     lying.vertices[:, 1] += np.where(lying.vertices[:, 2] > 0.1, 0.6, 0.0)
-    taken = explorer.take_mesh("lying.stl", content(lying))
+    taken = explorer.add_mesh("lying.stl", content(lying))
     assert taken["azimuth"] == 0.0
     texts = {**STATUE, "mesh": f"file:{taken['key']}"}
     with pytest.raises(InvalidBlock, match="does not stand"):
@@ -263,15 +263,14 @@ def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned(here):
 @pytest.mark.thorough
 def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
     data = SHIPPED_MESHES["statue"].read_bytes()
-    made, sections = apart.made_apart("statue.obj", data, {"unit": "ft"})
+    made, sections = apart.read_mesh_in_process("statue.obj", data, {"unit": "ft"})
     assert rocking.Solid(**made).to_dict() == rocking.Solid.from_mesh("statue", unit="ft").to_dict()
-    expected = apart.made_here("statue", {"unit": "ft"})[1]
-    assert np.abs(sections.compute_outline(30.0) - expected.compute_outline(30.0)).max() < 1e-5
-    monkeypatch.setattr(apart, "_PATIENCE", 0.05)
+    assert np.abs(sections.compute_outline(30.0) - apart.read_mesh("statue", {"unit": "ft"})[1].compute_outline(30.0)).max() < 1e-5
+    monkeypatch.setattr(apart, "_MAX_WAIT", 0.05)
     with pytest.raises(
         InvalidBlock, match=r"statue\.obj: takes more than 20 s or 2 GiB to read: make the mesh coarser"
     ):
-        apart.made_apart("statue.obj", data, {})
+        apart.read_mesh_in_process("statue.obj", data, {})
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of a process are those of Linux")
@@ -279,13 +278,13 @@ def test_a_process_that_takes_too_much_is_ended(tmp_path, monkeypatch):
     (tmp_path / "sitecustomize.py").write_text("import resource\nresource.setrlimit(resource.RLIMIT_CPU, (0, 1))\n")
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
     with pytest.raises(InvalidBlock, match="takes more than"):
-        apart.made_apart("statue.obj", SHIPPED_MESHES["statue"].read_bytes(), {})
+        apart.read_mesh_in_process("statue.obj", SHIPPED_MESHES["statue"].read_bytes(), {})
 
 
 def test_what_reads_meshes_may_be_missing(here, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(InvalidOption, match=r"trimesh, which is not installed: run pip install '\.\[mesh\]'"):
-        Explorer().take_mesh("box.stl", content(box()))
+        Explorer().add_mesh("box.stl", content(box()))
 
 
 @pytest.fixture(scope="module")
@@ -318,7 +317,7 @@ def test_the_server_takes_a_mesh_and_shows_it(page, here):
         assert refused.status_code == 422
         assert words.lower() in refused.json()["problem"].lower()
     assert page.post("/api/meshes", params={"name": "a.zip"}, content=b"PK").status_code == 422
-    large = {"content-length": str(LARGEST + 1)}
+    large = {"content-length": str(MAX_FILE_SIZE + 1)}
     assert page.post("/api/meshes", params={"name": "a.stl"}, content=b"", headers=large).status_code == 413
 
 

@@ -14,8 +14,8 @@ import pytest
 import rocking
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.core import Explorer
-from rocking.explorer.inputs import read_case, texts_of
-from rocking.explorer.uploads import UploadStore, bare_name
+from rocking.explorer.inputs import read_case, response_to_texts
+from rocking.explorer.uploads import UploadStore, clean_file_name
 
 BLOCK = {"width": "0.24", "height": "1.1"}
 FILE = "time (s), a (g)\n" + "".join(f"{0.01 * k:.2f}, {0.3 * (-1) ** (k // 20)}\n" for k in range(100))
@@ -55,7 +55,7 @@ def test_hostile_names_of_files_are_one_argument_and_one_text(tmp_path, every):
     assert len(found) == len(names)
     plain = ast.dump(ast.parse(case_as_python(case_of("x", UploadStore()))))
     for name, case, (command, file, *rest) in zip(names, cases, found, strict=True):
-        kept = bare_name(name)
+        kept = clean_file_name(name)
         assert (command, *rest) == ("simulate", "--width", "0.24", "--height", "1.1")
         assert Path(file) == Path(kept) and not file.startswith("-")
         script = ast.parse(case_as_python(case))
@@ -97,6 +97,6 @@ def test_the_name_of_a_motion_ends_no_comment():
     explorer = Explorer()
     motion = rocking.Motion.from_samples(np.sin(np.arange(50.0)), dt=0.02, name="x\nimport os\rimport sys\x0cy")
     response = rocking.simulate(rocking.Block(width=0.24, height=1.1), motion)
-    python = explorer.code(texts_of(response, explorer.uploads))["python"]
+    python = explorer.code(response_to_texts(response, explorer.uploads))["python"]
     assert "# ximport osimport sysy: the motion" in python
     assert len(ast.parse(python).body) == 6

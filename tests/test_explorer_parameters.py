@@ -12,7 +12,7 @@ from rocking.explorer.parameters import (
     field_label,
     specification,
 )
-from rocking.explorer.payload import english
+from rocking.explorer.payload import load_english_texts
 from rocking.inputs import quantities
 from rocking.inputs.pulses import FAMILIES, named_pulse
 
@@ -71,7 +71,7 @@ def test_two_sides_are_read_where_a_parameter_may_have_them_and_refused_elsewher
 def test_the_page_reads_every_unit_as_the_program_does():
     judged = 0
     for parameter in (*PARAMETERS.values(), *(each for pulse in PULSES.values() for each in pulse["parameters"])):
-        described = parameter.described()
+        described = parameter.describe()
         kind = "acceleration" if parameter.name == "sa" else parameter.kind
         if kind == "text":
             continue
@@ -94,7 +94,10 @@ def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():
     judged = 0
     for name, pulse in PULSES.items():
         for parameter in pulse["parameters"]:
-            assert field_label(parameter.name, f"{name}:frequency=1") == f"“{english()[f'field.{parameter.text}']}”"
+            assert (
+                field_label(parameter.name, f"{name}:frequency=1")
+                == f"“{load_english_texts()[f'field.{parameter.text}']}”"
+            )
             judged += 1
     assert judged >= 20
     assert field_label("amplitude") == "amplitude"  # of the acceleration, or of the velocity

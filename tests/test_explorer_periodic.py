@@ -13,15 +13,15 @@ from rocking.errors import InvalidOption
 from rocking.explorer.code import sweep_as_python
 from rocking.explorer.inputs import read_case
 from rocking.explorer.periodic import (
-    KEPT,
-    LONGEST,
-    nearest_sine,
-    orbit,
-    part_payload,
-    parts,
-    sine_of,
-    sweep_of,
-    texts_at,
+    MAX_PERIOD,
+    STORED_STATES,
+    describe_orbit,
+    find_sine,
+    pack_sweep_part,
+    read_sweep,
+    simulate_sweep,
+    suggest_sine,
+    sweep_point_to_texts,
 )
 from rocking.explorer.uploads import UploadStore
 
@@ -42,7 +42,7 @@ def sine(amplitude, frequency=2.0):
 
 def long_simulation(case, periods):
     """Response over some periods of the case's sine, and the states at their starts in units of slenderness."""
-    given = sine_of(case)
+    given = find_sine(case)
     motion = rocking.pulses.sine(given.amplitude, given.frequency, cycles=periods + 1, phase=given.phase)
     response = rocking.simulate(
         case.block,
@@ -73,7 +73,7 @@ def long_simulation(case, periods):
     ],
 )
 def test_what_a_case_settles_on_is_where_a_long_simulation_ends(case, period, impacts, rests, words):
-    found = orbit(case)
+    found = describe_orbit(case)
     assert in_english(found.header["sentence"]) == f"It repeats {words} in each repetition."
     assert found.header["period"] == period
     response, states = long_simulation(case, 400 + period)
@@ -83,7 +83,7 @@ def test_what_a_case_settles_on_is_where_a_long_simulation_ends(case, period, im
     assert apart.min(axis=1).max() < 2e-6 and apart.min(axis=0).max() < 2e-6
     for shorter in range(1, period):
         assert np.abs(states[-1] - states[-1 - shorter]).max() > 1e-5
-    start = response.duration - period / sine_of(case).frequency
+    start = response.duration - period / find_sine(case).frequency
     assert impacts is None or np.sum(response.impacts["time"] >= start) == impacts
     kinds, times = response.events["kind"], response.events["time"]
     assert np.sum((kinds == "rest") & (times >= start) & (times < response.duration)) == rests
@@ -92,7 +92,7 @@ def test_what_a_case_settles_on_is_where_a_long_simulation_ends(case, period, im
 def test_multipliers_are_those_of_the_impacts():
     # An arc keeps areas; an impact takes eta^2 of them.
     case = case_of(sine(6.0))
-    about = in_english(orbit(case).header["about"])
+    about = in_english(describe_orbit(case).header["about"])
     numbers = [float(each) for each in re.search(r"are (\S+) (?:and|±) ([^i\s]+?)i?\.$", about).groups()]
     product = numbers[0] * numbers[1] if " and " in about.split("are")[1] else numbers[0] ** 2 + numbers[1] ** 2
     assert product == pytest.approx(0.5 ** (2 * 2), rel=1e-3)
@@ -101,7 +101,7 @@ def test_multipliers_are_those_of_the_impacts():
 @pytest.mark.parametrize("texts", [{}, {**ECCENTRIC, "restitution": "0.5,0.6"}])
 def test_the_trajectory_passes_through_the_starts_of_the_periods_and_jumps_at_impacts(texts):
     case = case_of(sine(6.0), **texts)
-    arrays = orbit(case).arrays
+    arrays = describe_orbit(case).arrays
     line = np.stack([arrays["rotation"], arrays["velocity"]], axis=-1)
     gaps = np.isnan(line[:, 0])
     assert np.array_equal(gaps, np.isnan(line[:, 1])) and gaps.sum() == len(arrays["before"]) == 2
@@ -121,7 +121,7 @@ def test_the_trajectory_passes_through_the_starts_of_the_periods_and_jumps_at_im
 )
 def test_an_overturning_is_told_with_its_period(amplitude, frequency, eta):
     case = case_of(sine(amplitude, frequency), restitution=eta)
-    found = orbit(case)
+    found = describe_orbit(case)
     response, _ = long_simulation(case, 40)
     assert response.overturned
     period = math.ceil(response.overturn_time * frequency)
@@ -132,14 +132,14 @@ def test_an_overturning_is_told_with_its_period(amplitude, frequency, eta):
 
 def test_a_case_without_a_period_is_said_to_have_none():
     case = case_of(sine(15.847), initial_rotation="0.0359", initial_velocity="1.216")
-    found = orbit(case)
-    assert in_english(found.header["sentence"]).startswith(f"No period up to {LONGEST} was found")
+    found = describe_orbit(case)
+    assert in_english(found.header["sentence"]).startswith(f"No period up to {MAX_PERIOD} was found")
     assert found.header["period"] == 0 and len(found.arrays["x"]) == 1024
 
 
 def test_a_scaled_sine_is_the_sine_of_that_amplitude():
     case = case_of("sine:amplitude=2,frequency=2,cycles=2.5,phase=30deg", scale="-3")
-    given = sine_of(case)
+    given = find_sine(case)
     times = np.linspace(0.0, 1.2, 200)
     assert given.amplitude > 0.0
     assert given.motion(2.5).acceleration(times) == pytest.approx(case.motion.acceleration(times), abs=1e-12)
@@ -149,17 +149,17 @@ def test_the_nearest_sine_has_the_peaks_of_the_motion():
     half = "half-sine:amplitude=3,frequency=2"
     for motion in ("ridgecrest-clc-090", "rectangular:amplitude=0.3g,duration=0.5", half):
         case = case_of(motion)
-        near = nearest_sine(case).motion(2.0)
+        near = suggest_sine(case).motion(2.0)
         assert near.pga == pytest.approx(case.motion.pga, rel=1e-5)
         if motion != half:
             # From rest its velocity goes from zero to twice the amplitude of the velocity.
             assert np.ptp(near.velocity(np.linspace(0.0, near.duration, 4001))) / 2.0 == pytest.approx(
                 case.motion.pgv, rel=1e-4
             )
-        offer = orbit(case).header["offer"]
-        assert sine_of(case_of(offer["motion"])) == nearest_sine(case)
-    assert nearest_sine(case_of(half)).frequency == 2.0
-    assert orbit(case_of(orbit(case_of("none")).header["offer"]["motion"])).header["offer"] is None
+        offer = describe_orbit(case).header["offer"]
+        assert find_sine(case_of(offer["motion"])) == suggest_sine(case)
+    assert suggest_sine(case_of(half)).frequency == 2.0
+    assert describe_orbit(case_of(describe_orbit(case_of("none")).header["offer"]["motion"])).header["offer"] is None
 
 
 # Sweeps
@@ -168,7 +168,7 @@ def test_the_nearest_sine_has_the_peaks_of_the_motion():
 def swept(sweep):
     """What the finest level of a sweep finds, by direction and number of the value."""
     found, shares, strides = {}, [], []
-    for part in parts(sweep):
+    for part in simulate_sweep(sweep):
         shares.append(part.share)
         strides.append(part.stride)
         if part.stride == 1:
@@ -189,7 +189,7 @@ def swept(sweep):
 )
 def test_a_sweep_is_what_its_script_computes(texts, asked, tmp_path):
     case = case_of("sine:amplitude=0.9g,frequency=2,cycles=3,phase=20deg", **texts)
-    sweep = sweep_of(case, {**asked, "sweep_points": "24"})
+    sweep = read_sweep(case, {**asked, "sweep_points": "24"})
     found = swept(sweep)
     script = tmp_path / "sweep.py"
     script.write_text(sweep_as_python(sweep), "utf-8")
@@ -199,19 +199,19 @@ def test_a_sweep_is_what_its_script_computes(texts, asked, tmp_path):
     for (direction, index), each in found.items():
         at = ran.data.sel(direction=direction, start=0).isel(value=index)
         states = np.stack([at.coordinate.values, at.velocity.values], axis=-1)
-        assert at.value == sweep.axis.values[index] and states.shape == (KEPT, 2)
+        assert at.value == sweep.axis.values[index] and states.shape == (STORED_STATES, 2)
         assert at.period == (each.period if len(each.states) else -1)
         overturned += not len(each.states)
         periodic += each.period > 0
         assert np.isnan(states[-1]).all() == (not len(each.states))
-        assert np.array_equal(states[KEPT - len(each.states) :], each.states)
+        assert np.array_equal(states[STORED_STATES - len(each.states) :], each.states)
     assert periodic >= 15 and periodic + overturned >= 24
     assert overturned >= 3 or "model" in texts or "scale" in texts
 
 
 @pytest.mark.parametrize("points", [12, pytest.param(40, marks=pytest.mark.thorough)])
 def test_a_sweep_depends_on_its_direction(points):
-    sweep = sweep_of(case_of(sine(9.0)), {"sweep_from": "0.9", "sweep_to": "6", "sweep_points": str(points)})
+    sweep = read_sweep(case_of(sine(9.0)), {"sweep_from": "0.9", "sweep_to": "6", "sweep_points": str(points)})
     found = swept(sweep)
     up, down = ([len(found[each, index].states) for index in range(points)] for each in ("up", "down"))
     # Amplitudes at which a block that rocks goes on, and one from rest overturns; the other way there is none.
@@ -225,30 +225,30 @@ def test_a_sweep_depends_on_its_direction(points):
 def test_the_case_at_a_point_of_a_sweep_settles_on_that_point(name, texts):
     ends = {"a": ("1.2", "3"), "omega": ("3", "5")}[name]
     case = case_of("sine:amplitude=0.7g,frequency=2,cycles=3", **texts)
-    sweep = sweep_of(case, {"sweep": name, "sweep_from": ends[0], "sweep_to": ends[1], "sweep_points": "8"})
+    sweep = read_sweep(case, {"sweep": name, "sweep_from": ends[0], "sweep_to": ends[1], "sweep_points": "8"})
     judged = 0
     for (_, index), each in swept(sweep).items():
         if not each.period:
             continue
         value = float(sweep.axis.values[index])
         u, v = map(float, each.states[-1])
-        opened = read_case(texts_at(sweep, value, (u, v)), UploadStore())
+        opened = read_case(sweep_point_to_texts(sweep, value, (u, v)), UploadStore())
         assert (opened.initial_rotation, opened.initial_velocity) == (u, v)
-        header = orbit(opened).header
+        header = describe_orbit(opened).header
         assert header["at"][name] == pytest.approx(value, rel=1e-12)
         assert header["period"] == each.period
-        again = sweep_of(opened, {"sweep": name})
+        again = read_sweep(opened, {"sweep": name})
         assert again.sine_at(1.0).text.partition("cycles")[0] == sweep.sine_at(1.0).text.partition("cycles")[0]
         judged += 1
     assert judged >= 10
-    assert "initial_rotation" not in texts_at(sweep, 2.0, None)
+    assert "initial_rotation" not in sweep_point_to_texts(sweep, 2.0, None)
 
 
 def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
-    sweep = sweep_of(case_of(sine(6.0)), {"sweep_points": "16", "sweep_to": "8.7"})
+    sweep = read_sweep(case_of(sine(6.0)), {"sweep_points": "16", "sweep_to": "8.7"})
     words = set()
-    for part in parts(sweep):
-        payload = part_payload(sweep, part)
+    for part in simulate_sweep(sweep):
+        payload = pack_sweep_part(sweep, part)
         states = payload.arrays["states"].reshape(-1, 2)
         assert sum(payload.header["counts"]) == len(states) == len(payload.arrays["drawn"])
         assert payload.arrays["drawn"] == pytest.approx(states[:, 0] / sweep.case.block.alpha)
@@ -269,4 +269,4 @@ def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
 )
 def test_a_sweep_that_is_none_is_refused(motion, asked, words):
     with pytest.raises(InvalidOption, match=words):
-        sweep_of(case_of(motion), asked)
+        read_sweep(case_of(motion), asked)

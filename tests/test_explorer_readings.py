@@ -26,9 +26,9 @@ def statue():
 
 @pytest.mark.parametrize("texts", [STATUE, SIDES, {**SIDES, "model": "linear"}])
 def test_the_phase_plane_and_the_energy_are_the_responses_own(explorer, texts):
-    response = explorer.show(texts).response
+    response = explorer.simulate(texts).response
     start, end = (230.5, 233.5) if texts is STATUE else (0.2, 2.0)
-    header, arrays = (found := readings.phase(explorer, texts, (start, end))).header, found.arrays
+    header, arrays = (found := readings.sample_phase(explorer, texts, (start, end))).header, found.arrays
     times = start + arrays["time"]
     before = arrays["before"].astype(int)
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]
@@ -51,7 +51,7 @@ def test_the_phase_plane_and_the_energy_are_the_responses_own(explorer, texts):
 def test_an_instant_is_read_from_the_series(explorer):
     response, judged = statue(), 0
     for time in (230.0, 232.123456789, 233.25, float(response.impacts["time"][100])):
-        found = readings.at(explorer, STATUE, repr(time), (229.0, 236.0))
+        found = readings.find_state(explorer, STATUE, repr(time), (229.0, 236.0))
         assert (found["rotation"], found["velocity"], found["acceleration"]) == tuple(response.states(time))
         assert found["ground_g"] == pytest.approx(float(response.motion.acceleration(time)) / 9.80665, rel=1e-14)
         assert found["energy"] == response.kinetic_energy(time) + response.potential_energy(time)
@@ -61,7 +61,7 @@ def test_an_instant_is_read_from_the_series(explorer):
         assert in_english(found["state"]) == expected
         judged += 1
     assert judged == 4
-    assert readings.at(explorer, STATUE, "232123.456789 ms")["time"] == pytest.approx(232.123456789, rel=1e-15)
+    assert readings.find_state(explorer, STATUE, "232123.456789 ms")["time"] == pytest.approx(232.123456789, rel=1e-15)
 
 
 def test_an_instant_outside_the_response_is_refused_by_the_name_of_its_field(explorer):
@@ -72,16 +72,16 @@ def test_an_instant_outside_the_response_is_refused_by_the_name_of_its_field(exp
         ("", "a time as 1.5"),
     ):
         with pytest.raises(InvalidOption, match=words) as refused:
-            readings.at(explorer, STATUE, text)
+            readings.find_state(explorer, STATUE, text)
         assert refused.value.argument == "at"
 
 
 def test_a_thumbnail_says_what_the_opened_case_says(explorer):
     axes = {"x": "omega", "y": "a", "points": "8", "y_to": "3"}
-    grid = maps.grid_of(read_case({**SIDES, "offset": "0"}, explorer.uploads), axes)
+    grid = maps.read_grid(read_case({**SIDES, "offset": "0"}, explorer.uploads), axes)
     for x, y in ((1.0, 1.02), (2.0, 2.9)):
-        texts = maps.texts_at(grid, x, y)
-        found, whole = readings.thumbnail(explorer, texts), explorer.case(texts)
+        texts = maps.map_point_to_texts(grid, x, y)
+        found, whole = readings.create_thumbnail(explorer, texts), explorer.case(texts)
         assert found.header["verdict"] == whole.header["verdict"]
         assert len(found.arrays["time"]) <= 300
         assert np.abs(found.arrays["rotation"]).max() == pytest.approx(

@@ -23,15 +23,15 @@ import pytest
 from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
-from rocking.core.threads import AHEAD, cores
+from rocking.core.threads import LOOKAHEAD, cores
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.explorer import launch, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.core import Explorer
-from rocking.explorer.launch import served
+from rocking.explorer.launch import start_listening
 from rocking.explorer.server import App
 from rocking.explorer.studies import StudyView
-from rocking.explorer.uploads import LARGEST, UploadStore
+from rocking.explorer.uploads import MAX_FILE_SIZE, UploadStore
 
 PORT = 8123
 OURS = f"http://127.0.0.1:{PORT}"
@@ -87,7 +87,7 @@ def frames(data):
 
 def test_a_case_comes_as_header_and_aligned_arrays(page, explorer):
     header, arrays = unpacked(page.get("/api/case", params=STATUE).content)
-    response = explorer.show(STATUE).response
+    response = explorer.simulate(STATUE).response
     assert header["peak_rotation"] == response.peak_rotation
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])
     code = page.get("/api/code", params=STATUE).json()
@@ -100,7 +100,7 @@ def test_a_window_comes_with_times_from_its_start(page, explorer):
     header, arrays = unpacked(page.get("/api/window", params=texts).content)
     assert header["window"] == {"from": 232.0, "to": 233.0, "impacts": 3, "unresolved": None}
     assert arrays["time"][0] == 0.0
-    response = explorer.show(STATUE).response
+    response = explorer.simulate(STATUE).response
     assert arrays["rotation"] == pytest.approx(response.rotation(232.0 + arrays["time"]), abs=1e-12)
     assert len(arrays["displacement"]) > 100
 
@@ -129,7 +129,7 @@ def test_a_map_comes_coarse_to_fine_and_whole(page):
     order = np.array(strides)
     overtaken = [int(np.sum(order[k:] > stride)) for k, stride in enumerate(strides)]
     assert sorted(set(strides)) == [1, 2, 4, 8] and len(strides) == 45
-    assert max(overtaken) < AHEAD * cores()
+    assert max(overtaken) < LOOKAHEAD * cores()
 
 
 def test_the_case_at_a_point_of_a_map(page):
@@ -325,7 +325,9 @@ def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
 
 
 def test_a_body_that_is_too_large_is_refused_before_and_while_it_comes(page):
-    answer = page.post("/api/records", params={"name": "x"}, content=b"", headers={"content-length": str(LARGEST + 1)})
+    answer = page.post(
+        "/api/records", params={"name": "x"}, content=b"", headers={"content-length": str(MAX_FILE_SIZE + 1)}
+    )
     assert answer.status_code == 413
 
     async def endless():
@@ -336,7 +338,7 @@ def test_a_body_that_is_too_large_is_refused_before_and_while_it_comes(page):
     assert page.post("/api/records", params={"name": "x"}, content=endless()).status_code == 413
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 4 * LARGEST
+    assert peak < 4 * MAX_FILE_SIZE
 
 
 def memory_of(act):
@@ -360,21 +362,21 @@ AT2 = (Path(__file__).parent / "data" / "formats" / "nga.at2").read_bytes()
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"0\n" * (LARGEST // 2), "8388608 lines, of which at most 1000000 are read here"),
-        (b"0\r" * (LARGEST // 2), "8388608 lines, of which at most 1000000 are read here"),
+        (b"0\n" * (MAX_FILE_SIZE // 2), "8388608 lines, of which at most 1000000 are read here"),
+        (b"0\r" * (MAX_FILE_SIZE // 2), "8388608 lines, of which at most 1000000 are read here"),
         (b"0\n" * 999_000, "999000 samples; at most 500000 are shown here"),
-        pytest.param(b"0 " * (LARGEST // 2), "each line holds 256 numbers", marks=pytest.mark.thorough),
+        pytest.param(b"0 " * (MAX_FILE_SIZE // 2), "each line holds 256 numbers", marks=pytest.mark.thorough),
         pytest.param(b".1\n" * 490_000, "read", marks=pytest.mark.thorough),
         pytest.param(b"0;0\n" * 490_000, "the time does not increase", marks=pytest.mark.slow),
         pytest.param(AT2 + b"0\n" * 999_000, "NPTS says", marks=pytest.mark.slow),
-        pytest.param(AT2 + b"0 " * (LARGEST // 2 - 2000), "NPTS says", marks=pytest.mark.slow),
+        pytest.param(AT2 + b"0 " * (MAX_FILE_SIZE // 2 - 2000), "NPTS says", marks=pytest.mark.slow),
         pytest.param(HEADED + (b"0" + b",0" * 200 + b"\n") * 20_000, "the time does not", marks=pytest.mark.slow),
     ],
     ids=lambda value: f"{len(value)}" if isinstance(value, bytes) else "",
 )  # fmt: skip
 def test_reading_a_file_takes_little_more_memory_than_the_file(data, words):
     store = UploadStore()
-    peak, found = memory_of(lambda: store.contents(store.add_file("x", data)))
+    peak, found = memory_of(lambda: store.describe_file(store.add_file("x", data)))
     assert words in found
     assert peak < 20 * len(data) + 60 * 2**20
 
@@ -385,11 +387,11 @@ def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
     obspy.Stream([obspy.Trace(quiet)]).write(packed, format="MSEED", encoding="STEIM2", reclen=4096)
     store = UploadStore()
     key = store.add_file("x", packed.getvalue())
-    assert len(store.contents(key)["channels"]) == 1
-    monkeypatch.setattr(uploads, "_MOST_SAMPLES", 399_999)
+    assert len(store.describe_file(key)["channels"]) == 1
+    monkeypatch.setattr(uploads, "_MAX_FILE_SAMPLES", 399_999)
     store.remove(key)
     key = store.add_file("x", packed.getvalue())
-    peak, words = memory_of(lambda: store.contents(key))
+    peak, words = memory_of(lambda: store.describe_file(key))
     assert "400000 samples, of which at most 399999 are read here" in words
     assert peak < 2 * quiet.nbytes
 
@@ -427,7 +429,7 @@ def test_twenty_clients_at_once_are_all_answered(page):
 
 @pytest.fixture(scope="module")
 def running():
-    here = served(Explorer(), {"motion": "one-sine:amplitude=0.3g,frequency=1"})
+    here = start_listening(Explorer(), {"motion": "one-sine:amplitude=0.3g,frequency=1"})
     here.run_in_background()
     yield here
     here.server.should_exit = True
@@ -594,10 +596,10 @@ def test_a_missing_package_is_named(run, monkeypatch):
 
 
 def test_a_port_that_is_taken_is_said_so():
-    here = served(Explorer(), {})
+    here = start_listening(Explorer(), {})
     try:
         with pytest.raises(InvalidOption, match="cannot be used"):
-            served(Explorer(), {}, port=here.port)
+            start_listening(Explorer(), {}, port=here.port)
     finally:
         here.socket.close()
 
@@ -654,8 +656,8 @@ def test_a_response_is_explored_in_a_frame():
 
 
 def test_connections_whose_request_never_comes_keep_nobody_out(monkeypatch):
-    monkeypatch.setattr("rocking.explorer.server.PATIENCE", 0.3)
-    here = served(Explorer(), {"motion": "one-sine:amplitude=0.3g,frequency=1"})
+    monkeypatch.setattr("rocking.explorer.server.REQUEST_TIMEOUT", 0.3)
+    here = start_listening(Explorer(), {"motion": "one-sine:amplitude=0.3g,frequency=1"})
     here.run_in_background()
     held = [socket.create_connection(("127.0.0.1", here.port)) for _ in range(3)]
     for each in held:

@@ -10,10 +10,10 @@ from explorer_texts import in_english
 
 import rocking
 from rocking.explorer.parameters import ASSESSMENT, MAP, PARAMETERS, READING, SWEEP, specification
-from rocking.explorer.payload import english, filled
+from rocking.explorer.payload import fill_page, load_english_texts
 
 FOLDER = Path(rocking.__file__).parent / "explorer"
-TEXTS = {key: text for key, text in english().items() if key}
+TEXTS = {key: text for key, text in load_english_texts().items() if key}
 #: Texts that Python alone puts into messages, and those of parameters, which are looked up by the name of each.
 OF_FIELDS = ("field.", "about.")
 
@@ -144,7 +144,7 @@ def test_a_count_chooses_its_form(count, expected):
 
 
 def test_the_page_comes_filled_in_with_every_text_and_no_place_is_left():
-    page = filled((FOLDER / "page" / "index.html").read_text("utf-8"), TEXTS | {"save.copy": "</script><b>"})
+    page = fill_page((FOLDER / "page" / "index.html").read_text("utf-8"), TEXTS | {"save.copy": "</script><b>"})
     found = re.search(r'<script type="application/json" id="texts">(.*?)</script>', page, re.S)
     assert json.loads(found[1])["save.copy"] == "</script><b>" and len(json.loads(found[1])) == len(TEXTS)
     rest = page.replace(found[0], "")

@@ -10,8 +10,8 @@ from rocking.cli.options import BlockOptions, HeldOptions, MotionOptions, StartO
 from rocking.explorer.inputs import read_case
 from rocking.explorer.parameters import PARAMETERS
 from rocking.explorer.uploads import UploadStore
-from rocking.inputs.bodies import block_of, call_of
-from rocking.inputs.declared import BLOCK, HELD, INPUTS, SHAPES
+from rocking.inputs.bodies import create_block, write_block_call
+from rocking.inputs.declared import BLOCK, INPUTS, SHAPES, SUPPORTS
 from rocking.studies import read_study
 from rocking.studies.file import SCHEMA
 
@@ -86,9 +86,9 @@ def test_a_file_makes_a_block_of_every_combination(tmp_path):
 
 def test_every_input_of_a_body_is_an_option_and_a_key_and_every_other_has_an_option():
     options = {each for kind in (HeldOptions, MotionOptions, StartOptions) for each in kind.__dataclass_fields__}
-    assert {*BLOCK, *HELD} <= options & INPUTS.keys()
+    assert {*BLOCK, *SUPPORTS} <= options & INPUTS.keys()
     keys = {*SCHEMA["blocks"]}
-    assert {*BLOCK} <= keys and all(name in keys or f"{name}s" in keys for name in HELD)
+    assert {*BLOCK} <= keys and all(name in keys or f"{name}s" in keys for name in SUPPORTS)
     described = {name for name, each in INPUTS.items() if each.help}
     assert described - {"model", "chattering"} == options & INPUTS.keys()  # these have options of their own
 
@@ -96,11 +96,11 @@ def test_every_input_of_a_body_is_an_option_and_a_key_and_every_other_has_an_opt
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.name)
 def test_a_description_of_a_block_is_complete_or_refused(shape):
     values = dict.fromkeys(shape.needed, 0.3) | ({"pivots": (0.3, 0.3)} if "pivots" in shape.needed else {})
-    assert eval(call_of(values), {"Block": Block}) == block_of(values)
+    assert eval(write_block_call(values), {"Block": Block}) == create_block(values)
     for name in shape.needed if len(shape.needed) > 1 else ():
         with pytest.raises(RockingError, match="a block needs more than"):
-            block_of({each: value for each, value in values.items() if each != name})
+            create_block({each: value for each, value in values.items() if each != name})
     for other in SHAPES:
         if other is not shape:
             with pytest.raises(RockingError, match="belong to different descriptions of a block"):
-                block_of(values | dict.fromkeys(other.needed, 0.3))
+                create_block(values | dict.fromkeys(other.needed, 0.3))

@@ -9,7 +9,7 @@ import pytest
 import rocking
 from rocking import pulses
 from rocking.chattering import chattering_time
-from rocking.inputs.pulses import FAMILIES, PARAMETERS, named_pulse, pulse_family
+from rocking.inputs.pulses import FAMILIES, PARAMETERS, find_family, named_pulse
 
 G = 9.80665
 
@@ -42,7 +42,7 @@ def test_every_pulse_has_a_name_and_every_parameter_a_reader():
     assert {family.make.__name__ for family in FAMILIES.values()} == set(pulses.__all__)
     parameters = {parameter for family in FAMILIES.values() for parameter in (*family.needed, *family.optional)}
     assert parameters == PARAMETERS.keys()  # what is no key of it can be neither read nor listed
-    assert {pulse_family(text.partition(":")[0]).name for text in EACH} == set(FAMILIES)
+    assert {find_family(text.partition(":")[0]).name for text in EACH} == set(FAMILIES)
 
 
 def test_a_frequency_may_be_in_rad_per_second():

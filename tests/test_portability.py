@@ -107,7 +107,7 @@ def test_on_windows_no_other_server_may_share_the_port(
     monkeypatch: pytest.MonkeyPatch, system: str, reused: bool
 ) -> None:
     monkeypatch.setattr(sys, "platform", system)
-    with launch._bound("127.0.0.1", 0) as listening:
+    with launch._bind_socket("127.0.0.1", 0) as listening:
         assert bool(listening.getsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR)) == reused
 
 

@@ -13,7 +13,7 @@ import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
 from rocking.core.tables import named
-from rocking.explorer.simulated import verdict
+from rocking.explorer.simulated import describe_outcome
 from rocking.response.summary import known_ratio, time_text
 from rocking.rules import Check
 
@@ -263,7 +263,7 @@ def test_one_case_has_one_peak_in_every_output(pga):
     else:  # fewer than three digits are known
         assert len(shown) <= 4 and float(low) - 0.05 <= float(shown) <= float(high) + 0.05
     assert known_ratio(response) == pytest.approx(float(shown), abs=5.1e-5)
-    told = verdict(response, block.uplift_thresholds())
+    told = describe_outcome(response, block.uplift_thresholds())
     if response.perturbed().is_decided:
         assert told["values"]["share"]["values"]["value"] == 100.0 * known_ratio(response)
     else:

@@ -141,7 +141,7 @@ def bars():
 
         def noted(bar, kind, *error):
             if kind is None:
-                found.append((bar.what, bar.done, bar.total))
+                found.append((bar.description, bar.done, bar.total))
             return ended(bar, kind, *error)
 
         patched.setattr(Progress, "__exit__", noted)

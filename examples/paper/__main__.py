@@ -14,14 +14,14 @@ mpl.use("agg")  # Figures are written, not shown.
 from figures import FIGURES, paper_figure
 
 from rocking import RockingError
-from rocking.inputs.quantities import angle
+from rocking.inputs.quantities import read_angle
 
 PARAMETERS = {
     "a": (float, "amplitude of the ground acceleration over g alpha"),
     "omega": (float, "its frequency (rad/s) over the block's p"),
     "eta": (float, "coefficient of restitution"),
     "p": (float, "the block's frequency parameter, rad/s"),
-    "alpha": (lambda text: angle(text, "alpha"), "its slenderness, 12deg or 0.2 (rad)"),
+    "alpha": (lambda text: read_angle(text, "alpha"), "its slenderness, 12deg or 0.2 (rad)"),
 }
 
 

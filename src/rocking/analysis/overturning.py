@@ -23,7 +23,7 @@ from rocking.core.tables import as_written, cell, named, records_of, text_table
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.inputs.pulses import pulse_family
+from rocking.inputs.pulses import find_family
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
 
@@ -273,7 +273,7 @@ class OverturningMap(DatasetResult):
     POOLED = ("boundary",)
 
     @staticmethod
-    def _kept_of(data: xr.Dataset) -> xr.Dataset:
+    def _restrict(data: xr.Dataset) -> xr.Dataset:
         at, level = data.boundary_frequency.values, data.boundary_amplitude.values
         low, high = data.amplitude.values.min(), data.amplitude.values.max()
         return data.isel(boundary=np.isin(at, data.frequency.values) & (low < level) & (level <= high))
@@ -357,14 +357,14 @@ def _pulse_function(
                 f"a {{}} given as a function takes no {', '.join(parameters)}: bind them to it", "pulse"
             )
         return pulse
-    family = pulse_family(pulse)
+    family = find_family(pulse)
     if family.name not in PULSES:
         raise InvalidOption(
             f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse", value=pulse
         )
 
     def named_pulse(amplitude: float, frequency: float) -> Motion:
-        made = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
+        made = family.create_motion({"amplitude": 1.0, "frequency": frequency} | parameters)
         return made.scaled_to(amplitude) if family.is_of_velocity else made.scaled(amplitude)
 
     return named_pulse

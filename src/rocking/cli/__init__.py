@@ -16,7 +16,7 @@ from cyclopts import App, Argument, CycloptsError, MissingArgumentError, Unknown
 from rocking.core.checks import meant
 from rocking.core.progress import notes_for
 from rocking.errors import INTERRUPTED, DamagedStudy, InvalidOption, RockingError, Spelling
-from rocking.inputs.texts import option_of
+from rocking.inputs.texts import write_option_name
 
 app = App(
     name="rocking",
@@ -170,7 +170,7 @@ def spelling_of(command: App) -> Spelling:
     def options() -> frozenset[str]:
         return frozenset(_options(command))
 
-    return lambda name: option_of(name) if option_of(name) in options() else name
+    return lambda name: write_option_name(name) if write_option_name(name) in options() else name
 
 
 def command_of(arguments: Sequence[str]) -> App:

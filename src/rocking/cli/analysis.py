@@ -36,9 +36,9 @@ from rocking.cli.options import (
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results
 from rocking.core.result import DatasetResult
 from rocking.errors import InvalidBlock, InvalidOption
-from rocking.inputs.bodies import block_of, note_likely_mistakes
+from rocking.inputs.bodies import create_block, note_likely_mistakes
 from rocking.inputs.declared import SHAPES
-from rocking.inputs.quantities import angle, length, tilt, values
+from rocking.inputs.quantities import read_angle, read_length, read_tilt, read_values
 
 #: Descriptions of a block for which the slenderness alone suffices.
 _SLENDER: Final = tuple(
@@ -94,19 +94,19 @@ def spectrum(
         )
     with output.folder() as folder:
         axes: dict[str, Any] = {
-            "p": None if p is None else values(p, "p"),
-            "size": None if size is None else values(size, "size", length),
+            "p": None if p is None else read_values(p, "p"),
+            "size": None if size is None else read_values(size, "size", read_length),
         }
         how = model.chosen()
         if alpha is not None:
-            restitutions = None if restitution is None else values(restitution, "restitution")
-            blocks = Blocks.grid(alpha=values(alpha, "alpha", tilt), restitution=restitutions, **axes)
+            restitutions = None if restitution is None else read_values(restitution, "restitution")
+            blocks = Blocks.grid(alpha=read_values(alpha, "alpha", read_tilt), restitution=restitutions, **axes)
             axes = {}
         elif ensemble is not None:
             given = ensemble_of(ensemble, model)
             blocks = given.pop("blocks")
             how |= given
-        shares = values(fractiles, "fractiles").tolist()
+        shares = read_values(fractiles, "fractiles").tolist()
         read = motion.read_all(names)
         found = rocking_spectrum(blocks, [*read.motions.values()], **axes, fractiles=shares, **how)
         _deliver(found, "spectrum", read, folder=folder, as_json=output.as_json, against=against)
@@ -153,7 +153,7 @@ def map(
     """
     given: dict[str, Any] = {
         "cycles": cycles,
-        "phase": None if phase is None else angle(phase, "phase"),
+        "phase": None if phase is None else read_angle(phase, "phase"),
         "gamma": gamma,
         "kind": kind,
     }
@@ -161,8 +161,8 @@ def map(
         found = overturning_map(
             _slender(block),
             pulse,
-            amplitudes=values(amplitudes, "amplitudes"),
-            frequencies=values(frequencies, "frequencies"),
+            amplitudes=read_values(amplitudes, "amplitudes"),
+            frequencies=read_values(frequencies, "frequencies"),
             model=model.model,
             rtol=rtol,
             **{name: value for name, value in given.items() if value is not None},
@@ -231,7 +231,7 @@ def measures(
         read = motion.read_all(names)
         found = compare_measures(
             motions=[*read.motions.values()],
-            periods=values(periods, "periods"),
+            periods=read_values(periods, "periods"),
             damping=damping,
             clusters=labels_of(clusters),
             **bodies,
@@ -257,7 +257,7 @@ def _slender(options: BlockOptions) -> Block:
         raise InvalidBlock(
             "the restitution of two different sides follows from {} and {} of both: give {}, too", "p", "alpha", "p"
         )
-    block = block_of({"p": 1.0} | values if "alpha" in values else values, _SLENDER)
+    block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER)
     note_likely_mistakes([block])
     return block
 

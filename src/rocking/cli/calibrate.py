@@ -30,7 +30,7 @@ from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_result
 from rocking.core.constants import Model
 from rocking.core.tables import counted, text_table
 from rocking.errors import InvalidOption
-from rocking.inputs.quantities import bounds, number, tilt
+from rocking.inputs.quantities import read_bounds, read_number, read_tilt
 from rocking.motion.motion import Motion
 
 #: Default number of candidate blocks.
@@ -91,11 +91,13 @@ def calibrate(
         Seed of the random numbers. The same seed reproduces the result.
     """
     ranges = {
-        "p": None if p is None else bounds(p, "p", number),
-        "alpha": None if alpha is None else bounds(alpha, "alpha", tilt),
-        "restitution": restitution if restitution in (None, HOUSNER) else bounds(restitution, "restitution", number),
+        "p": None if p is None else read_bounds(p, "p", read_number),
+        "alpha": None if alpha is None else read_bounds(alpha, "alpha", read_tilt),
+        "restitution": restitution
+        if restitution in (None, HOUSNER)
+        else read_bounds(restitution, "restitution", read_number),
     }
-    start = None if initial_rotation is None else tilt(initial_rotation, "initial_rotation")
+    start = None if initial_rotation is None else read_tilt(initial_rotation, "initial_rotation")
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:

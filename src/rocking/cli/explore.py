@@ -41,7 +41,7 @@ def explore(
     address
         Address of this machine for the server. Addresses other than 127.0.0.1 can be reached from other machines.
     """
-    from rocking.explorer.launch import require_packages, served
+    from rocking.explorer.launch import require_packages, start_listening
 
     require_packages()
     from rocking.explorer.core import Explorer
@@ -50,7 +50,7 @@ def explore(
     is_study = motion is not None and Path(motion).is_dir()
     study = _study(Path(motion)) if motion is not None and is_study else None
     texts = {"view": "map"} if is_study else {} if motion is None else _opening(explorer, motion)
-    server = served(explorer, texts, study, address=address, port=port)
+    server = start_listening(explorer, texts, study, address=address, port=port)
     server.announce(open_browser=not no_open)
     server.run()
 
@@ -68,11 +68,11 @@ def _study(folder: Path) -> StudyView:
 
 def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
     """Return the texts of the initial motion."""
-    from rocking.explorer.motions import is_pulse, pulse_of
+    from rocking.explorer.motions import create_pulse, is_pulse
     from rocking.records.formats.source import unreadable_file_error
 
     if is_pulse(motion):
-        pulse_of(motion)
+        create_pulse(motion)
         return {"motion": motion}
     if is_shipped(motion):
         return {"motion": motion}
@@ -81,5 +81,5 @@ def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
         key = explorer.uploads.add_file(file.name, file.read_bytes())
     except OSError as error:
         raise unreadable_file_error(motion, error) from None
-    explorer.uploads.contents(key)
+    explorer.uploads.describe_file(key)
     return {"motion": f"file:{key}"}

@@ -14,7 +14,7 @@ from rocking.core.progress import note
 from rocking.core.tables import text_table, write_csv
 from rocking.errors import InvalidOption
 from rocking.inputs.notes import block_notes
-from rocking.inputs.quantities import densities, length, number, sides, values
+from rocking.inputs.quantities import read_densities, read_length, read_number, read_sides, read_values
 from rocking.solid.solid import Solid
 
 _Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
@@ -67,16 +67,16 @@ def mesh(
             raise InvalidOption("{} is for the blocks of {}: give one, or leave it out", "restitution", "azimuth")
         solid = Solid.from_mesh(
             file,
-            density=None if density is None else densities(density, "density"),
+            density=None if density is None else read_densities(density, "density"),
             support=None if support is None else [_numbers(corner, "support") for corner in support.split(";")],
-            tolerance=None if tolerance is None else length(tolerance, "tolerance"),
+            tolerance=None if tolerance is None else read_length(tolerance, "tolerance"),
             up=_numbers(up, "up") if up is not None and "," in up else up,
-            unit=unit if unit.isalpha() else number(unit, "unit"),
-            turn=0.0 if turn is None else number(turn, "turn"),
+            unit=unit if unit.isalpha() else read_number(unit, "unit"),
+            turn=0.0 if turn is None else read_number(turn, "turn"),
         )
         rose = solid.rose()
-        e = None if restitution is None else sides(restitution, "restitution")
-        azimuths = [] if azimuth is None else values(azimuth, "azimuth").tolist()
+        e = None if restitution is None else read_sides(restitution, "restitution")
+        azimuths = [] if azimuth is None else read_values(azimuth, "azimuth").tolist()
         blocks = [_row(at, solid.block(at, restitution=e)) for at in azimuths]
         found: dict[str, Any] = {"solid": solid.to_dict(), **rose.to_dict(), "blocks": blocks}
         text = [solid.summary(), rose.summary()]
@@ -115,4 +115,4 @@ def _row(azimuth: float, block: Block) -> dict[str, float]:
 
 def _numbers(text: str, name: str) -> Sequence[float]:
     """Return numbers separated by commas."""
-    return [number(part, name) for part in text.split(",")]
+    return [read_number(part, name) for part in text.split(",")]

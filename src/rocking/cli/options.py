@@ -17,11 +17,11 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, literal
 from rocking.inputs import bodies, declared
-from rocking.inputs.declared import INPUTS, noted_acceleration
+from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes, vertical_notes
 from rocking.inputs.pulses import named_pulse
-from rocking.inputs.quantities import Quantity, acceleration, number, scaling, values, velocity
-from rocking.inputs.texts import option_of
+from rocking.inputs.quantities import Quantity, read_acceleration, read_number, read_scaling, read_values, read_velocity
+from rocking.inputs.texts import write_option_name
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import expand_record_names, load_motion, load_vertical
@@ -112,25 +112,25 @@ class BlockOptions(InputOptions):
 
     def block(self) -> Block:
         """Return the block, with notes on likely mistakes."""
-        block = bodies.block_of(self.read(*declared.BLOCK))
+        block = bodies.create_block(self.read(*declared.BLOCK))
         bodies.note_likely_mistakes([block])
         return block
 
 
-@_with("mass", *declared.HELD)
+@_with("mass", *declared.SUPPORTS)
 class HeldOptions(BlockOptions):
     """Block with restraints."""
 
     def body(self) -> Body:
         """Return the block, with its restraints if any."""
-        given, block = self.given(), bodies.block_of(self.read(*declared.BLOCK))
+        given, block = self.given(), bodies.create_block(self.read(*declared.BLOCK))
         forces = [_made(declared.FORCES[name], text, name) for name in declared.FORCES for text in given.get(name, ())]
         for name, couple in declared.COUPLES.items():
             if name in given:
                 with _about(name):
                     forces.append(couple(INPUTS[name].read(given[name])))
         try:
-            body = bodies.body_of(block, self.read("restitution", "one_sided", "lean"), forces)
+            body = bodies.create_body(block, self.read("restitution", "one_sided", "lean"), forces)
         except InvalidBlock as wrong:
             if not forces or wrong.argument != "offset":
                 raise
@@ -153,7 +153,7 @@ class EnsembleOptions(HeldOptions):
         if self.ensemble is None:
             return {"blocks": self.body(), "model": model.model}
         if given := self.of_block():
-            raise InvalidBlock(f"{{}} has blocks of its own: leave {bodies.all_of(given)} out", "ensemble", *given)
+            raise InvalidBlock(f"{{}} has blocks of its own: leave {bodies.name_all(given)} out", "ensemble", *given)
         return ensemble_of(self.ensemble, model)
 
     def of_block(self) -> list[str]:
@@ -190,7 +190,7 @@ def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
             raise InvalidOption(sentence + literal(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
             raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
-        given[name] = value == "yes" if name in flags else bodies.quantity_of(name)(value, option)
+        given[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
     bodies.check_parameters(kind, given, "{}", option)
     with _about(option):
         return kind(**given)
@@ -208,7 +208,7 @@ class FileOptions(InputOptions):
         """Return the scaled motion of a record or pulse, with notes."""
         given, vertical = self.given(), self.given().get("vertical")
         # Mistakes in the options are reported before a long file is read.
-        target = scaling({n: given[n] for n in ("scale", "pga", "pgv", "sa") if n in given}, positive_acceleration)
+        target = read_scaling({n: given[n] for n in ("scale", "pga", "pgv", "sa") if n in given}, positive_acceleration)
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
@@ -262,7 +262,9 @@ class ReadRecords(NamedTuple):
 
 def refusal(name: str, error: RockingError) -> str:
     """Return why a record cannot be read, for the command line."""
-    reason = error.text(lambda argument: option_of(argument) if argument in ("channel", "dt", "units") else argument)
+    reason = error.text(
+        lambda argument: write_option_name(argument) if argument in ("channel", "dt", "units") else argument
+    )
     return reason if error.path == name else f"{name}: {reason}"
 
 
@@ -358,8 +360,12 @@ class MeasureOptions(IntensityOptions):
 
     def chosen(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        readers: Mapping[str, Quantity] = {"pga": positive_acceleration, "sa": positive_acceleration, "pgv": velocity}
-        levels = None if self.levels is None else values(self.levels, "levels", readers.get(self.measure, _ratio))
+        readers: Mapping[str, Quantity] = {
+            "pga": positive_acceleration,
+            "sa": positive_acceleration,
+            "pgv": read_velocity,
+        }
+        levels = None if self.levels is None else read_values(self.levels, "levels", readers.get(self.measure, _ratio))
         return {"measure": self.wanted, "levels": levels}
 
 
@@ -402,17 +408,17 @@ def labels_of(clusters: str | None) -> str | list[str] | None:
 
 def positive_acceleration(text: str, name: str) -> float:
     """Return a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
-    if not acceleration(text, name) > 0.0:
+    if not read_acceleration(text, name) > 0.0:
         raise InvalidOption(
             f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
         )
-    return noted_acceleration(text, name)
+    return read_noted_acceleration(text, name)
 
 
 def _ratio(text: str, name: str) -> float:
     """Return a level of a measure in the units of the block."""
     try:
-        return number(text, name)
+        return read_number(text, name)
     except InvalidOption:
         sentence = "{} takes plain numbers with this {}, which counts in the block's own units, not "
         raise InvalidOption(sentence + repr(text.strip()), name, "measure") from None
@@ -433,7 +439,7 @@ def parse_limit_states(text: str) -> dict[str, float]:
             why = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
             raise InvalidOption(f"{{}} {why}; name each limit state once, as half=0.5", "limit_states")
         try:
-            limits[name] = number(value, "limit_states") if given else math.inf
+            limits[name] = read_number(value, "limit_states") if given else math.inf
         except InvalidOption:
             raise InvalidOption(
                 f"{{}} {name} takes a number, not {value.strip()!r}", "limit_states", value=text

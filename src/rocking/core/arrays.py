@@ -11,22 +11,22 @@ Flags = NDArray[np.bool_]
 
 
 def as_asked(values: Floats) -> Floats:
-    """Return an array, or its number if it has no dimension."""
-    answer: Floats = values[()]
-    return answer
+    """Return a number for an array without dimensions, else the array."""
+    unwrapped: Floats = values[()]
+    return unwrapped
 
 
 def without_dust(values: ArrayLike, size: float) -> Floats:
-    """Return values with zeros in place of those at the rounding level of a size."""
+    """Replace values below the rounding error of a size by zero."""
     return np.where(np.abs(values) > 2.0**-40 * size, values, 0.0)
 
 
-def evenly(count: int, most: int) -> list[int]:
+def evenly(count: int, max_count: int) -> list[int]:
     """Return at most `most` of `count` positions, evenly from the first to the last."""
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(count, max_count))})
 
 
 def ranges(count: int, size: int) -> Iterator[slice]:
-    """Yield ranges of at most `size` that cover `count` items, because kernel calls cannot be interrupted."""
+    """Yield slices of at most `size` items, because kernel calls cannot be interrupted."""
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))

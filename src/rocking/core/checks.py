@@ -21,7 +21,7 @@ from rocking.core.arrays import Floats
 from rocking.errors import RockingError, literal
 
 #: Largest number of characters of a value in a message.
-_SHOWN: Final = 60
+_MAX_LENGTH: Final = 60
 
 
 class Error(Protocol):
@@ -33,7 +33,7 @@ class Error(Protocol):
 
 def number(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one real number (possibly not finite)."""
-    result = _real(value)
+    result = _convert_real(value)
     if result is None:
         raise error(f"{{}} must be a number, not {shown(value)}", name, value=value)
     return result
@@ -41,7 +41,7 @@ def number(value: object, name: str, error: Error) -> float:
 
 def finite(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one finite number."""
-    result = _real(value)
+    result = _convert_real(value)
     if result is None or not math.isfinite(result):
         raise error(f"{{}} must be a finite number, not {shown(value)}", name, value=value)
     return result
@@ -51,28 +51,32 @@ def positive(
     value: object, name: str, error: Error, unit: str = "", limits: tuple[float, float] = (0.0, math.inf)
 ) -> float:
     """Return `value` as a float, or raise `error` unless it is one positive finite number within its limits."""
-    result = _real(value)
+    result = _convert_real(value)
     if result is None or not (math.isfinite(result) and result > 0.0):
-        raise error(f"{{}} must be a positive number{_in(unit)}, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be a positive number{_format_unit(unit)}, not {shown(value)}", name, value=value)
     low, high = limits
     if not low <= result <= high:
         raise error(
-            f"{{}} must be a number from {low:g} to {high:g}{_in(unit)}, not {shown(result)}", name, value=result
+            f"{{}} must be a number from {low:g} to {high:g}{_format_unit(unit)}, not {shown(result)}",
+            name,
+            value=result,
         )
     return result
 
 
 def within(value: object, name: str, error: Error, low: float, high: float, unit: str = "") -> float:
     """Return `value` as a float, or raise `error` unless it is a number from `low` to `high` inclusive."""
-    result = _real(value)
+    result = _convert_real(value)
     if result is None or not low <= result <= high:
-        raise error(f"{{}} must be a number from {low:g} to {high:g}{_in(unit)}, not {shown(value)}", name, value=value)
+        raise error(
+            f"{{}} must be a number from {low:g} to {high:g}{_format_unit(unit)}, not {shown(value)}", name, value=value
+        )
     return result
 
 
 def share(value: object, name: str, error: Error, below: float = 1.0) -> float:
     """Return `value` as a float, or raise `error` unless it is a number above 0 and below `below`."""
-    result = _real(value)
+    result = _convert_real(value)
     if result is None or not 0.0 < result < below:
         raise error(f"{{}} must be a number between 0 and {below:g}, not {shown(value)}", name, value=value)
     return result
@@ -96,14 +100,14 @@ def increasing_pair(value: object, name: str, error: Error) -> tuple[float, floa
     return low, high
 
 
-def whole(value: object, name: str, error: Error, least: int, most: int | None = None) -> int:
+def whole(value: object, name: str, error: Error, minimum: int, maximum: int | None = None) -> int:
     """Return `value` as an int, or raise `error` unless it has an integer type and is within its bounds."""
-    single = _single(value)
-    usable = isinstance(single, Integral) and not isinstance(single, bool)
-    if not usable or not least <= single or not (most is None or single <= most):
-        bounds = f"of at least {least}" if most is None else f"from {least} to {most}"
+    item = _unwrap(value)
+    is_integer = isinstance(item, Integral) and not isinstance(item, bool)
+    if not is_integer or not minimum <= item or not (maximum is None or item <= maximum):
+        bounds = f"of at least {minimum}" if maximum is None else f"from {minimum} to {maximum}"
         raise error(f"{{}} must be a whole number {bounds}, not {shown(value)}", name, value=value)
-    return int(single)
+    return int(item)
 
 
 def text(value: object, name: str, error: Error) -> str:
@@ -143,12 +147,12 @@ def several(value: object, name: str, error: Error) -> list[Any]:
     return [*value]
 
 
-def grid_size(sizes: Mapping[str, int], error: Error, most: int = 10_000_000) -> None:
+def grid_size(sizes: Mapping[str, int], error: Error, max_points: int = 10_000_000) -> None:
     """Raise `error` if the product of the sizes of a grid's axes, by name, exceeds `most`."""
     points = math.prod(sizes.values())
-    if points > most:
+    if points > max_points:
         axes = " x ".join(f"{size} {name}" for name, size in sizes.items())
-        raise error(f"{axes} make a grid of {points:,} points; at most {most:,} can be computed: take fewer")
+        raise error(f"{axes} make a grid of {points:,} points; at most {max_points:,} can be computed: take fewer")
 
 
 def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
@@ -156,66 +160,66 @@ def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     if np.ma.is_masked(values):
         raise error("{} must be numbers throughout, but some are masked", name, value=values)
     try:
-        given = np.asarray(values)
-        if given.dtype.kind == "O":
-            given = np.reshape([number(value, name, error) for value in given.ravel()], given.shape)
+        array = np.asarray(values)
+        if array.dtype.kind == "O":
+            array = np.reshape([number(value, name, error) for value in array.ravel()], array.shape)
     except (TypeError, ValueError):
         raise error(f"{{}} must be a number or an array of numbers, not {shown(values)}", name, value=values) from None
-    if given.dtype.kind not in "iuf" and given.size:
+    if array.dtype.kind not in "iuf" and array.size:
         raise error(f"{{}} must be a number or an array of numbers, not {shown(values)}", name, value=values)
-    return np.asarray(given, dtype=np.float64)
+    return np.asarray(array, dtype=np.float64)
 
 
 def answers_or_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return real numbers, or truth values as 1 and 0, like `numbers`."""
     if np.ma.is_masked(values):
         raise error("{} must be given throughout, but some are masked", name, value=values)
-    given = np.asarray(values)
-    return given.astype(np.float64) if given.dtype.kind == "b" else numbers(values, name, error)
+    array = np.asarray(values)
+    return array.astype(np.float64) if array.dtype.kind == "b" else numbers(values, name, error)
 
 
 def positive_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return one or more positive finite numbers as a flat array, or raise `error`."""
-    axis = np.atleast_1d(numbers(values, name, error))
-    if axis.ndim != 1 or not axis.size or not np.all(np.isfinite(axis) & (axis > 0.0)):
+    array = np.atleast_1d(numbers(values, name, error))
+    if array.ndim != 1 or not array.size or not np.all(np.isfinite(array) & (array > 0.0)):
         raise error("{} must be one or more positive finite numbers", name, value=values)
-    return axis
+    return array
 
 
 def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return positive finite numbers in increasing order, or raise `error`."""
-    axis = positive_numbers(values, name, error)
-    if not np.all(np.diff(axis) > 0.0):
+    array = positive_numbers(values, name, error)
+    if not np.all(np.diff(array) > 0.0):
         raise error("{} must increase from one to the next", name, value=values)
-    return axis
+    return array
 
 
 def axis(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return finite, increasing numbers of an axis (one or more, of any sign), or raise `error`."""
-    found = np.atleast_1d(numbers(values, name, error))
-    if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found)) or np.any(np.diff(found) <= 0.0):
+    array = np.atleast_1d(numbers(values, name, error))
+    if array.ndim != 1 or array.size == 0 or not np.all(np.isfinite(array)) or np.any(np.diff(array) <= 0.0):
         raise error("{} must be increasing finite numbers", name, value=values)
-    return found
+    return array
 
 
 def shown(value: object) -> str:
     """Return a value for a message, in one line of limited length."""
     text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())
-    return literal(text if len(text) <= _SHOWN else f"{text[: _SHOWN - 10]}...{text[-7:]}")
+    return literal(text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH - 10]}...{text[-7:]}")
 
 
-def nearest(name: str, known: Iterable[str], likeness: float = 0.6) -> str | None:
+def nearest(name: str, known: Iterable[str], similarity: float = 0.6) -> str | None:
     """Return the known name that shares at least this fraction of its letters with `name`, or None."""
-    close = difflib.get_close_matches(name, [*known], n=1, cutoff=likeness)
-    return close[0] if close else None
+    matches = difflib.get_close_matches(name, [*known], n=1, cutoff=similarity)
+    return matches[0] if matches else None
 
 
-def meant(name: str, known: Iterable[str], otherwise: str = "", likeness: float = 0.6) -> str:
+def meant(name: str, known: Iterable[str], default: str = "", similarity: float = 0.6) -> str:
     """Return the end of a message about an unknown name: a similar known name, or another hint."""
-    found = nearest(name, known, likeness)
-    if found is None:
-        return otherwise
-    return f"did you mean {known[found] if isinstance(known, Mapping) else found}?"
+    similar = nearest(name, known, similarity)
+    if similar is None:
+        return default
+    return f"did you mean {known[similar] if isinstance(known, Mapping) else similar}?"
 
 
 def hint_of_degrees(angle: float) -> str:
@@ -230,21 +234,21 @@ def hint_of_percent(factor: float) -> str:
     return f"; if it is in per cent, give {factor / 100.0:g}" if 2.0 < factor <= 100.0 else ""
 
 
-def _real(value: object) -> float | None:
+def _convert_real(value: object) -> float | None:
     """Return a float (infinite if too large), or None for anything but one real number."""
-    single = _single(value)
-    if not isinstance(single, Real) or isinstance(single, bool):
+    item = _unwrap(value)
+    if not isinstance(item, Real) or isinstance(item, bool):
         return None
     try:
-        return float(single)
+        return float(item)
     except OverflowError:
         return math.inf
 
 
-def _single(value: object) -> Any:
+def _unwrap(value: object) -> Any:
     """Return the value, or the item of an array without dimensions."""
     return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
 
 
-def _in(unit: str) -> str:
+def _format_unit(unit: str) -> str:
     return f", in {unit}" if unit else ""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import rich.progress
 
 #: Shortest time before a bar is shown, s.
-_PATIENCE: Final = 1.0
+_DELAY: Final = 1.0
 
 #: Audience of notes: a person at a terminal, everybody, nobody.
 Audience = Literal["terminal", "everybody", "nobody"]
@@ -45,13 +45,13 @@ def spelled(message: Message) -> str:
 def note(message: Message | str) -> None:
     """Print a sentence on a line of stderr for the audience chosen by `notes_for`."""
     # The template of a sentence without argument names has no placeholders.
-    whole = message if isinstance(message, Message) else Message(message)
+    sentence = message if isinstance(message, Message) else Message(message)
     if _listener.seen is not None:
-        if whole in _listener.seen:
+        if sentence in _listener.seen:
             return
-        _listener.seen.add(whole)
+        _listener.seen.add(sentence)
     if _listener.audience == "everybody" or (_listener.audience == "terminal" and sys.stderr.isatty()):
-        print(f"rocking: note: {spelled(whole)}", file=sys.stderr)
+        print(f"rocking: note: {spelled(sentence)}", file=sys.stderr)
 
 
 @contextlib.contextmanager
@@ -59,22 +59,22 @@ def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[
     """Set audience of notes and spelling of arguments while a command runs, and show each note once."""
     global _listener
 
-    def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+    def show(message: Warning | str, category: type[Warning], *location: Any) -> None:
         if issubclass(category, OutsideFit):
             note(str(message))
         else:
-            shown(message, category, *place)
+            default_show(message, category, *location)
 
-    before = _listener
+    previous = _listener
     with warnings.catch_warnings():
-        shown = warnings.showwarning
+        default_show = warnings.showwarning
         warnings.simplefilter("always", OutsideFit)
         warnings.showwarning = show  # type: ignore[assignment]
         _listener = _Listener(audience, spelling, set())
         try:
             yield
         finally:
-            _listener = before
+            _listener = previous
 
 
 class Progress:
@@ -84,12 +84,12 @@ class Progress:
     already `done` do not count towards the rate.
     """
 
-    def __init__(self, what: str, total: int, *, done: int = 0) -> None:
-        self.what, self.total = what, total
+    def __init__(self, description: str, total: int, *, done: int = 0) -> None:
+        self.description, self.total = description, total
         show = progress_option()
         self._show = (_listener.audience != "nobody" and sys.stderr.isatty()) if show is None else show
         self._start = time.monotonic()
-        self._before = self.done = done
+        self._initially_done = self.done = done
         self._bar: rich.progress.Progress | None = None
 
     def __enter__(self) -> Progress:
@@ -105,29 +105,29 @@ class Progress:
 
     def note(self, text: str) -> None:
         """Show a few words after the description of the task."""
-        self.what = f"{self.what.partition(',')[0]}, {text}"
+        self.description = f"{self.description.partition(',')[0]}, {text}"
         if self._bar is not None:
-            self._bar.update(self._bar.task_ids[0], description=self.what)
+            self._bar.update(self._bar.task_ids[0], description=self.description)
 
     def advance(self, steps: int = 1) -> None:
         """Add completed steps."""
         self.done += steps
-        if not self._show or time.monotonic() - self._start < _PATIENCE:
+        if not self._show or time.monotonic() - self._start < _DELAY:
             return
         if self._bar is None:
-            self._bar = _started(self.what, self.total)
-        rate = (self.done - self._before) / (time.monotonic() - self._start)
-        left = f"{timedelta(seconds=round(max(self.total - self.done, 0) / rate))} left" if rate else ""
-        self._bar.update(self._bar.task_ids[0], completed=self.done, rate=f"{rate:.3g}/s", left=left)
+            self._bar = _start_bar(self.description, self.total)
+        rate = (self.done - self._initially_done) / (time.monotonic() - self._start)
+        remaining = f"{timedelta(seconds=round(max(self.total - self.done, 0) / rate))} left" if rate else ""
+        self._bar.update(self._bar.task_ids[0], completed=self.done, rate=f"{rate:.3g}/s", left=remaining)
 
 
-def _started(what: str, total: int) -> rich.progress.Progress:
+def _start_bar(description: str, total: int) -> rich.progress.Progress:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     texts = [TextColumn(f"{{task.{name}}}") for name in ("description", "fields[rate]", "fields[left]")]
     columns = (texts[0], BarColumn(), MofNCompleteColumn(), *texts[1:])
     bar = Progress(*columns, console=Console(stderr=True), transient=True)
-    bar.add_task(what, total=total, rate="", left="")
+    bar.add_task(description, total=total, rate="", left="")
     bar.start()
     return bar

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Rows of a table for display.
-_SHOWN = 12
+_MAX_ROWS = 12
 
 
 class Row(NamedTuple):
@@ -165,7 +165,7 @@ class Result(ABC):
         return f"<{type(self).__name__}: {self._headline()}>"
 
     def _repr_html_(self) -> str:
-        table = self.to_dataframe().to_html(max_rows=_SHOWN, index=False) if self.TABLES else ""
+        table = self.to_dataframe().to_html(max_rows=_MAX_ROWS, index=False) if self.TABLES else ""
         return f"<p><b>{type(self).__name__}</b>: {escape(self._headline())}</p>{table}"
 
 
@@ -213,22 +213,22 @@ class DatasetResult(Result):
                 "or take what is of each from `data`",
                 value=labels,
             )
-        wanted = {name: np.atleast_1d(values) for name, values in labels.items()}
+        selection = {name: np.atleast_1d(values) for name, values in labels.items()}
         data = self.data
         try:
-            for name, values in wanted.items():
+            for name, values in selection.items():
                 numeric = data[name].dtype.kind == "f"
-                at = checks.numbers(values, name, InvalidOption) if numeric else values
-                data = data.sel({name: at}, method="nearest" if numeric else None)
+                coordinate = checks.numbers(values, name, InvalidOption) if numeric else values
+                data = data.sel({name: coordinate}, method="nearest" if numeric else None)
         except (KeyError, TypeError, ValueError, IndexError):
             names = ", ".join(map(str, data.sizes))
             raise InvalidOption(
                 f"there is nothing at {checks.shown(labels)}; the dimensions are {names}", value=labels
             ) from None
-        return type(self)(self._kept_of(data))
+        return type(self)(self._restrict(data))
 
     @staticmethod
-    def _kept_of(data: xr.Dataset) -> xr.Dataset:
+    def _restrict(data: xr.Dataset) -> xr.Dataset:
         """Return the data of a part without variables that belong to another part."""
         return data
 
@@ -253,11 +253,11 @@ class DatasetResult(Result):
 
 def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: str = "") -> tuple[Any, Any, Any]:
     """Return a variable of a dataset: dimensions, values, and optional unit and meaning."""
-    return dims, values, {name: said for name, said in (("units", unit), ("long_name", meaning)) if said}
+    return dims, values, {name: text for name, text in (("units", unit), ("long_name", meaning)) if text}
 
 
 def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """Return a table of at most a dozen rows, evenly from first to last, with a remark if there are more."""
-    chosen = evenly(len(rows), _SHOWN)
-    table = text_table(header, [rows[k] for k in chosen])
-    return table if len(chosen) == len(rows) else f"{table}\n({len(chosen)} of {len(rows)} rows)"
+    indices = evenly(len(rows), _MAX_ROWS)
+    table = text_table(header, [rows[k] for k in indices])
+    return table if len(indices) == len(rows) else f"{table}\n({len(indices)} of {len(rows)} rows)"

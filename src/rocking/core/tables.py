@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-#: Wider than any table, so that none is wrapped or cut.
+#: Number of letters in a line, more than in any table.
 _WIDTH: Final = 100_000
 
-#: Rounding of a number after a few operations.
+#: Relative rounding error after a few operations.
 _ROUNDING: Final = 2.0**-50
 
-#: Number of letters of a unique name.
-_HASH: Final = 8
+#: Number of letters that make the name of a temporary file unique.
+_SUFFIX_LENGTH: Final = 8
 
 #: Number with a decimal comma and an optional unit.
-_WITH_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*[a-zA-Z°/%]*)")
+_DECIMAL_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*[a-zA-Z°/%]*)")
 
 
 class Column(NamedTuple):
@@ -114,12 +114,12 @@ def known_digits(
     low, high = interval
     width = high - low
     # Two digits of the width.
-    last = math.floor(math.log10(width)) - 1 if 0.0 < width < math.inf else math.inf
+    last_digit = math.floor(math.log10(width)) - 1 if 0.0 < width < math.inf else math.inf
 
     def text(number: float) -> str:
         if number == 0.0 or not math.isfinite(number):
             return "infinity" if math.isinf(number) else f"{number:g}"
-        digits = int(max(2, math.floor(math.log10(abs(number))) - last + 1))
+        digits = int(max(2, math.floor(math.log10(abs(number))) - last_digit + 1))
         return f"{float(f'{number:.{digits - 1}e}'):.{max(digits, 6)}g}"
 
     return within(value, bounds, text), f"{within(low, bounds, text)} to {within(high, bounds, text)}"
@@ -143,8 +143,8 @@ def as_written(text: str) -> str:
 
 def decimal(value: float) -> float:
     """Return a number without the rounding in its last digit, for display."""
-    written = float(f"{value:.12g}")
-    return written if abs(written - value) <= _ROUNDING * abs(value) else value
+    rounded = float(f"{value:.12g}")
+    return rounded if abs(rounded - value) <= _ROUNDING * abs(value) else value
 
 
 def frame_of(columns: Iterable[Column]) -> pd.DataFrame:
@@ -167,20 +167,20 @@ def text_of_columns(columns: Sequence[Column]) -> str:
     return text_table([column.label for column in labelled], [*rows])
 
 
-def columns_of(part: xr.Dataset) -> list[Column]:
+def columns_of(dataset: xr.Dataset) -> list[Column]:
     """Return dimensions, coordinates and variables of a dataset as columns, with a row for each point."""
     # A dimension without labels only numbers the rows.
-    rows = [] if len(part.dims) == 1 and not part.coords else [*part.dims]
-    frame = part.to_dataframe().reset_index()
-    names = dict.fromkeys([*rows, *part.coords, *part.data_vars])
-    return [Column(str(name), frame[name], part[name].attrs.get("units", "1")) for name in names]
+    rows = [] if len(dataset.dims) == 1 and not dataset.coords else [*dataset.dims]
+    frame = dataset.to_dataframe().reset_index()
+    names = dict.fromkeys([*rows, *dataset.coords, *dataset.data_vars])
+    return [Column(str(name), frame[name], dataset[name].attrs.get("units", "1")) for name in names]
 
 
-def columns_with_skipped(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> list[Column]:
+def columns_with_skipped(rows: Sequence[Mapping[str, Any]], skipped_records: Mapping[str, str]) -> list[Column]:
     """Return records as columns, with additional rows for unreadable records and the reason."""
     import pandas as pd
 
-    skipped = [{"record": record, "verdict": f"skipped: {reason}"} for record, reason in unread.items()]
+    skipped = [{"record": record, "verdict": f"skipped: {reason}"} for record, reason in skipped_records.items()]
     frame = pd.DataFrame([*rows, *skipped])
     for name in rows[0] if skipped else ():
         kinds = {type(row[name]) for row in rows}
@@ -205,12 +205,12 @@ def csv_rows(text: str) -> list[tuple[int, list[str]]]:
     rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(map(str.strip, row))]
     if not semicolons:
         return rows
-    return [(number, [_with_point(cell) for cell in row]) for number, row in rows]
+    return [(number, [_replace_comma(cell) for cell in row]) for number, row in rows]
 
 
-def _with_point(cell: str) -> str:
-    found = _WITH_COMMA.fullmatch(cell)
-    return f"{found[1]}.{found[2]}" if found else cell
+def _replace_comma(cell: str) -> str:
+    match = _DECIMAL_COMMA.fullmatch(cell)
+    return f"{match[1]}.{match[2]}" if match else cell
 
 
 def rows_of(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
@@ -244,26 +244,26 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     Devices and pipes are written directly. If writing fails, an `OutputError` contains the reason, and the previous
     content is unchanged.
     """
-    wanted = checks.path(path, "path of a file", OutputError)
+    destination = checks.path(path, "path of a file", OutputError)
     try:
-        if wanted.exists() and not wanted.is_file() and not wanted.is_dir():
-            yield wanted
+        if destination.exists() and not destination.is_file() and not destination.is_dir():
+            yield destination
             return
-        target = wanted.resolve()  # a link remains, and its target is replaced
+        target = destination.resolve()  # a link remains, and its target is replaced
         if not target.parent.is_dir():
             raise OutputError(
                 f"cannot be written: there is no folder {target.parent}; make it, or choose another", path=str(path)
             )
-        beside = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:_HASH]}.part{target.suffix}")
+        temporary = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:_SUFFIX_LENGTH]}.part{target.suffix}")
         try:
-            yield beside
-            with beside.open("rb+") as file:
+            yield temporary
+            with temporary.open("rb+") as file:
                 os.fsync(file.fileno())
             if target.exists():
-                shutil.copymode(target, beside)
-            beside.replace(target)
+                shutil.copymode(target, temporary)
+            temporary.replace(target)
         finally:
-            beside.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise OutputError(
@@ -278,8 +278,8 @@ def write_text(path: str | Path, text: str) -> None:
 
 def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
     """Write a binary file, completely or not at all."""
-    with whole_file(path) as beside:
-        beside.write_bytes(content)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, *, index: bool = False, digits: str | None = "%.15g") -> None:
@@ -293,9 +293,9 @@ def write_excel(path: str | Path, sheets: Mapping[str, pd.DataFrame]) -> None:
 
     content = io.BytesIO()
     try:
-        with pd.ExcelWriter(content, engine="openpyxl") as book:
+        with pd.ExcelWriter(content, engine="openpyxl") as workbook:
             for name, frame in sheets.items():
-                frame.to_excel(book, sheet_name=name, freeze_panes=(1, 0), index=False, float_format="%.15g")
+                frame.to_excel(workbook, sheet_name=name, freeze_panes=(1, 0), index=False, float_format="%.15g")
     except ImportError:
         raise InvalidOption(f"a workbook needs openpyxl: {install('excel')}, or write CSV") from None
     write_bytes(path, content.getvalue())
@@ -310,6 +310,6 @@ def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
 
 def write_figure(path: str | Path, figure: Figure, **options: Any) -> None:
     """Write a figure in the suffix's format, completely or not at all, with options of its ``savefig``."""
-    drawn = io.BytesIO()
-    figure.savefig(drawn, format=Path(path).suffix.removeprefix("."), **options)
-    write_bytes(path, drawn.getvalue())
+    content = io.BytesIO()
+    figure.savefig(content, format=Path(path).suffix.removeprefix("."), **options)
+    write_bytes(path, content.getvalue())

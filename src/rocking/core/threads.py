@@ -1,4 +1,4 @@
-"""Parallel work on many items in threads that stops cleanly when interrupted."""
+"""Parallel computation in threads that stops cleanly on an interrupt."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from rocking.core import checks
 from rocking.errors import InvalidOption
 
 Item = TypeVar("Item")
-Found = TypeVar("Found")
+Output = TypeVar("Output")
 
 #: Items per thread that are submitted ahead of the oldest pending result.
-AHEAD: Final = 16
+LOOKAHEAD: Final = 16
 
 
 class _Options(NamedTuple):
@@ -68,7 +68,7 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
     def __init__(self, *, threads: int | None = None, progress: bool | None = None) -> None:
         before = _options.get(_DEFAULT)
         if threads is not None:
-            threads = checks.whole(threads, "threads", InvalidOption, least=1)
+            threads = checks.whole(threads, "threads", InvalidOption, minimum=1)
         if progress is not None:
             progress = checks.flag(progress, "progress", InvalidOption)
         self._token = _options.set(
@@ -98,11 +98,11 @@ def cores() -> int:
 
 
 def in_threads(
-    work: Callable[[Item], Found],
+    function: Callable[[Item], Output],
     items: Iterable[Item],
     *,
     cancelled: threading.Event | None = None,
-) -> Iterator[Found]:
+) -> Iterator[Output]:
     """Yield the results of some work on each item, in order, from the number of threads in `set_options`.
 
     Items are consumed as needed, some per thread ahead of the results. The first of several failed items determines the
@@ -111,14 +111,14 @@ def in_threads(
     """
     count = min(thread_count(), len(items) if isinstance(items, Sized) else 2**16)
     if count < 2:
-        yield from map(work, items)
+        yield from map(function, items)
         return
-    left, pending = iter(items), deque[Future[Found]]()
+    remaining, pending = iter(items), deque[Future[Output]]()
     pool = ThreadPoolExecutor(count)
     try:
         while True:
-            for item in itertools.islice(left, AHEAD * count - len(pending)):
-                pending.append(pool.submit(work, item))
+            for item in itertools.islice(remaining, LOOKAHEAD * count - len(pending)):
+                pending.append(pool.submit(function, item))
             if not pending:
                 return
             yield pending.popleft().result()

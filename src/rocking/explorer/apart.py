@@ -25,66 +25,68 @@ if TYPE_CHECKING:
     from rocking.solid.mesh import Mesh
 
 #: Maximum number of triangles of a mesh; about six seconds of work.
-MOST_TRIANGLES: Final = 500_000
+MAX_TRIANGLES: Final = 500_000
 
 #: Limits of the process: processor time, s, memory, bytes, and waiting time, s.
-_SECONDS: Final = 20
-_MEMORY: Final = 2 * 2**30
-_PATIENCE: Final = 60.0
+_MAX_TIME: Final = 20
+_MAX_MEMORY: Final = 2 * 2**30
+_MAX_WAIT: Final = 60.0
 
 #: Libraries that would allocate memory for every processor.
-_ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_THREAD_COUNTS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 #: Arguments of `rocking.Solid`, and the sections of its outline.
-Made = tuple[dict[str, Any], Sections]
+SolidParts = tuple[dict[str, Any], Sections]
 
 
-def made_here(mesh: Mesh, options: Mapping[str, Any]) -> Made:
-    """Read a mesh of up to `MOST_TRIANGLES` triangles with arguments of `rocking.Solid.from_mesh`."""
-    given = {"density": None, "support": None, "tolerance": None, "up": None, "unit": "m", "turn": 0.0, **options}
-    made, surfaces = compute_properties(mesh, **given, max_faces=MOST_TRIANGLES)
-    return made, compute_sections(surfaces)
+def read_mesh(mesh: Mesh, options: Mapping[str, Any]) -> SolidParts:
+    """Read a mesh of up to `MAX_TRIANGLES` triangles with arguments of `rocking.Solid.from_mesh`."""
+    arguments = {"density": None, "support": None, "tolerance": None, "up": None, "unit": "m", "turn": 0.0, **options}
+    parts, surfaces = compute_properties(mesh, **arguments, max_faces=MAX_TRIANGLES)
+    return parts, compute_sections(surfaces)
 
 
-def made_apart(name: str, data: bytes, options: Mapping[str, Any]) -> Made:
+def read_mesh_in_process(name: str, data: bytes, options: Mapping[str, Any]) -> SolidParts:
     """Read the content of a file in a process with limited time and memory."""
     head = json.dumps({"name": name, "options": dict(options)}).encode()
-    places = os.pathsep.join(each for each in sys.path if each)
-    environment = {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONPATH": places}
-    command, sent = [sys.executable, "-P", "-m", __name__], head + b"\n" + data
+    search_path = os.pathsep.join(path for path in sys.path if path)
+    environment = {**os.environ, **dict.fromkeys(_THREAD_COUNTS, "1"), "PYTHONPATH": search_path}
+    command, request = [sys.executable, "-P", "-m", __name__], head + b"\n" + data
     try:
-        done = subprocess.run(command, input=sent, capture_output=True, timeout=_PATIENCE, env=environment, check=True)
+        process = subprocess.run(
+            command, input=request, capture_output=True, timeout=_MAX_WAIT, env=environment, check=True
+        )
     except subprocess.SubprocessError:
-        limits = f"{_SECONDS} s or {_MEMORY // 2**30} GiB"
-        sentence = f"takes more than {limits} to read: make the mesh coarser, or use it in Python"
+        allowed = f"{_MAX_TIME} s or {_MAX_MEMORY // 2**30} GiB"
+        sentence = f"takes more than {allowed} to read: make the mesh coarser, or use it in Python"
         raise InvalidBlock(sentence, path=name) from None
-    return made_of(done.stdout)
+    return decode_answer(process.stdout)
 
 
-def made_of(answer: str | bytes) -> Made:
+def decode_answer(output: str | bytes) -> SolidParts:
     """Decode the answer of the process."""
-    found = json.loads(answer)
-    if "error" in found:
-        kind, template, arguments, path = found["error"]
+    answer = json.loads(output)
+    if "error" in answer:
+        kind, template, arguments, path = answer["error"]
         raise getattr(errors, kind)(template, *arguments, path=path)
-    made = found["made"]
-    arrays = {each: np.array(made[each]) for each in ("support", "centre", "inertia_over_mass")}
-    regions = [Region(*each) for each in made["regions"]]
-    hulls = tuple(np.array(corners) for corners in found["hulls"])
-    return {**made, **arrays, "regions": regions}, Sections(np.array(found["heights"]), hulls)
+    parts = answer["made"]
+    arrays = {name: np.array(parts[name]) for name in ("support", "centre", "inertia_over_mass")}
+    regions = [Region(*region) for region in parts["regions"]]
+    hulls = tuple(np.array(corners) for corners in answer["hulls"])
+    return {**parts, **arrays, "regions": regions}, Sections(np.array(answer["heights"]), hulls)
 
 
-def answered(data: bytes) -> dict[str, Any]:
-    """Decode the input from `made_apart`, read the mesh, and return the result."""
+def answer_request(data: bytes) -> dict[str, Any]:
+    """Decode the input from `read_mesh_in_process`, read the mesh, and return the result."""
     head, _, content = data.partition(b"\n")
-    asked = json.loads(head)
+    request = json.loads(head)
     stream = io.BytesIO(content)
-    stream.name = asked["name"]
+    stream.name = request["name"]
     try:
-        made, sections = made_here(stream, asked["options"])
+        parts, sections = read_mesh(stream, request["options"])
     except RockingError as error:
         return {"error": [type(error).__name__, error.message.template, error.message.arguments, error.path]}
-    plain = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in made.items()}
+    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in parts.items()}
     hulls = [np.round(corners, 6).tolist() for corners in sections.hulls]
     return {"made": plain, "heights": sections.heights.tolist(), "hulls": hulls}
 
@@ -95,17 +97,17 @@ def _limit_this_process() -> None:
         import resource
     except ImportError:  # Windows
         return
-    for kind, soft, hard in (
-        (resource.RLIMIT_AS, _MEMORY, _MEMORY),
-        (resource.RLIMIT_CPU, _SECONDS, _SECONDS + 1),
+    for resource_kind, soft, hard in (
+        (resource.RLIMIT_AS, _MAX_MEMORY, _MAX_MEMORY),
+        (resource.RLIMIT_CPU, _MAX_TIME, _MAX_TIME + 1),
         (resource.RLIMIT_CORE, 0, 0),
     ):
         # A lower limit may be set already, and macOS rejects limits of memory.
         with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(kind, (soft, hard))
+            resource.setrlimit(resource_kind, (soft, hard))
 
 
 if __name__ == "__main__":
     _limit_this_process()
-    out, sys.stdout = sys.stdout, sys.stderr
-    json.dump(answered(sys.stdin.buffer.read()), out)
+    output, sys.stdout = sys.stdout, sys.stderr
+    json.dump(answer_request(sys.stdin.buffer.read()), output)

@@ -49,11 +49,11 @@ LOOPBACK: Final = ("127.0.0.1", "localhost", "[::1]")
 EXCHANGE: Final = "/api/secret"
 
 #: Maximum number of unopened links.
-_LINKS: Final = 100
+_MAX_LINKS: Final = 100
 
-_READING: Final = ("GET", "HEAD")
+_READ_METHODS: Final = ("GET", "HEAD")
 
-_UNKNOWN: Final = (
+_LINK_REQUIRED: Final = (
     "this page needs the link that rocking explore printed, which opens once in one browser: open that link, or start "
     "rocking explore again; in a notebook, run the cell again"
 )
@@ -76,7 +76,7 @@ class RequestAuthentication:
         """Return a token that opens the page once."""
         token = secrets.token_urlsafe(32)
         with self._lock:
-            self._tokens = [*self._tokens[-_LINKS + 1 :], token]
+            self._tokens = [*self._tokens[-_MAX_LINKS + 1 :], token]
         return token
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -85,36 +85,36 @@ class RequestAuthentication:
             await self._application(scope, receive, send)
         elif scope["type"] != "http":
             await send({"type": "websocket.close", "code": 1008})
-        elif (refused := self._refused(scope)) is not None:
-            await _answer(send, *refused)
+        elif (refusal := self._find_refusal(scope)) is not None:
+            await _respond(send, *refusal)
         elif scope["path"] == EXCHANGE and scope["method"] == "POST":
-            await _answer(send, *((200, self._secret) if self._redeemed(_bearer(scope)) else (403, _UNKNOWN)))
-        elif hmac.compare_digest(_bearer(scope), self._secret.encode()) or _is_public(scope):
+            await _respond(send, *((200, self._secret) if self._redeem(_read_bearer(scope)) else (403, _LINK_REQUIRED)))
+        elif hmac.compare_digest(_read_bearer(scope), self._secret.encode()) or _is_public(scope):
             await self._application(scope, receive, send)
         else:
-            await _answer(send, 403, _UNKNOWN)
+            await _respond(send, 403, _LINK_REQUIRED)
 
-    def _refused(self, scope: Scope) -> tuple[int, str] | None:
+    def _find_refusal(self, scope: Scope) -> tuple[int, str] | None:
         """Return status and reason if the request names another server or comes from another page."""
-        hosts = _values(scope, b"host")
+        hosts = _read_headers(scope, b"host")
         if len(hosts) != 1 or hosts[0] not in self._hosts:
             return 421, "this address is not served here: open the link that rocking explore printed"
-        origins, sites = _values(scope, b"origin"), _values(scope, b"sec-fetch-site")
-        ours = [b"http://" + hosts[0]]
-        if scope["method"] in _READING:
+        origins, sites = _read_headers(scope, b"origin"), _read_headers(scope, b"sec-fetch-site")
+        own_origins = [b"http://" + hosts[0]]
+        if scope["method"] in _READ_METHODS:
             # Links may lead here from anywhere, but resources must be loaded by this page.
-            navigates = _values(scope, b"sec-fetch-mode") == [b"navigate"]
-            own = origins in ([], ours) and (navigates or sites in ([], [b"same-origin"], [b"none"]))
+            navigates = _read_headers(scope, b"sec-fetch-mode") == [b"navigate"]
+            is_allowed = origins in ([], own_origins) and (navigates or sites in ([], [b"same-origin"], [b"none"]))
         else:
-            own = origins == ours or (origins == [] and sites == [b"same-origin"])
-        return None if own else (403, "only the page of this server may send this")
+            is_allowed = origins == own_origins or (origins == [] and sites == [b"same-origin"])
+        return None if is_allowed else (403, "only the page of this server may send this")
 
-    def _redeemed(self, token: bytes) -> bool:
+    def _redeem(self, token: bytes) -> bool:
         """Whether a token is valid and unused, and mark it as used."""
         with self._lock:
-            for known in self._tokens:
-                if hmac.compare_digest(known.encode(), token):
-                    self._tokens.remove(known)
+            for valid_token in self._tokens:
+                if hmac.compare_digest(valid_token.encode(), token):
+                    self._tokens.remove(valid_token)
                     return True
         return False
 
@@ -122,21 +122,21 @@ class RequestAuthentication:
 def _is_public(scope: Scope) -> bool:
     """Whether a request only reads the page or one of its files."""
     path = scope["path"]
-    return scope["method"] in _READING and (path == "/" or path.startswith(("/page/", "/library/")))
+    return scope["method"] in _READ_METHODS and (path == "/" or path.startswith(("/page/", "/library/")))
 
 
-def _bearer(scope: Scope) -> bytes:
+def _read_bearer(scope: Scope) -> bytes:
     """Return the content of a single Authorization header; empty if there is none or several."""
-    values = _values(scope, b"authorization")
-    scheme, _, carried = values[0].partition(b" ") if len(values) == 1 else (b"", b"", b"")
-    return carried if scheme == b"Bearer" else b""
+    values = _read_headers(scope, b"authorization")
+    scheme, _, credentials = values[0].partition(b" ") if len(values) == 1 else (b"", b"", b"")
+    return credentials if scheme == b"Bearer" else b""
 
 
-def _values(scope: Scope, name: bytes) -> list[bytes]:
+def _read_headers(scope: Scope, name: bytes) -> list[bytes]:
     return [bytes(value) for key, value in scope["headers"] if key.lower() == name]
 
 
-async def _answer(send: Send, status: int, text: str) -> None:
+async def _respond(send: Send, status: int, text: str) -> None:
     body = text.encode()
     headers = [
         (b"content-type", b"text/plain; charset=utf-8"),

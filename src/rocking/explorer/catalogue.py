@@ -13,224 +13,234 @@ from urllib.parse import parse_qsl
 from rocking import records
 from rocking.analysis.levels import numbered
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer.parameters import PARAMETERS, Texts, field_label, names_of
-from rocking.explorer.uploads import UploadStore, measures
+from rocking.explorer.parameters import PARAMETERS, Texts, field_label, list_names
+from rocking.explorer.uploads import UploadStore, compute_measures
 
 #: Maximum number of entries and letters of a list in an address: forty records of two components, and as many again.
-MOST: Final = 160
-_LETTERS: Final = 40_000
+MAX_ENTRIES: Final = 160
+_MAX_LETTERS: Final = 40_000
 
 #: Names of components at the end of a file's name or of a channel: azimuths, directions, instrument codes.
-_UP: Final = r"up|ud[12]?|dwn|down|vrt|vert(?:ical)?|u-d|[behls][hln]z|z|v"
-_LEVEL: Final = r"ns[12]?|ew[12]?|n-s|e-w|[behls][hln][ne123xy]|[nexy]|[nsew]\d{1,3}[nsew]|h[12]|[0-3]\d\d"
+_VERTICAL_NAMES: Final = r"up|ud[12]?|dwn|down|vrt|vert(?:ical)?|u-d|[behls][hln]z|z|v"
+_HORIZONTAL_NAMES: Final = r"ns[12]?|ew[12]?|n-s|e-w|[behls][hln][ne123xy]|[nexy]|[nsew]\d{1,3}[nsew]|h[12]|[0-3]\d\d"
 _COMPONENT: Final = re.compile(
-    rf"(?i)(?:^|[-_. ]|(?<=[a-z])(?=\d\d\d))(?:(?P<up>{_UP})|(?P<level>{_LEVEL}))(?: ?deg)?$"
+    rf"(?i)(?:^|[-_. ]|(?<=[a-z])(?=\d\d\d))(?:(?P<up>{_VERTICAL_NAMES})|(?P<level>{_HORIZONTAL_NAMES}))(?: ?deg)?$"
 )
 
 #: Sensor number in a component name, and its heading: KiK-net has one sensor in a borehole, 1, and one at the surface,
 #: 2, each with three components.
 _SENSOR: Final = re.compile(r"(?i)(?:ns|ew|ud)([12])$")
-_DEEP: Final = " borehole"
+_BOREHOLE_SUFFIX: Final = " borehole"
 
 
 @dataclass
 class Component:
-    """Row of the list: texts that make it the case's motion, its name, and its known properties."""
+    """Row of the list: a horizontal or vertical component of a record."""
 
-    texts: Texts
+    texts: Texts  # that select it as the motion of a case
     title: str
-    label: str
+    label: str  # of the component
     is_up: bool
     measures: Mapping[str, float] | None
     event: str = ""
     station: str = ""
-    stem: str = ""
-    sensor: str = ""
+    stem: str = ""  # of the file's name, without the component
+    sensor: str = ""  # number
     samples: int = 0
-    step: float | None = None
-    key: str = ""
-    file: str = ""
-    missing: list[str] = field(default_factory=list)
-    choices: Mapping[str, Any] = field(default_factory=dict)
-    vertical: str = ""
+    step: float | None = None  # s
+    key: str = ""  # of an uploaded file
+    file: str = ""  # name of this file
+    missing: list[str] = field(default_factory=list)  # metadata
+    choices: Mapping[str, Any] = field(default_factory=dict)  # of the missing metadata
+    vertical: str = ""  # text that adds its vertical component
 
-    def described(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, Any]:
         """Return the fields that the page shows."""
         names = ("texts", "title", "label", "is_up", "measures", "key", "file", "missing", "choices", "vertical")
         return {name: getattr(self, name) for name in names}
 
 
-def entries_of(text: str) -> list[dict[str, str]]:
+def read_entries(text: str) -> list[dict[str, str]]:
     """Read a list from an address: entries separated by ;, each the texts of a motion as a query.
 
     Examples
     --------
-    >>> entries_of("motion=ridgecrest-clc-090&vertical=ridgecrest-clc-up;motion=ridgecrest-clc-360")
+    >>> read_entries("motion=ridgecrest-clc-090&vertical=ridgecrest-clc-up;motion=ridgecrest-clc-360")
     [{'motion': 'ridgecrest-clc-090', 'vertical': 'ridgecrest-clc-up'}, {'motion': 'ridgecrest-clc-360'}]
     """
     parts = [part for part in text.split(";") if part]
-    if len(text) > _LETTERS or len(parts) > MOST:
+    if len(text) > _MAX_LETTERS or len(parts) > MAX_ENTRIES:
         raise InvalidOption(
-            f"a list of {{}} has {MOST} entries and {_LETTERS} letters at most: take some out", "records"
+            f"a list of {{}} has {MAX_ENTRIES} entries and {_MAX_LETTERS} letters at most: take some out", "records"
         )
-    found = [dict(parse_qsl(part)) for part in parts]
-    wrong = {name for entry in found for name in entry.keys() - {*names_of("motion"), "key"}}
-    if wrong:
+    entries = [dict(parse_qsl(part)) for part in parts]
+    unknown_names = {name for entry in entries for name in entry.keys() - {*list_names("motion"), "key"}}
+    if unknown_names:
         raise InvalidOption(
-            f"an entry of the list of {{}} has {', '.join(names_of('motion'))}, not {min(wrong)[:20]!r}",
+            f"an entry of the list of {{}} has {', '.join(list_names('motion'))}, not {min(unknown_names)[:20]!r}",
             "records",
             value=text,
         )
-    return found
+    return entries
 
 
-def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, Any]:
+def list_records(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, Any]:
     """Return all records grouped by station; ``answers`` contains ``dt`` and ``units`` by the key of a file."""
-    known = {answer["key"]: answer for answer in answers if "key" in answer}
-    files, problems = [], {}
-    for key in uploads.kept():
+    answers_by_key = {answer["key"]: answer for answer in answers if "key" in answer}
+    components, problems = [], {}
+    for key in uploads.list_records():
         try:
-            files += _of_file(uploads, key, known.get(key, {}))
+            components += _list_channels(uploads, key, answers_by_key.get(key, {}))
         except RockingError as error:
             problems[key] = ("" if error.path else f"{uploads.file(key).name}: ") + error.text(field_label)
-            files += _of_file(uploads, key, {})
-    groups = [_described(group, "") for group in _by_station(_shipped())]
-    for group in _by_station(files):
-        wrong = [problems[each.key] for each in group if each.key in problems]
-        groups.append(_described(group, " ".join(wrong)))
+            components += _list_channels(uploads, key, {})
+    groups = [_describe_group(group, "") for group in _group_by_station(_list_shipped())]
+    for group in _group_by_station(components):
+        messages = [problems[component.key] for component in group if component.key in problems]
+        groups.append(_describe_group(group, " ".join(messages)))
     return {"groups": groups, "usage": uploads.usage()}
 
 
-def clusters_of(entries: list[dict[str, str]], uploads: UploadStore) -> list[int]:
+def number_stations(entries: list[dict[str, str]], uploads: UploadStore) -> list[int]:
     """Return a number for each entry, equal for components that the list assigns to one station."""
     files = {entry["motion"].partition(":")[2]: entry for entry in entries if entry["motion"].startswith("file:")}
-    components = [each for key, entry in files.items() for each in _of_file(uploads, key, entry)]
-    homes: dict[tuple[str, str | None], object] = {}
-    for group in [*_by_station(_shipped()), *_by_station(components)]:
-        for each in group:
-            names = (each.event, each.station) if each.station else (group[0].key, group[0].texts.get("channel"))
-            homes[each.texts["motion"], each.texts.get("channel")] = names
-    places = [(entry["motion"], entry.get("channel")) for entry in entries]
-    return [*map(int, numbered([homes.get(place, place) for place in places]))]
+    components = [component for key, entry in files.items() for component in _list_channels(uploads, key, entry)]
+    station_labels: dict[tuple[str, str | None], object] = {}
+    for group in [*_group_by_station(_list_shipped()), *_group_by_station(components)]:
+        for row in group:
+            label = (row.event, row.station) if row.station else (group[0].key, group[0].texts.get("channel"))
+            station_labels[row.texts["motion"], row.texts.get("channel")] = label
+    record_keys = [(entry["motion"], entry.get("channel")) for entry in entries]
+    return [*map(int, numbered([station_labels.get(key, key) for key in record_keys]))]
 
 
-def title_of(texts: Texts, uploads: UploadStore) -> str:
+def find_title(texts: Texts, uploads: UploadStore) -> str:
     """Return the title of an entry's record in the list."""
     name, _, key = texts.get("motion", "").partition(":")
     if name != "file":
         return records.info(name).title if name in records.names() else texts.get("motion", "")
-    file = uploads.contents(key, PARAMETERS["dt"].read(texts["dt"]) if "dt" in texts else None, texts.get("units"))
+    file = uploads.describe_file(key, PARAMETERS["dt"].read(texts["dt"]) if "dt" in texts else None, texts.get("units"))
     channels = file["channels"]
-    chosen = [each for each in channels if str(each["number"]) == texts.get("channel")] if len(channels) > 1 else []
-    return f"{file['name']}, {chosen[0]['name']}" if chosen else str(file["name"])
+    selected = (
+        [channel for channel in channels if str(channel["number"]) == texts.get("channel")] if len(channels) > 1 else []
+    )
+    return f"{file['name']}, {selected[0]['name']}" if selected else str(file["name"])
 
 
 @functools.cache
-def _shipped() -> tuple[Component, ...]:
-    found = []
+def _list_shipped() -> tuple[Component, ...]:
+    components = []
     for name in records.names():
         record = records.info(name)
-        place, up = record.title.rpartition(", ")[0], record.direction == "up"
+        station, is_up = record.title.rpartition(", ")[0], record.direction == "up"
         texts, stem = {"motion": name}, name.rpartition("-")[0]
-        known = measures(records.load(name))
-        found.append(Component(texts, record.title, record.direction, up, known, station=place, stem=stem))
-    return tuple(found)
+        record_measures = compute_measures(records.load(name))
+        components.append(
+            Component(texts, record.title, record.direction, is_up, record_measures, station=station, stem=stem)
+        )
+    return tuple(components)
 
 
-def _of_file(uploads: UploadStore, key: str, answer: Texts) -> list[Component]:
+def _list_channels(uploads: UploadStore, key: str, answers: Texts) -> list[Component]:
     """Return the channels of a file, read with the user's answers."""
-    dt = PARAMETERS["dt"].read(answer["dt"]) if answer.get("dt") else None
-    given = {name: answer[name] for name in ("dt", "units") if answer.get(name)}
-    told = uploads.contents(key, dt, answer.get("units") or None)
-    needed = uploads.contents(key)["missing"]
-    name, several = told["name"], len(told["channels"]) > 1
-    found = []
-    for each in told["channels"]:
-        texts = {"motion": f"file:{key}"} | ({"channel": str(each["number"])} if several else {})
-        texts |= {one: given[one] for one in needed if one in given}
-        stem, label, is_up, sensor = _parted(name, each["name"], each["azimuth"], several)
-        found.append(
+    dt = PARAMETERS["dt"].read(answers["dt"]) if answers.get("dt") else None
+    known = {name: answers[name] for name in ("dt", "units") if answers.get(name)}
+    contents = uploads.describe_file(key, dt, answers.get("units") or None)
+    missing = uploads.describe_file(key)["missing"]
+    name, has_many = contents["name"], len(contents["channels"]) > 1
+    components = []
+    for channel in contents["channels"]:
+        texts = {"motion": f"file:{key}"} | ({"channel": str(channel["number"])} if has_many else {})
+        texts |= {argument: known[argument] for argument in missing if argument in known}
+        stem, label, is_up, sensor = _split_component_name(name, channel["name"], channel["azimuth"], has_many)
+        components.append(
             Component(
                 texts,
-                f"{name}, {each['name']}" if several else name,
+                f"{name}, {channel['name']}" if has_many else name,
                 label,
                 is_up,
-                **{fact: each[fact] for fact in ("measures", "event", "station", "samples", "step", "choices")},
-                stem=key if several else stem,
+                **{field: channel[field] for field in ("measures", "event", "station", "samples", "step", "choices")},
+                stem=key if has_many else stem,
                 sensor=sensor,
                 key=key,
                 file=name,
-                missing=told["missing"],
+                missing=contents["missing"],
             )
         )
-    return found
+    return components
 
 
-def _parted(name: str, channel: str, azimuth: float | None, several: bool) -> tuple[str, str, bool, str]:
+def _split_component_name(name: str, channel: str, azimuth: float | None, has_many: bool) -> tuple[str, str, bool, str]:
     """Return a file's name without its component, the component's label, whether it is vertical, and its sensor."""
     path = PurePath(name)
-    whole = path.stem
-    found = None
-    for text in (path.suffix.removeprefix("."), whole):
-        found = found or (_COMPONENT.search(text) if not several else None)
-    stem = whole[: found.start()] if found is not None and found.string == whole else whole
-    said = _COMPONENT.search(channel.strip().removesuffix(_DEEP))
-    up = azimuth is None and any(each is not None and each["up"] for each in (said, found))
-    label = channel if found is None or azimuth is not None else found[0].strip("-_. ")
-    number = _SENSOR.search(found[0]) if found is not None else None
-    sensor = "1" if channel.endswith(_DEEP) else "" if number is None else number[1]
-    return stem.lower(), label, up, sensor
+    full_stem = path.stem
+    match = None
+    for candidate in (path.suffix.removeprefix("."), full_stem):
+        match = match or (_COMPONENT.search(candidate) if not has_many else None)
+    stem = full_stem[: match.start()] if match is not None and match.string == full_stem else full_stem
+    channel_match = _COMPONENT.search(channel.strip().removesuffix(_BOREHOLE_SUFFIX))
+    is_up = azimuth is None and any(m is not None and m["up"] for m in (channel_match, match))
+    label = channel if match is None or azimuth is not None else match[0].strip("-_. ")
+    number = _SENSOR.search(match[0]) if match is not None else None
+    sensor = "1" if channel.endswith(_BOREHOLE_SUFFIX) else "" if number is None else number[1]
+    return stem.lower(), label, is_up, sensor
 
 
-def _by_station(components: Iterable[Component]) -> list[list[Component]]:
+def _group_by_station(components: Iterable[Component]) -> list[list[Component]]:
     """Group the components of one sensor: up to two horizontal ones, followed by a vertical one."""
     groups: list[list[Component]] = []
-    for each in components:
-        home = next((group for group in groups if _belongs(each, group)), None)
-        if home is None:
-            groups.append([each])
+    for component in components:
+        home_group = next((group for group in groups if _belongs_to(component, group)), None)
+        if home_group is None:
+            groups.append([component])
         else:
-            home.append(each)
+            home_group.append(component)
     for group in groups:
-        group.sort(key=lambda each: each.is_up)
-        upward = next((each for each in group if each.is_up), None)
-        for each in group:
-            if upward is not None and not each.is_up:
-                each.vertical = _as_vertical(upward, each)
+        group.sort(key=lambda component: component.is_up)
+        vertical = next((component for component in group if component.is_up), None)
+        for component in group:
+            if vertical is not None and not component.is_up:
+                component.vertical = _write_vertical(vertical, component)
     return groups
 
 
-def _belongs(one: Component, group: list[Component]) -> bool:
+def _belongs_to(row: Component, group: list[Component]) -> bool:
     """Whether a component belongs to a group."""
     first = group[0]
-    if bool(one.key) != bool(first.key) or sum(each.is_up == one.is_up for each in group) >= (1 if one.is_up else 2):
-        return False
-    if not one.key or one.key == first.key:
-        return one.stem == first.stem
-    if (
-        one.sensor != first.sensor
-        or one.missing != first.missing
-        or one.step != first.step
-        or any(each.key == one.key for each in group)
+    if bool(row.key) != bool(first.key) or sum(member.is_up == row.is_up for member in group) >= (
+        1 if row.is_up else 2
     ):
         return False
-    if abs(one.samples - first.samples) > 0.01 * max(one.samples, first.samples):
+    if not row.key or row.key == first.key:
+        return row.stem == first.stem
+    if (
+        row.sensor != first.sensor
+        or row.missing != first.missing
+        or row.step != first.step
+        or any(member.key == row.key for member in group)
+    ):
         return False
-    if one.station and first.station and (one.station, one.event) != (first.station, first.event):
+    if abs(row.samples - first.samples) > 0.01 * max(row.samples, first.samples):
         return False
-    heads = bool(one.station) and (one.station, one.event) == (first.station, first.event)
-    return heads or (bool(one.stem) and one.stem == first.stem and one.label != first.label)
+    if row.station and first.station and (row.station, row.event) != (first.station, first.event):
+        return False
+    heads = bool(row.station) and (row.station, row.event) == (first.station, first.event)
+    return heads or (bool(row.stem) and row.stem == first.stem and row.label != first.label)
 
 
-def _as_vertical(upward: Component, beside: Component) -> str:
+def _write_vertical(vertical: Component, horizontal: Component) -> str:
     """Return the text that makes a component the vertical one of another."""
-    name, channel = upward.texts["motion"], upward.texts.get("channel")
+    name, channel = vertical.texts["motion"], vertical.texts.get("channel")
     if channel is None:
         return name
-    return channel if upward.key == beside.key else f"{name}#{channel}"
+    return channel if vertical.key == horizontal.key else f"{name}#{channel}"
 
 
-def _described(group: list[Component], reason: str) -> dict[str, Any]:
+def _describe_group(group: list[Component], reason: str) -> dict[str, Any]:
     first = group[0]
-    place = ", ".join(part for part in (first.event, first.station) if part)
-    return {"title": place or first.stem or first.file, "reason": reason, "rows": [each.described() for each in group]}
+    origin = ", ".join(part for part in (first.event, first.station) if part)
+    return {
+        "title": origin or first.stem or first.file,
+        "reason": reason,
+        "rows": [component.describe() for component in group],
+    }

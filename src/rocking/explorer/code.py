@@ -1,4 +1,4 @@
-"""Equivalent Python code and commands for cases and maps."""
+"""Equivalent Python code and commands for cases, maps and sweeps."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Final
 
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.explorer.inputs import Case
-from rocking.explorer.maps import Axis, MapGrid, sign_of
-from rocking.explorer.motions import arguments_of, is_pulse, pulse_call
+from rocking.explorer.maps import Axis, MapGrid, read_polarity
+from rocking.explorer.motions import is_pulse, read_pulse_arguments, write_pulse_call
 from rocking.explorer.parameters import BLOCK_NAMES, NAMES
-from rocking.explorer.periodic import KEPT, PASSED, Sweep, call_at
-from rocking.inputs.texts import command_line
+from rocking.explorer.periodic import STORED_STATES, TRANSIENT_PERIODS, Sweep, write_sine_call
+from rocking.inputs.texts import write_command
 
 _MAP: Final = """\
 import math
@@ -36,7 +36,7 @@ _OUTCOME: Final = """\
 found = chattering_map(case, {{"{y}": ys, "{x}": xs}})
 print(found.summary())"""
 
-_OTHER: Final = """\
+_GRID: Final = """\
 def quantity(response):
     times, kinds = response.events["time"], response.events["kind"]
     uplifts, rests = times[kinds == "uplift"], times[kinds == "rest"]
@@ -49,7 +49,7 @@ found = np.array(
 print(found)"""
 
 #: Python code that computes the quantities of a map from the response at a point.
-_QUANTITY: Final = {
+_QUANTITIES: Final = {
     "rest": """\
     # Time, s, from the first uplift to the first rest; NaN where the block never rests.
     return rests[0] - uplifts[0] if len(rests) else np.nan""",
@@ -107,20 +107,20 @@ def case_as_python(case: Case) -> str:
     response = rocking.simulate(block, motion, initial_rotation=0.02)
     print(response.summary())
     """
-    numbers = {
+    arguments = {
         "model": None if case.model == "nonlinear" else case.model,
         "chattering": case.texts.get("chattering"),
         "duration": case.duration,
         "initial_rotation": case.initial_rotation or None,
         "initial_velocity": case.initial_velocity or None,
     }
-    options = "".join(f", {name}={value!r}" for name, value in numbers.items() if value is not None)
+    options = "".join(f", {name}={value!r}" for name, value in arguments.items() if value is not None)
     return "\n".join(
         [
             "import rocking",
             "",
             f"block = rocking.{case.block_call}",
-            *filter(None, [case.motion_before]),
+            *filter(None, [case.motion_preamble]),
             f"motion = {case.motion_call}",
             f"response = rocking.simulate(block, motion{options})",
             "print(response.summary())",
@@ -141,49 +141,49 @@ def case_as_command(case: Case) -> str | None:
     """
     if not case.words or "gravity" in case.texts:
         return None
-    left_out = {*BLOCK_NAMES, "motion", "vertical"}
-    options = {**case.block_options} | {name: case.texts[name] for name in NAMES if name in {*case.texts} - left_out}
-    return command_line(["rocking", "simulate", *case.words], options)
+    excluded = {*BLOCK_NAMES, "motion", "vertical"}
+    options = {**case.block_options} | {name: case.texts[name] for name in NAMES if name in {*case.texts} - excluded}
+    return write_command(["rocking", "simulate", *case.words], options)
 
 
 def map_as_python(grid: MapGrid, quantity: str) -> str:
     """Write a complete script that computes a quantity of a map."""
-    texts = {"x": grid.x.name, "y": grid.y.name, "xs": _values(grid.x), "ys": _values(grid.y)}
-    before = grid.case.motion_before
+    axis_texts = {"x": grid.x.name, "y": grid.y.name, "xs": _write_axis(grid.x), "ys": _write_axis(grid.y)}
+    preamble = grid.case.motion_preamble
     return _MAP.format(
-        **texts,
-        before=before and f"{before}\n",
-        block=_block(grid),
-        motion=_motion(grid),
+        **axis_texts,
+        before=preamble and f"{preamble}\n",
+        block=_write_block(grid),
+        motion=_write_motion(grid),
         model=grid.case.model,
-        found=_OUTCOME.format(**texts) if quantity == "outcome" else _OTHER.format(quantity=_QUANTITY[quantity]),
+        found=_OUTCOME.format(**axis_texts) if quantity == "outcome" else _GRID.format(quantity=_QUANTITIES[quantity]),
     )
 
 
 def sweep_as_python(sweep: Sweep) -> str:
     """Write a complete script that computes the steady state of a case, and a sweep."""
     case, name = sweep.case, sweep.axis.name
-    given = {"model": case.model, "chattering": case.texts.get("chattering")}
+    arguments = {"model": case.model, "chattering": case.texts.get("chattering")}
     return _SWEEP.format(
         block=case.block_call,
-        motion=call_at(sweep),
-        options="".join(f", {option}={value!r}" for option, value in given.items() if value is not None),
+        motion=write_sine_call(sweep),
+        options="".join(f", {option}={value!r}" for option, value in arguments.items() if value is not None),
         name=name,
         at=sweep.value,
-        values=_values(sweep.axis),
+        values=_write_axis(sweep.axis),
         rotation=case.initial_rotation,
         velocity=case.initial_velocity,
-        kept=KEPT,
-        transient=PASSED - 1,
-        last=PASSED + KEPT - 1,
+        kept=STORED_STATES,
+        transient=TRANSIENT_PERIODS - 1,
+        last=TRANSIENT_PERIODS + STORED_STATES - 1,
     )
 
 
-def _values(axis: Axis) -> str:
+def _write_axis(axis: Axis) -> str:
     return f"np.linspace({float(axis.values[0])!r}, {float(axis.values[-1])!r}, {len(axis.values)})"
 
 
-def _block(grid: MapGrid) -> str:
+def _write_block(grid: MapGrid) -> str:
     """Return the call that creates the block, with the names of the axes as arguments."""
     varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution"}
     texts, sides = grid.case.texts, grid.case.block.sides
@@ -191,38 +191,38 @@ def _block(grid: MapGrid) -> str:
         return grid.case.block_call
     slowest = min(side.p for side in sides)
     arguments = {
-        "p": _pair([f"p * {side.p / slowest!r}" if "p" in varied else repr(side.p) for side in sides]),
-        "alpha": "np.radians(alpha)" if "alpha" in varied else _pair([repr(side.alpha) for side in sides]),
+        "p": _write_pair([f"p * {side.p / slowest!r}" if "p" in varied else repr(side.p) for side in sides]),
+        "alpha": "np.radians(alpha)" if "alpha" in varied else _write_pair([repr(side.alpha) for side in sides]),
     }
     if "restitution" in varied:
         arguments["restitution"] = "restitution"
     elif "alpha" not in varied or "restitution" in texts:
-        arguments["restitution"] = _pair([repr(side.restitution) for side in sides])
+        arguments["restitution"] = _write_pair([repr(side.restitution) for side in sides])
     if "gravity" in texts:
         arguments["gravity"] = repr(grid.case.block.gravity)
     return f"Block.from_parameters({', '.join(f'{name}={value}' for name, value in arguments.items())})"
 
 
-def _pair(sides: list[str]) -> str:
-    plain = [each.removesuffix(" * 1.0") for each in sides]
-    return plain[0] if plain[0] == plain[1] else f"[{', '.join(plain)}]"
+def _write_pair(sides: list[str]) -> str:
+    numbers = [number.removesuffix(" * 1.0") for number in sides]
+    return numbers[0] if numbers[0] == numbers[1] else f"[{', '.join(numbers)}]"
 
 
-def _motion(grid: MapGrid) -> str:
+def _write_motion(grid: MapGrid) -> str:
     """Return the call that creates the motion, with the names of the axes among its arguments."""
-    names, made = {grid.x.name, grid.y.name}, grid.case.motion_call
+    axis_names, call = {grid.x.name, grid.y.name}, grid.case.motion_call
     text = grid.case.texts.get("motion", "")
-    if "omega" in names and is_pulse(text):
+    if "omega" in axis_names and is_pulse(text):
         p = min(side.p for side in grid.case.block.sides)
-        given = arguments_of(text)
+        pulse = read_pulse_arguments(text)
         frequency = f"omega * {p!r} / (2.0 * math.pi)"
-        written = {name: repr(value) for name, value in given.items()}
-        written |= {"amplitude": repr(sign_of(grid.case.texts) * given["amplitude"]), "frequency": frequency}
-        if "duration" in given:
-            written["duration"] = f"{given['duration'] * given['frequency']!r} / ({frequency})"
-        made = pulse_call(text, written)
-    if "a" in names:
-        return f"{made}.scaled_to(a * min(block.uplift_thresholds({grid.case.model!r})))"
-    if "pga" in names:
-        return f"{made}.scaled_to(pga * {STANDARD_GRAVITY!r})"
-    return f"{made}.scaled_to({grid.motion.pga!r})" if "omega" in names else made
+        written = {name: repr(value) for name, value in pulse.items()}
+        written |= {"amplitude": repr(read_polarity(grid.case.texts) * pulse["amplitude"]), "frequency": frequency}
+        if "duration" in pulse:
+            written["duration"] = f"{pulse['duration'] * pulse['frequency']!r} / ({frequency})"
+        call = write_pulse_call(text, written)
+    if "a" in axis_names:
+        return f"{call}.scaled_to(a * min(block.uplift_thresholds({grid.case.model!r})))"
+    if "pga" in axis_names:
+        return f"{call}.scaled_to(pga * {STANDARD_GRAVITY!r})"
+    return f"{call}.scaled_to({grid.motion.pga!r})" if "omega" in axis_names else call

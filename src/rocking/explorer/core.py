@@ -1,4 +1,4 @@
-"""Arrays, numbers and words that the page shows for one or two cases, independent of the web."""
+"""Arrays, numbers and texts of one or two cases on the page, independent of the web."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from rocking.core.arrays import Floats
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.inputs import read_case
-from rocking.explorer.meshes import described
-from rocking.explorer.parameters import Texts, names_of
+from rocking.explorer.meshes import describe_body
+from rocking.explorer.parameters import Texts, list_names
 from rocking.explorer.payload import Payload
 from rocking.explorer.simulated import (
-    POINTS,
-    Simulated,
-    about_window,
-    checked_window,
-    ends_of,
-    facts,
-    ground_in,
-    lines_in,
-    lines_of,
-    shown_window,
+    MAX_POINTS,
+    SimulatedCase,
+    check_window,
+    choose_window,
+    describe_case,
+    describe_window,
+    sample_events,
+    sample_ground_displacement,
+    sample_window,
+    widen_empty_window,
 )
-from rocking.explorer.uploads import Recent, UploadStore
+from rocking.explorer.uploads import RecentCache, UploadStore
 from rocking.response import active_span
 
 #: Number of stored responses, and maximum size of their steps and motions, some hundreds of MB.
-_KEPT: Final = 48
-_KEPT_ROWS: Final = 2_000_000
+_MAX_RESPONSES: Final = 48
+_MAX_ROWS: Final = 2_000_000
 
 #: File formats of figures and tables, and their content types.
 EXPORTS: Final[Mapping[str, str]] = {
@@ -61,99 +61,108 @@ class Explorer:
     def __init__(self) -> None:
         self.uploads = UploadStore()
         self._drawing = threading.Lock()
-        self._kept = Recent[Simulated](_KEPT_ROWS, _rows)
+        self._simulated = RecentCache[SimulatedCase](_MAX_ROWS, _count_rows)
 
-    def take_record(self, name: str, data: bytes) -> dict[str, Any]:
+    def add_record(self, name: str, data: bytes) -> dict[str, Any]:
         """Store a record file, and return its description."""
-        return self.uploads.take(name, data)
+        return self.uploads.add_and_describe(name, data)
 
-    def take_mesh(self, name: str, data: bytes) -> dict[str, Any]:
+    def add_mesh(self, name: str, data: bytes) -> dict[str, Any]:
         """Store a mesh, and return the direction of first uplift, or an error that the user may correct."""
         uploads = self.uploads
         key = uploads.add_mesh(name, data)
-        found = {"key": key, "name": uploads.file(key).name, "azimuth": 0.0}
+        description = {"key": key, "name": uploads.file(key).name, "azimuth": 0.0}
         try:
-            return found | {"azimuth": uploads.body(f"file:{key}", {}, None, None).solid.weakest_azimuth}
+            return description | {"azimuth": uploads.body(f"file:{key}", {}, None, None).solid.weakest_azimuth}
         except InvalidBlock as error:
             if error.argument is None:
                 uploads.remove(key)
                 raise
-            return found
+            return description
 
-    def forget(self, key: str) -> dict[str, int]:
+    def remove(self, key: str) -> dict[str, int]:
         """Remove a file and its responses, and return the number of remaining files."""
         self.uploads.remove(key)
-        self._kept.forget(f"file:{key}")
+        self._simulated.remove(f"file:{key}")
         return self.uploads.usage()
 
-    def show(self, texts: Texts) -> Simulated:
+    def simulate(self, texts: Texts) -> SimulatedCase:
         """Return a case with its response."""
 
-        def simulated() -> Simulated:
+        def simulate_case() -> SimulatedCase:
             case = read_case(texts, self.uploads)
-            return Simulated(case, case.simulate())
+            return SimulatedCase(case, case.simulate())
 
-        return self._kept.get(tuple(sorted(f"{name}={value}" for name, value in texts.items() if value)), simulated)
+        return self._simulated.get(
+            tuple(sorted(f"{name}={value}" for name, value in texts.items() if value)), simulate_case
+        )
 
     def case(self, texts: Texts, window: tuple[float, float] | None = None) -> Payload:
         """Return all words on a case, and its arrays in a window (s; by default the time of its motion)."""
-        shown = self.show(texts)
-        response = shown.response
-        start, end = shown_window(window, response.duration, active_span(response))
-        header = {**facts(shown), "window": about_window(shown, start, end)}
-        profile = {} if shown.outline is None else {"profile": shown.outline.ravel()}
-        return Payload(header, {**lines_in(shown, start, end), **lines_of(response), **profile})
+        simulated = self.simulate(texts)
+        response = simulated.response
+        start, end = choose_window(window, response.duration, active_span(response))
+        header = {**describe_case(simulated), "window": describe_window(simulated, start, end)}
+        profile = {} if simulated.outline is None else {"profile": simulated.outline.ravel()}
+        return Payload(header, {**sample_window(simulated, start, end), **sample_events(response), **profile})
 
     def window(
-        self, texts: Texts, window: tuple[float, float], *, ground: bool = False, points: int = POINTS
+        self, texts: Texts, window: tuple[float, float], *, ground: bool = False, points: int = MAX_POINTS
     ) -> Payload:
         """Return the newly evaluated arrays of a window (s), with the ground displacement."""
-        shown = self.show(texts)
-        start, end = checked_window(window, shown.response.duration)
-        arrays = lines_in(shown, start, end, min(max(points, 2), POINTS))
+        simulated = self.simulate(texts)
+        start, end = check_window(window, simulated.response.duration)
+        arrays = sample_window(simulated, start, end, min(max(points, 2), MAX_POINTS))
         if ground:
-            arrays |= ground_in(shown, start, end)
-        return Payload({"window": about_window(shown, start, end)}, arrays)
+            arrays |= sample_ground_displacement(simulated, start, end)
+        return Payload({"window": describe_window(simulated, start, end)}, arrays)
 
     def compare(
-        self, texts: Texts, changed: Texts, window: tuple[float, float] | None = None, *, whole: bool = False
+        self, texts: Texts, changed: Texts, window: tuple[float, float] | None = None, *, complete: bool = False
     ) -> Payload:
-        """Return two cases in one window; the second is ``whole``, or the first with some texts changed."""
-        first = self.show(texts)
-        both = {"first": first, "second": self.show(changed if whole else _changed(first.case.texts, changed))}
-        longest = max(shown.response.duration for shown in both.values())
-        starts, ends = zip(*(active_span(shown.response) for shown in both.values()), strict=True)
-        start, end = shown_window(window, longest, (min(starts), max(ends)))
-        header = {"window": ends_of(start, end), "duration": longest, "cases": [facts(each) for each in both.values()]}
+        """Return two cases in one window; the second is ``complete``, or the first with some texts changed."""
+        first = self.simulate(texts)
+        cases = {
+            "first": first,
+            "second": self.simulate(changed if complete else _replace_texts(first.case.texts, changed)),
+        }
+        longest = max(simulated.response.duration for simulated in cases.values())
+        starts, ends = zip(*(active_span(simulated.response) for simulated in cases.values()), strict=True)
+        start, end = choose_window(window, longest, (min(starts), max(ends)))
+        header = {
+            "window": widen_empty_window(start, end),
+            "duration": longest,
+            "cases": [describe_case(simulated) for simulated in cases.values()],
+        }
         arrays: dict[str, Floats] = {}
-        for name, shown in both.items():
-            stop = min(end, shown.response.duration)
+        for name, simulated in cases.items():
+            stop = min(end, simulated.response.duration)
             if start < stop:
-                arrays |= {f"{name}_{key}": values for key, values in lines_in(shown, start, stop).items()}
-            arrays[f"{name}_rest"] = shown.response.rest_intervals.ravel()
+                arrays |= {f"{name}_{key}": values for key, values in sample_window(simulated, start, stop).items()}
+            arrays[f"{name}_rest"] = simulated.response.rest_intervals.ravel()
         return Payload(header, arrays)
 
     def body(self, texts: Texts) -> Payload:
         """Return plan, resistance in every direction, and words for the body of a mesh."""
-        case = self.show(texts).case
+        case = self.simulate(texts).case
         if case.body is None:
             raise InvalidOption("this block is of no {}: open one", "mesh")
-        return described(case.body, case.azimuth)
+        return describe_body(case.body, case.azimuth)
 
     def summary(self, texts: Texts) -> list[tuple[str, str]]:
         """Return the summary of a response as rows of label and value."""
-        return [(row.name, row.text) for row in self.show(texts).response.summary_rows()]
+        return [(row.name, row.text) for row in self.simulate(texts).response.summary_rows()]
 
     def code(self, texts: Texts) -> dict[str, str | None]:
         """Return a case as Python, and as a command if the command line supports it."""
-        case = self.show(texts).case
+        case = self.simulate(texts).case
         return {"python": case_as_python(case), "command": case_as_command(case)}
 
     def export(self, texts: Texts, form: str, window: tuple[float, float] | None = None) -> bytes:
         """Return a response as the content of a file in one of `EXPORTS`; a figure shows a window (s)."""
         if form not in EXPORTS:
             raise InvalidOption(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
-        response = self.show(texts).response
+        response = self.simulate(texts).response
         with tempfile.TemporaryDirectory(prefix="rocking-") as folder:
             file = Path(folder) / f"response.{form}"
             if form in _TABLES:
@@ -161,11 +170,11 @@ class Explorer:
             elif form == "nc":
                 response.to_netcdf(file)
             else:
-                shown = None if window is None else checked_window(window, response.duration)
+                checked_ends = None if window is None else check_window(window, response.duration)
                 with self._drawing:
                     from matplotlib import rc_context
 
-                    figure = response.plot(window=shown, longest_sequence=bool(len(response.sequences)))
+                    figure = response.plot(window=checked_ends, longest_sequence=bool(len(response.sequences)))
                     with rc_context({"svg.hashsalt": "rocking"}):
                         figure.savefig(file, dpi=160)
                     if "matplotlib.pyplot" in sys.modules:
@@ -173,15 +182,15 @@ class Explorer:
             return file.read_bytes()
 
 
-def _rows(shown: Simulated) -> int:
-    """Return the steps of a response and the samples of its motion, at least its share of `_KEPT` responses."""
-    motion = shown.case.motion
+def _count_rows(simulated: SimulatedCase) -> int:
+    """Count the steps of a response and the samples of its motion, or return a minimum if there are few."""
+    motion = simulated.case.motion
     samples = 0 if motion is None else len(motion.breakpoints) * (1 if motion.vertical is None else 2)
-    return max(samples + len(shown.response.solution.trail.nodes), _KEPT_ROWS // _KEPT)
+    return max(samples + len(simulated.response.solution.trail.nodes), _MAX_ROWS // _MAX_RESPONSES)
 
 
-def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
+def _replace_texts(texts: Texts, changed: Texts) -> dict[str, str]:
     """Return the texts of a case with replacements. Texts of a block, or of motion and start, are replaced together."""
-    together = [(names_of("block"), names_of("block")), (names_of("motion"), names_of("motion", "start"))]
-    gone = {name for given, names in together if changed.keys() & {*given} for name in names}
-    return {name: value for name, value in texts.items() if name not in gone} | dict(changed)
+    replacements = [(list_names("block"), list_names("block")), (list_names("motion"), list_names("motion", "start"))]
+    replaced = {name for changed_names, names in replacements if changed.keys() & {*changed_names} for name in names}
+    return {name: value for name, value in texts.items() if name not in replaced} | dict(changed)

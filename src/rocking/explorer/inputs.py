@@ -15,33 +15,28 @@ from rocking.block import Block, one_block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
-from rocking.explorer.meshes import Body, pivots_of
-from rocking.explorer.motions import motion_of, texts_of_motion
-from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, given_texts
+from rocking.explorer.meshes import MeshBody, find_pivots
+from rocking.explorer.motions import motion_to_texts, read_motion_values
+from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, clean_texts
 from rocking.explorer.uploads import UploadStore
-from rocking.inputs.bodies import block_of, call_of
+from rocking.inputs.bodies import create_block, write_block_call
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION, TOO_STRONG
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
 #: Maximum product of both restitutions for which a page waits until the block rests.
-_LIVELIEST: Final = 0.998
+_MAX_RESTITUTION_PRODUCT: Final = 0.998
 
 #: Shortest duration, s; below it rounding errors dominate.
-_SHORTEST: Final = 1e-12
+_MIN_DURATION: Final = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Arguments of `rocking.simulate`, with the texts from which they were read.
+    """Arguments of `rocking.simulate`, with equivalent Python code and words of a command."""
 
-    ``block_call`` and ``motion_call`` (after the line ``motion_before``, if any) are Python expressions.
-    ``block_options`` and ``words`` belong to the command line, and are None if the motion has no name. The block of a
-    mesh has a ``body`` and an ``azimuth``, degrees, of its plane.
-    """
-
-    texts: Texts
+    texts: Texts  # from which the case was read
     block: Block
     motion: Motion | None
     model: Model
@@ -49,13 +44,13 @@ class Case:
     duration: float | None
     initial_rotation: float
     initial_velocity: float
-    block_call: str
-    block_options: Texts
-    body: Body | None
-    azimuth: float
-    motion_call: str
-    motion_before: str
-    words: tuple[str, ...]
+    block_call: str  # Python expression
+    block_options: Texts  # of the command
+    body: MeshBody | None  # of a mesh
+    azimuth: float  # of the body's plane, degrees
+    motion_call: str  # Python expression
+    motion_preamble: str  # line of Python before it, or empty
+    words: tuple[str, ...]  # of the command; empty if the motion has no name
 
     def simulate(self) -> Response:
         """Return the response."""
@@ -84,40 +79,40 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     >>> case.block, round(case.motion.pga, 6)
     (<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>, 3.92266)
     """
-    given = given_texts(texts)
-    values = {name: PARAMETERS[name].read(text) for name, text in given.items()}
-    found_block = _block(given, values, uploads)
-    block = found_block.block
-    found = motion_of(given, values, uploads)
+    case_texts = clean_texts(texts)
+    values = {name: PARAMETERS[name].read(text) for name, text in case_texts.items()}
+    written_block = _read_block(case_texts, values, uploads)
+    block = written_block.block
+    written_motion = read_motion_values(case_texts, values, uploads)
     if "duration" not in values:
         require_rest(side.restitution for side in block.sides)
-    elif values["duration"] < _SHORTEST:
-        raise InvalidOption(f"{{}} must be {_SHORTEST:g} s or more here", "duration", value=values["duration"])
+    elif values["duration"] < _MIN_DURATION:
+        raise InvalidOption(f"{{}} must be {_MIN_DURATION:g} s or more here", "duration", value=values["duration"])
     return Case(
-        texts=given,
+        texts=case_texts,
         block=block,
-        motion=found.motion,
+        motion=written_motion.motion,
         model=values.get("model", "nonlinear"),
         chattering=chattering_scheme(values.get("chattering", "certified")),
         duration=values.get("duration"),
         initial_rotation=values.get("initial_rotation", 0.0),
         initial_velocity=values.get("initial_velocity", 0.0),
-        block_call=found_block.python,
-        block_options=found_block.options,
-        body=found_block.body,
+        block_call=written_block.python,
+        block_options=written_block.options,
+        body=written_block.body,
         azimuth=values.get("azimuth", 0.0),
-        motion_call=found.python,
-        motion_before=found.before,
-        words=found.words,
+        motion_call=written_motion.python,
+        motion_preamble=written_motion.preamble,
+        words=written_motion.words,
     )
 
 
 def require_rest(restitutions: Iterable[float]) -> None:
     """Raise `InvalidOption` unless a block with these restitutions comes to rest within an acceptable time."""
-    if math.prod(restitutions) > _LIVELIEST:
+    if math.prod(restitutions) > _MAX_RESTITUTION_PRODUCT:
         raise InvalidOption(
-            f"the product of {{}} on both sides is above {_LIVELIEST:g}, so that the block hardly comes to rest: lower "
-            "it, or simulate it in Python",
+            f"the product of {{}} on both sides is above {_MAX_RESTITUTION_PRODUCT:g}, so that the block hardly comes "
+            "to rest: lower it, or simulate it in Python",
             "restitution",
         )
 
@@ -128,25 +123,25 @@ def require_possible(peak: float) -> None:
         raise InvalidMotion(TOO_STRONG)
 
 
-def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
+def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str]:
     """Write a response as the texts of its case; the store keeps a motion that no text can name."""
     block, motion = one_block(response.block), response.motion
-    texts = _texts_of_block(block)
-    texts |= {"motion": "none"} if motion is None else texts_of_motion(motion, uploads)
+    texts = _block_to_texts(block)
+    texts |= {"motion": "none"} if motion is None else motion_to_texts(motion, uploads)
     if response.model != "nonlinear":
         texts["model"] = response.model
     if str(response.chattering) != str(chattering_scheme("certified")):
         texts["chattering"] = str(response.chattering)
-    rules = response.solution.trail.settings
-    if not rules["no_end_time"]:
-        texts["duration"] = repr(float(rules["stop"]))
+    settings = response.solution.trail.settings
+    if not settings["no_end_time"]:
+        texts["duration"] = repr(float(settings["stop"]))
     rotation, velocity = float(response.rotation(0.0)), float(response.angular_velocity(0.0))
     if rotation or velocity:
         texts |= {"initial_rotation": repr(rotation), "initial_velocity": repr(velocity)}
     return texts
 
 
-def _texts_of_block(block: Block) -> dict[str, str]:
+def _block_to_texts(block: Block) -> dict[str, str]:
     """Return the sizes of a rectangular block, else the parameters of both sides."""
     pairs = {name: [getattr(side, name) for side in block.sides] for name in ("p", "alpha", "restitution")}
     texts = {name: ",".join(repr(value) for value in pair) for name, pair in pairs.items()}
@@ -162,41 +157,41 @@ def _texts_of_block(block: Block) -> dict[str, str]:
     return {name: repr(size) for name, size in sizes.items()} | texts
 
 
-class _FoundBlock(NamedTuple):
-    """Block, its Python expression, its command-line options, and its body."""
+class _WrittenBlock(NamedTuple):
+    """Block with equivalent Python code and options of a command."""
 
     block: Block
     python: str
     options: Texts
-    body: Body | None = None
+    body: MeshBody | None = None  # of a mesh
 
 
-def _block(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
-    """Create the block."""
-    chosen = values.keys() & BLOCK_NAMES - {"restitution"}
-    shape = next((each for each in SHAPES if {*each.needed} <= chosen <= {*each.needed, *each.optional}), None)
+def _read_block(texts: Texts, values: Values, uploads: UploadStore) -> _WrittenBlock:
+    """Create the block of a case."""
+    names = values.keys() & BLOCK_NAMES - {"restitution"}
+    shape = next((shape for shape in SHAPES if {*shape.needed} <= names <= {*shape.needed, *shape.optional}), None)
     if shape is None:
         raise InvalidBlock(
             "a block has either {} and {} (m) and perhaps {}, or {} (rad/s) and {}, or {}, {} and {} (m), or {} and "
             "{} (degrees)",
-            *(name for each in SHAPES[:-1] for name in (*each.needed, *each.optional)),
+            *(name for shape in SHAPES[:-1] for name in (*shape.needed, *shape.optional)),
             *SHAPES[-1].needed,
         )
     if shape.name == "mesh":
-        return _of_mesh(given, values, uploads)
-    described = {name: values[name] for name in NAMES if name in BLOCK_NAMES or name == "gravity" if name in values}
-    options = {name: given[name] for name in described if name != "gravity"}
-    return _FoundBlock(block_of(described), call_of(described), options)
+        return _read_mesh_block(texts, values, uploads)
+    block_values = {name: values[name] for name in NAMES if name in BLOCK_NAMES or name == "gravity" if name in values}
+    options = {name: texts[name] for name in block_values if name != "gravity"}
+    return _WrittenBlock(create_block(block_values), write_block_call(block_values), options)
 
 
-def _of_mesh(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
+def _read_mesh_block(texts: Texts, values: Values, uploads: UploadStore) -> _WrittenBlock:
     """Create the block of a mesh in the plane of an azimuth."""
-    body = uploads.body(given["mesh"], given, values.get("tolerance"), values.get("gravity"))
+    body = uploads.body(texts["mesh"], texts, values.get("tolerance"), values.get("gravity"))
     azimuth, restitution = values["azimuth"], values.get("restitution")
     block = body.solid.block(azimuth, restitution=restitution)
-    distances, height, gyration = pivots_of(body, azimuth)
+    distances, height, gyration = find_pivots(body, azimuth)
     options = {"pivots": ",".join(map(repr, distances)), "height_of_mass": repr(height), "gyration": repr(gyration)}
     if restitution is not None:
-        options["restitution"] = given["restitution"]
+        options["restitution"] = texts["restitution"]
     python = f"{body.call}.block({azimuth!r}" + ("" if restitution is None else f", restitution={restitution!r}") + ")"
-    return _FoundBlock(block, python, options, body)
+    return _WrittenBlock(block, python, options, body)

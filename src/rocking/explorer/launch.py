@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from rocking.explorer.studies import StudyView
 
 #: Address that only this machine can reach.
-HERE: Final = "127.0.0.1"
+LOCAL_ADDRESS: Final = "127.0.0.1"
 
 #: Maximum number of connections, and of connections waiting to be accepted.
-_MOST: Final = 400
-_WAITING: Final = 128
+_MAX_CONNECTIONS: Final = 400
+_BACKLOG: Final = 128
 
 
 def require_packages() -> None:
@@ -71,20 +71,20 @@ class Server:
         link = self.link()
         print(f"rocking explorer: {link} (once, in one browser; Ctrl-C ends it)", flush=True)
         if open_browser:
-            threading.Thread(target=self._open, args=(link,), daemon=True).start()
+            threading.Thread(target=self._open_browser, args=(link,), daemon=True).start()
 
-    def _open(self, link: str) -> None:
+    def _open_browser(self, link: str) -> None:
         while not self.server.started:
             time.sleep(0.02)
         webbrowser.open(link)
 
 
-def served(
+def start_listening(
     explorer: Explorer,
     opening: Mapping[str, str],
     study: StudyView | None = None,
     *,
-    address: str = HERE,
+    address: str = LOCAL_ADDRESS,
     port: int = 0,
     framed_by: str = "'none'",
 ) -> Server:
@@ -95,11 +95,11 @@ def served(
     from rocking.explorer.server import App, BoundedProtocol
 
     application = App(explorer, opening, study, framed_by).asgi
-    listening = _bound(address, port)
-    place, number = (listening.getsockname()[k] for k in (0, 1))
-    host, bound = (f"[{each}]" if ":" in each else each for each in (address, place))
+    listener = _bind_socket(address, port)
+    bound_address, number = (listener.getsockname()[k] for k in (0, 1))
+    host, bound_host = (f"[{name}]" if ":" in name else name for name in (address, bound_address))
     # Browsers normalise numeric addresses.
-    authentication = RequestAuthentication(application, number, {*LOOPBACK, host, bound})
+    authentication = RequestAuthentication(application, number, {*LOOPBACK, host, bound_host})
     config = uvicorn.Config(
         authentication,
         log_level="error",
@@ -107,47 +107,47 @@ def served(
         ws="none",
         http=BoundedProtocol,
         timeout_keep_alive=10,
-        backlog=_WAITING,
+        backlog=_BACKLOG,
         server_header=False,
-        limit_concurrency=_MOST,
+        limit_concurrency=_MAX_CONNECTIONS,
         timeout_graceful_shutdown=1,
         proxy_headers=False,
     )
-    return Server(authentication, uvicorn.Server(config), listening, host, number)
+    return Server(authentication, uvicorn.Server(config), listener, host, number)
 
 
-def _bound(address: str, port: int) -> socket.socket:
+def _bind_socket(address: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise InvalidOption(f"{{}} must be a whole number from 0 to 65535, not {port}", "port", value=port)
     try:
         # An empty address means all addresses.
-        family, kind, _, _, place = socket.getaddrinfo(address or "::", port, type=socket.SOCK_STREAM)[0]
+        family, kind, _, _, socket_address = socket.getaddrinfo(address or "::", port, type=socket.SOCK_STREAM)[0]
     except OSError as error:
         raise InvalidOption(
             f"{{}}: this machine has no {address} ({error.strerror})", "address", value=address
         ) from None
-    found = ip_address(str(place[0]).partition("%")[0])
-    found = (found.ipv4_mapped if isinstance(found, IPv6Address) else None) or found
-    if found.is_unspecified:
+    ip = ip_address(str(socket_address[0]).partition("%")[0])
+    ip = (ip.ipv4_mapped if isinstance(ip, IPv6Address) else None) or ip
+    if ip.is_unspecified:
         raise InvalidOption(
             f"{{}} {address!r} is every address of this machine: name the one that others shall use",
             "address",
             value=address,
         )
-    if not found.is_loopback:
+    if not ip.is_loopback:
         note(f"{address} can be reached from other machines, and what is sent is not encrypted")
-    listening = socket.socket(family, kind)
+    listener = socket.socket(family, kind)
     try:
         if sys.platform != "win32":
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(place)
-        listening.listen(_WAITING)
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(socket_address)
+        listener.listen(_BACKLOG)
     except OSError as error:
-        listening.close()
+        listener.close()
         raise InvalidOption(
             f"{{}} {port} of {address} cannot be used ({error.strerror}): choose another one", "port", value=port
         ) from None
-    return listening
+    return listener
 
 
 @dataclass(frozen=True)
@@ -223,13 +223,13 @@ def explore(response: Response, *, height: int = 760) -> Frame:
         raise InvalidOption(
             f"{{}} must be a Response, as rocking.simulate returns it, not a {type(response).__name__}", "response"
         )
-    from rocking.explorer.inputs import texts_of
+    from rocking.explorer.inputs import response_to_texts
 
-    explorer, server = _server_of_this_process()
-    return Frame(texts_of(response, explorer.uploads), height, server.link)
+    explorer, server = _get_shared_server()
+    return Frame(response_to_texts(response, explorer.uploads), height, server.link)
 
 
-def _server_of_this_process() -> tuple[Explorer, Server]:
+def _get_shared_server() -> tuple[Explorer, Server]:
     """Return the server of this process; the first call starts it."""
     global _running
     from rocking.explorer.core import Explorer
@@ -238,7 +238,7 @@ def _server_of_this_process() -> tuple[Explorer, Server]:
         if _running is None:
             explorer = Explorer()
             # notebooks served by this machine
-            server = served(explorer, {}, framed_by="http://localhost:* http://127.0.0.1:*")
+            server = start_listening(explorer, {}, framed_by="http://localhost:* http://127.0.0.1:*")
             server.run_in_background()
             _running = explorer, server
         return _running

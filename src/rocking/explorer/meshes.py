@@ -13,9 +13,9 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import RockingError
-from rocking.explorer.apart import made_apart, made_here
+from rocking.explorer.apart import read_mesh, read_mesh_in_process
 from rocking.explorer.payload import Payload, phrase
-from rocking.inputs.quantities import densities, number
+from rocking.inputs.quantities import read_densities, read_number
 from rocking.solid import Rose, Solid
 from rocking.solid.solid import Plane, compute_plane
 from rocking.solid.support import compute_directions
@@ -27,24 +27,24 @@ if TYPE_CHECKING:
 _File = tuple[str, bytes]
 
 #: Lock while a mesh is read, because this needs much memory.
-_reading = threading.Lock()
+_read_lock = threading.Lock()
 
 #: Azimuths of the rose, degrees.
 _AZIMUTHS: Final = np.arange(0.0, 360.0, 2.0)
 
 #: Maximum number of named parts.
-_NAMED: Final = 6
+_MAX_NAMED_PARTS: Final = 6
 
 #: Texts that describe a body, and how each is read as an argument of `rocking.Solid.from_mesh`.
 _READERS: Final[Mapping[str, Callable[[str], Any]]] = {
-    "density": lambda text: densities(text, "density"),
+    "density": lambda text: read_densities(text, "density"),
     "up": str,
-    "unit": lambda text: text if text.isalpha() else number(text, "unit"),
+    "unit": lambda text: text if text.isalpha() else read_number(text, "unit"),
 }
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class MeshBody:
     """Body of a mesh, with its file name and outline; ``call`` is the Python expression."""
 
     solid: Solid
@@ -56,7 +56,7 @@ class Body:
         """Resistance of the body in every direction."""
         return self.solid.rose(_AZIMUTHS)
 
-    def across(self, azimuth: float) -> Floats:
+    def find_outline(self, azimuth: float) -> Floats:
         """Return its outline seen along the axis perpendicular to an azimuth, from its centre of mass; shape (n, 6)."""
         outline = self.sections.compute_outline(azimuth)
         outline[:, 2:] -= float(self.solid.centre[:2] @ np.asarray(compute_directions(azimuth)[0]))
@@ -65,28 +65,28 @@ class Body:
     def plane(self, azimuth: float) -> dict[str, Any]:
         """Describe the section in the plane of an azimuth: the rocking edges, m from its centre of mass."""
         plane = compute_plane(self.solid, azimuth)
-        distance, low, high = (np.asarray(each).tolist() for each in plane.pivots)
+        distance, low, high = (np.asarray(pivot_values).tolist() for pivot_values in plane.pivots)
         return {
             "name": self.solid.description,
             "azimuth": plane.azimuth,
-            "edges": [list(each) for each in zip(distance, low, high, strict=True)],
+            "edges": [list(edge) for edge in zip(distance, low, high, strict=True)],
         }
 
 
-def described(body: Body, azimuth: float) -> Payload:
+def describe_body(body: MeshBody, azimuth: float) -> Payload:
     """Return plan, rose and description of a body for the page; m from its centre of mass."""
     solid, rose = body.solid, body.rose
     pieces = body.sections.hulls[:: -(-len(body.sections.hulls) // 40)]
     corners = np.vstack(pieces) - solid.centre[:2]
     support = solid.support - solid.centre[:2]
-    parts = [each.name for each in solid.regions]
+    parts = [region.name for region in solid.regions]
     data = solid.rose([azimuth]).data
-    left_out = {name: float(data[name][0]) for name in ("coupling", "aside", "gap")}
+    neglected = {name: float(data[name][0]) for name in ("coupling", "aside", "gap")}
     header = {
         "name": solid.description,
-        "about": _about(solid),
+        "about": _describe_solid(solid),
         "parts": parts,
-        "left_out": phrase("body.left_out", azimuth=azimuth, **left_out),
+        "left_out": phrase("body.left_out", azimuth=azimuth, **neglected),
         "repaired": phrase("body.repaired", repairs="; ".join(solid.repairs))
         if solid.repairs
         else phrase("body.sound"),
@@ -100,42 +100,44 @@ def described(body: Body, azimuth: float) -> Payload:
         "acceleration": rose.data.acceleration.values,
         "support": support.ravel(),
         "plan": corners.ravel(),
-        "piece": np.cumsum([len(each) for each in pieces], dtype=float),
+        "piece": np.cumsum([len(piece) for piece in pieces], dtype=float),
     }
     return Payload(header, arrays)
 
 
-def pivots_of(body: Body, azimuth: float) -> tuple[tuple[float, float], float, float]:
+def find_pivots(body: MeshBody, azimuth: float) -> tuple[tuple[float, float], float, float]:
     """Return the pivot distances, height of mass and radius of gyration of a body in a plane, m."""
     plane: Plane = compute_plane(body.solid, azimuth)
     plus, minus = plane.pivots.distance.tolist()
     return (plus, minus), plane.height, plane.gyration
 
 
-def options_of(texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> dict[str, Any]:
+def read_options(texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> dict[str, Any]:
     """Read the texts that describe a body as arguments of `rocking.Solid.from_mesh`."""
-    given = {name: read(texts[name]) for name, read in _READERS.items() if name in texts}
-    return given | {name: each for name, each in (("tolerance", tolerance), ("gravity", gravity)) if each is not None}
+    options = {name: read(texts[name]) for name, read in _READERS.items() if name in texts}
+    return options | {
+        name: value for name, value in (("tolerance", tolerance), ("gravity", gravity)) if value is not None
+    }
 
 
-def read_body(name: str, upload: _File | None, given: Mapping[str, Any]) -> Body | RockingError:
+def read_body(name: str, upload: _File | None, arguments: Mapping[str, Any]) -> MeshBody | RockingError:
     """Read a mesh, one at a time; errors are returned for the cache, because a second attempt would take as long."""
-    options = {each: value for each, value in given.items() if each != "gravity"}
-    written = "".join(f", {each}={value!r}" for each, value in given.items())
+    options = {argument: value for argument, value in arguments.items() if argument != "gravity"}
+    written_arguments = "".join(f", {argument}={value!r}" for argument, value in arguments.items())
     try:
-        with _reading:
-            made, sections = made_here(name, options) if upload is None else made_apart(*upload, options)
-        solid = Solid(gravity=given.get("gravity", STANDARD_GRAVITY), **made)
+        with _read_lock:
+            parts, sections = read_mesh(name, options) if upload is None else read_mesh_in_process(*upload, options)
+        solid = Solid(gravity=arguments.get("gravity", STANDARD_GRAVITY), **parts)
     except RockingError as error:
         return error
-    return Body(solid, sections, f"Solid.from_mesh({upload[0] if upload else name!r}{written})")
+    return MeshBody(solid, sections, f"Solid.from_mesh({upload[0] if upload else name!r}{written_arguments})")
 
 
-def _about(solid: Solid) -> dict[str, Any]:
+def _describe_solid(solid: Solid) -> dict[str, Any]:
     """Describe a body."""
     count, name, size = len(solid.regions), solid.description, {"height": solid.height, "volume": solid.volume}
-    names = ", ".join(each.name for each in solid.regions[:_NAMED]) + ", ..." * (count > _NAMED)
-    whole = phrase("body.parts", name=name, count=count, names=names) if count > 1 else name
+    names = ", ".join(region.name for region in solid.regions[:_MAX_NAMED_PARTS]) + ", ..." * (count > _MAX_NAMED_PARTS)
+    name_with_parts = phrase("body.parts", name=name, count=count, names=names) if count > 1 else name
     if solid.mass is None:
-        return phrase("body.is", name=whole, **size)
-    return phrase("body.is_heavy", name=whole, mass=solid.mass, **size)
+        return phrase("body.is", name=name_with_parts, **size)
+    return phrase("body.is_heavy", name=name_with_parts, mass=solid.mass, **size)

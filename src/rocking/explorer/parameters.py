@@ -14,8 +14,8 @@ from rocking import records
 from rocking.core.constants import VERSION
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import InvalidOption
-from rocking.explorer.payload import english
-from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
+from rocking.explorer.payload import load_english_texts
+from rocking.inputs.declared import INPUTS, SCALINGS, Input, index_by_name
 from rocking.inputs.declared import SHAPES as ALL_SHAPES
 from rocking.inputs.pulses import FAMILIES
 from rocking.records.units import UNIT_NAMES
@@ -28,12 +28,12 @@ Texts = Mapping[str, str]
 Values = Mapping[str, Any]
 
 #: All texts of a case by name, in the order of the address and of the command line.
-PARAMETERS: Final = {name: each for name, each in INPUTS.items() if each.group}
+PARAMETERS: Final = {name: declared_input for name, declared_input in INPUTS.items() if declared_input.group}
 
-_LONGEST_TEXT: Final = 300
+_MAX_TEXT_LENGTH: Final = 300
 
 
-def _of(group: str, numbers: str, **texts: str) -> dict[str, Input]:
+def _declare(group: str, numbers: str, **texts: str) -> dict[str, Input]:
     """Declare names of an address in order: numbers, except for some texts with their defaults."""
     return {
         name: Input(
@@ -47,7 +47,7 @@ def _of(group: str, numbers: str, **texts: str) -> dict[str, Input]:
 
 
 #: Texts for a map of a case or of a study.
-MAP: Final = _of(
+MAP: Final = _declare(
     "map",
     "x x_from x_to y y_from y_to points quantity motion_index polarity_index scale_index "
     "fix_p fix_alpha fix_restitution fix_block",
@@ -55,15 +55,15 @@ MAP: Final = _of(
 )  # fmt: skip
 
 #: Texts for a sweep under periodic motion.
-SWEEP: Final = _of("sweep", "sweep sweep_from sweep_to sweep_points", sweep="a")
+SWEEP: Final = _declare("sweep", "sweep sweep_from sweep_to sweep_points", sweep="a")
 
 #: Text for the time of a reading.
-READING: Final = by_name(Input("at", "reading", "duration", "", "s"))
+READING: Final = index_by_name(Input("at", "reading", "duration", "", "s"))
 
 #: File name extensions of meshes.
 MESH_KINDS: Final = ("obj", "ply", "stl", "glb", "gltf")
 #: Texts for an assessment and its list of records.
-ASSESSMENT: Final = by_name(
+ASSESSMENT: Final = index_by_name(
     Input("records", "assessment", "text"),
     Input("measure", "assessment", "text", default="pga"),
     Input("measure_period", "assessment", "duration", "", "s", "1"),
@@ -84,7 +84,7 @@ SHOWN_IN: Final[Mapping[str, tuple[str, ...]]] = {
 DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
 
 
-class Shape(NamedTuple):
+class PageShape(NamedTuple):
     """Description of a block on the page: name, and required and optional parameters."""
 
     name: str
@@ -94,11 +94,11 @@ class Shape(NamedTuple):
 
 SHAPES: Final = (
     *(
-        Shape(shape.name, shape.needed, tuple(name for name in shape.optional if name in PARAMETERS))
+        PageShape(shape.name, shape.needed, tuple(name for name in shape.optional if name in PARAMETERS))
         for shape in ALL_SHAPES
         if PARAMETERS.keys() >= {*shape.needed}
     ),
-    Shape("mesh", ("mesh", "azimuth"), ("up", "unit", "density", "tolerance")),
+    PageShape("mesh", ("mesh", "azimuth"), ("up", "unit", "density", "tolerance")),
 )
 
 _PERIOD: Final = Input("period", "motion", "duration", "", "s", "1", 0.05, 5.0, True)
@@ -111,7 +111,7 @@ _CHOICES: Final[Mapping[str, dict[str, Any]]] = {
 }  # fmt: skip
 
 
-def _fields(pulse: str) -> tuple[Input, ...]:
+def _list_fields(pulse: str) -> tuple[Input, ...]:
     """Return the parameters of a pulse that have a field: required ones, and numbers with a default."""
     family = FAMILIES[pulse]
     numbers = (name for name, default in family.optional.items() if isinstance(default, float))
@@ -120,21 +120,21 @@ def _fields(pulse: str) -> tuple[Input, ...]:
 
 #: Parameters of each pulse, and choices.
 PULSES: Final[Mapping[str, dict[str, Any]]] = {
-    name: {"parameters": _fields(name), **choices} for name, choices in _CHOICES.items()
+    name: {"parameters": _list_fields(name), **choices} for name, choices in _CHOICES.items()
 }
 
 
-def _limited(name: str, unit: str, default: str, text: str) -> dict[str, Any]:
+def _declare_limited_scheme(name: str, unit: str, default: str, text: str) -> dict[str, Any]:
     """Return a scheme with the field of its limit, and its default limit."""
     limit = Input("limit", "treatment", "number", "", unit, default, 1e-9, 0.1, True, text=text)
-    return {"name": name, "limit": limit.described(), "unnamed": str(chattering_scheme(name)).partition("=")[2]}
+    return {"name": name, "limit": limit.describe(), "unnamed": str(chattering_scheme(name)).partition("=")[2]}
 
 
 _TREATMENTS: Final = (
     {"name": "certified"},
-    _limited("velocity", "", "0.05", "limit_velocity"),
-    _limited("bypass", "", "0.001", "limit_velocity"),
-    _limited("interval", "s", "0.001", "limit_interval"),
+    _declare_limited_scheme("velocity", "", "0.05", "limit_velocity"),
+    _declare_limited_scheme("bypass", "", "0.001", "limit_velocity"),
+    _declare_limited_scheme("interval", "s", "0.001", "limit_interval"),
     {"name": "time"},
 )
 
@@ -143,12 +143,12 @@ _TREATMENTS: Final = (
 QUANTITIES: Final = ("outcome", "rest", "peak", "mode")
 
 
-def names_of(*groups: str) -> tuple[str, ...]:
+def list_names(*groups: str) -> tuple[str, ...]:
     """Return the names of a case's texts in some groups.
 
     Examples
     --------
-    >>> names_of("start")
+    >>> list_names("start")
     ('initial_rotation', 'initial_velocity')
     """
     return tuple(name for name, parameter in PARAMETERS.items() if parameter.group in groups)
@@ -157,18 +157,18 @@ def names_of(*groups: str) -> tuple[str, ...]:
 NAMES: Final = tuple(PARAMETERS)
 
 #: Names of the texts that describe the block of a case.
-BLOCK_NAMES: Final = frozenset(names_of("block"))
+BLOCK_NAMES: Final = frozenset(list_names("block"))
 
 
-def given_texts(texts: Texts) -> dict[str, str]:
+def clean_texts(texts: Texts) -> dict[str, str]:
     """Return the texts of a case that are not empty."""
-    given = {name: value.strip() for name, value in texts.items() if value.strip()}
-    for name, value in given.items():
+    nonempty = {name: value.strip() for name, value in texts.items() if value.strip()}
+    for name, value in nonempty.items():
         if name not in NAMES:
             raise InvalidOption(f"a case has no {name[:40]!r}; it has {', '.join(NAMES)}")
-        if len(value) > _LONGEST_TEXT:
-            raise InvalidOption(f"{{}} is {len(value)} letters long; at most {_LONGEST_TEXT} are read", name)
-    return {"motion": DEFAULT["motion"], **given} if given else dict(DEFAULT)
+        if len(value) > _MAX_TEXT_LENGTH:
+            raise InvalidOption(f"{{}} is {len(value)} letters long; at most {_MAX_TEXT_LENGTH} are read", name)
+    return {"motion": DEFAULT["motion"], **nonempty} if nonempty else dict(DEFAULT)
 
 
 def field_label(name: str, motion: str = "", texts: Mapping[str, Any] | None = None) -> str:
@@ -184,18 +184,18 @@ def field_label(name: str, motion: str = "", texts: Mapping[str, Any] | None = N
     >>> field_label("amplitude", "sine:amplitude=0.2g"), field_label("amplitude", "mavroeidis-papageorgiou")
     ('“Amplitude”', '“Velocity amplitude”')
     """
-    shown = PULSES.get(motion.partition(":")[0])
-    known = PARAMETERS | MAP | SWEEP | READING | ASSESSMENT | by_name(_PERIOD)
-    known_texts = english() if texts is None else texts
+    pulse_in_motion = PULSES.get(motion.partition(":")[0])
+    inputs = PARAMETERS | MAP | SWEEP | READING | ASSESSMENT | index_by_name(_PERIOD)
+    labels = load_english_texts() if texts is None else texts
     fields = {
-        each.text
-        for pulse in (PULSES.values() if shown is None else [shown])
-        for each in pulse["parameters"]
-        if each.name == name
+        field.text
+        for pulse in (PULSES.values() if pulse_in_motion is None else [pulse_in_motion])
+        for field in pulse["parameters"]
+        if field.name == name
     }
-    if name in known:
-        fields = {known[name].text or name}
-    return f"“{known_texts[f'field.{fields.pop()}']}”" if len(fields) == 1 else name
+    if name in inputs:
+        fields = {inputs[name].text or name}
+    return f"“{labels[f'field.{fields.pop()}']}”" if len(fields) == 1 else name
 
 
 @functools.cache
@@ -204,23 +204,23 @@ def specification() -> dict[str, Any]:
     return {
         "version": VERSION,
         "default": DEFAULT,
-        "parameters": [parameter.described() for parameter in PARAMETERS.values()],
+        "parameters": [parameter.describe() for parameter in PARAMETERS.values()],
         "map": list(MAP),
         "sweep": list(SWEEP),
         "assessment": list(ASSESSMENT),
         "shown_in": {name: list(units) for name, units in SHOWN_IN.items()},
         "shapes": [shape._asdict() for shape in SHAPES],
         "scalings": ["", *SCALINGS],
-        "period": _PERIOD.described(),
+        "period": _PERIOD.describe(),
         "pulses": {
-            name: {**pulse, "parameters": [parameter.described() for parameter in pulse["parameters"]]}
+            name: {**pulse, "parameters": [parameter.describe() for parameter in pulse["parameters"]]}
             for name, pulse in PULSES.items()
         },
         "meshes": [*SHIPPED_MESHES],
         "mesh_kinds": list(MESH_KINDS),
         "records": [
             {"name": name}
-            | {each: getattr(records.info(name), each) for each in ("title", "event", "station", "direction")}
+            | {key: getattr(records.info(name), key) for key in ("title", "event", "station", "direction")}
             for name in records.names()
         ],
         "mesh_units": list(MESH_UNITS),

@@ -18,7 +18,7 @@ from rocking.core.arrays import Floats
 from rocking.core.tables import plain
 
 #: Placeholders of the page for texts.
-_PLACE: Final = re.compile(r"\{([a-z]+\.[a-z_]+)\}")
+_PLACEHOLDER: Final = re.compile(r"\{([a-z]+\.[a-z_]+)\}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,21 +57,23 @@ def phrase(key: str, **values: Any) -> dict[str, Any]:
     return {"phrase": key, "values": values}
 
 
-def filled(page: str, texts: Mapping[str, Any]) -> str:
+def fill_page(page: str, texts: Mapping[str, Any]) -> str:
     """Return the page with each ``{key}`` replaced by its text, and with all texts for its scripts.
 
     Examples
     --------
-    >>> filled('<b title="{save.copy}">{save.copy}</b>TEXTS', {"save.copy": "Copy"})
+    >>> fill_page('<b title="{save.copy}">{save.copy}</b>TEXTS', {"save.copy": "Copy"})
     '<b title="Copy">Copy</b>{"save.copy": "Copy"}'
     """
-    said = json.dumps({key: text for key, text in texts.items() if key}, ensure_ascii=False).replace("<", "\\u003c")
-    return _PLACE.sub(lambda place: escape(texts[place[1]]), page).replace("TEXTS", said, 1)
+    json_texts = json.dumps({key: text for key, text in texts.items() if key}, ensure_ascii=False).replace(
+        "<", "\\u003c"
+    )
+    return _PLACEHOLDER.sub(lambda match: escape(texts[match[1]]), page).replace("TEXTS", json_texts, 1)
 
 
 @functools.cache
-def english() -> dict[str, Any]:
+def load_english_texts() -> dict[str, Any]:
     """Return the English texts by key; a text with several forms is a dictionary of them."""
     file = resources.files("rocking.explorer") / "page" / "texts.json"
-    found: dict[str, Any] = json.loads(file.read_text("utf-8"))
-    return found
+    texts: dict[str, Any] = json.loads(file.read_text("utf-8"))
+    return texts

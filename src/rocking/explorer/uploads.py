@@ -14,7 +14,7 @@ from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 from rocking.core import checks
 from rocking.errors import InvalidBlock, InvalidMotion, RockingError, UnreadableRecord
-from rocking.explorer.meshes import Body, options_of, read_body
+from rocking.explorer.meshes import MeshBody, read_body, read_options
 from rocking.explorer.parameters import MESH_KINDS
 from rocking.inputs.notes import motion_notes
 from rocking.motion.motion import Motion
@@ -27,33 +27,33 @@ from rocking.solid.mesh import SHIPPED_MESHES
 V = TypeVar("V")
 
 #: Largest file, bytes: twenty times a long record of three channels.
-LARGEST: Final = 16 * 2**20
-TOO_LARGE: Final = (
-    f"a file may be {LARGEST // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
+MAX_FILE_SIZE: Final = 16 * 2**20
+TOO_LARGE_MESSAGE: Final = (
+    f"a file may be {MAX_FILE_SIZE // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
 )
 
 #: Maximum number of files, forty stations of three components, and their bytes. Further records are rejected, so that
 #: none disappears unnoticed.
-MOST: Final = 120
-ALL: Final = 256 * 2**20
+MAX_FILES: Final = 120
+MAX_BYTES: Final = 256 * 2**20
 
 #: Maximum number of cached bodies of meshes.
-_BODIES: Final = 12
+_MAX_BODIES: Final = 12
 
 #: Maximum number of samples in a channel: 1.5 hours at 100 Hz. A motion takes some 120 bytes per sample.
-LONGEST: Final = 500_000
+MAX_SAMPLES: Final = 500_000
 
 #: Maximum number of samples of cached motions, of 120 bytes each; the least recently used are removed first.
-READ: Final = 3_000_000
+MAX_CACHED_SAMPLES: Final = 3_000_000
 
 #: Maximum number of lines in a file (two such channels with a line per sample), and of possibly compressed samples.
-_MOST_LINES, _MOST_SAMPLES = 2 * LONGEST, 8 * LONGEST
+_MAX_LINES, _MAX_FILE_SAMPLES = 2 * MAX_SAMPLES, 8 * MAX_SAMPLES
 
-#: Letters of a name, and of a hash.
-_NAME, _HASH = 80, 24
+#: Lengths of a name and of a key.
+_NAME_LENGTH, _KEY_LENGTH = 80, 24
 
-#: Placeholder arguments for reading the channels of a file with missing metadata.
-_STAND_INS: Final[dict[str, Any]] = {"dt": 1.0, "units": "m/s2"}
+#: Substitutes for missing metadata while the channels of a file are described.
+_PLACEHOLDERS: Final[dict[str, Any]] = {"dt": 1.0, "units": "m/s2"}
 
 
 class Upload(NamedTuple):
@@ -69,28 +69,28 @@ class Upload(NamedTuple):
         return stream
 
 
-class Recent(Generic[V]):
+class RecentCache(Generic[V]):
     """Thread-safe least-recently-used cache with limited total weight."""
 
-    def __init__(self, most: float, weight: Callable[[V], float] = lambda _: 1.0) -> None:
-        self._most, self._weight = most, weight
+    def __init__(self, max_weight: float, weight: Callable[[V], float] = lambda _: 1.0) -> None:
+        self._max_weight, self._weight = max_weight, weight
         self._lock = threading.Lock()
         self._values: OrderedDict[tuple[str, ...], V] = OrderedDict()
 
-    def get(self, key: tuple[str, ...], make: Callable[[], V]) -> V:
+    def get(self, key: tuple[str, ...], create: Callable[[], V]) -> V:
         """Return the value of a key, created unless it is cached."""
         with self._lock:
             if key in self._values:
                 self._values.move_to_end(key)
                 return self._values[key]
-        value = make()
+        value = create()
         with self._lock:
             self._values[key] = value
-            while len(self._values) > 1 and sum(map(self._weight, self._values.values())) > self._most:
+            while len(self._values) > 1 and sum(map(self._weight, self._values.values())) > self._max_weight:
                 self._values.popitem(last=False)
         return value
 
-    def forget(self, name: str) -> None:
+    def remove(self, name: str) -> None:
         """Remove all values whose keys contain a name."""
         with self._lock:
             for key in [key for key in self._values if any(name in part for part in key)]:
@@ -104,53 +104,56 @@ class UploadStore:
         self._lock = threading.Lock()
         self._files: dict[str, Upload] = {}
         self._motions: dict[str, Motion] = {}
-        self._read = Recent[Motion](READ, lambda motion: len(motion.breakpoints))
-        self._told = Recent[dict[str, Any]](4 * MOST)
-        self._bodies = Recent["Body | RockingError"](_BODIES)
+        self._record_motions = RecentCache[Motion](MAX_CACHED_SAMPLES, lambda motion: len(motion.breakpoints))
+        self._descriptions = RecentCache[dict[str, Any]](4 * MAX_FILES)
+        self._bodies = RecentCache["MeshBody | RockingError"](_MAX_BODIES)
 
     def add_file(self, name: str, data: bytes) -> str:
         """Store a record, and return its key."""
-        upload = Upload(bare_name(name), data)
-        if (lines := max(data.count(b"\n"), data.count(b"\r"))) > _MOST_LINES and b"\0" not in data:
+        upload = Upload(clean_file_name(name), data)
+        if (lines := max(data.count(b"\n"), data.count(b"\r"))) > _MAX_LINES and b"\0" not in data:
             raise UnreadableRecord(
-                f"{lines} lines, of which at most {_MOST_LINES} are read here; cut the record into smaller files",
+                f"{lines} lines, of which at most {_MAX_LINES} are read here; cut the record into smaller files",
                 path=upload.name,
             )
-        return self._kept(upload)
+        return self._add_upload(upload)
 
     def add_mesh(self, name: str, data: bytes) -> str:
         """Store a mesh, and return its key."""
-        upload = Upload(bare_name(name), data)
+        upload = Upload(clean_file_name(name), data)
         if not _is_mesh(upload.name):
             kinds = ", ".join(MESH_KINDS)
             raise UnreadableRecord(f"is no mesh by its name: files of {kinds} are read here", path=upload.name)
-        return self._kept(upload)
+        return self._add_upload(upload)
 
-    def _kept(self, upload: Upload) -> str:
-        key = hashlib.sha256(upload.data).hexdigest()[:_HASH]
-        if len(upload.data) > LARGEST:
-            raise UnreadableRecord(TOO_LARGE, path=upload.name)
+    def _add_upload(self, upload: Upload) -> str:
+        key = hashlib.sha256(upload.data).hexdigest()[:_KEY_LENGTH]
+        if len(upload.data) > MAX_FILE_SIZE:
+            raise UnreadableRecord(TOO_LARGE_MESSAGE, path=upload.name)
         with self._lock:
             others = {name: file for name, file in self._files.items() if name != key}
-            while len(others) >= MOST or sum(len(file.data) for file in others.values()) + len(upload.data) > ALL:
-                # No list shows meshes: the oldest one leaves.
+            while (
+                len(others) >= MAX_FILES
+                or sum(len(file.data) for file in others.values()) + len(upload.data) > MAX_BYTES
+            ):
+                # Meshes are in no list on the page, so the oldest one is removed.
                 mesh = next((name for name, file in others.items() if _is_mesh(file.name)), None)
                 if mesh is None:
                     raise UnreadableRecord(
-                        f"it cannot be kept: {MOST} files and {ALL // 2**20} MiB are kept at most; take some out of "
-                        "the list of records first",
+                        f"it cannot be kept: {MAX_FILES} files and {MAX_BYTES // 2**20} MiB are kept at most; take "
+                        "some out of the list of records first",
                         path=upload.name,
                     )
                 del others[mesh], self._files[mesh]
-            # Results of a content have the name under which it came first, which stays.
+            # Cached results contain the first name of a content, so the name is not replaced.
             self._files.setdefault(key, upload)
         return key
 
-    def take(self, name: str, data: bytes) -> dict[str, Any]:
+    def add_and_describe(self, name: str, data: bytes) -> dict[str, Any]:
         """Store a file, unless it is unreadable, and describe it."""
         key = self.add_file(name, data)
         try:
-            return self.contents(key)
+            return self.describe_file(key)
         except RockingError:
             self.remove(key)
             raise
@@ -160,29 +163,29 @@ class UploadStore:
         self.file(key)
         with self._lock:
             self._files.pop(key, None)
-        for store in (self._read, self._told, self._bodies):
-            store.forget(key)
+        for cache in (self._record_motions, self._descriptions, self._bodies):
+            cache.remove(key)
 
-    def kept(self) -> tuple[str, ...]:
+    def list_records(self) -> tuple[str, ...]:
         """Return the keys of the stored records, in order of upload."""
         with self._lock:
-            return tuple(key for key, each in self._files.items() if not _is_mesh(each.name))
+            return tuple(key for key, upload in self._files.items() if not _is_mesh(upload.name))
 
     def usage(self) -> dict[str, int]:
         """Return number and bytes of the stored files, and their limits."""
         with self._lock:
-            held = sum(len(each.data) for each in self._files.values())
-            return {"files": len(self._files), "bytes": held, "most_files": MOST, "most_bytes": ALL}
+            total = sum(len(upload.data) for upload in self._files.values())
+            return {"files": len(self._files), "bytes": total, "most_files": MAX_FILES, "most_bytes": MAX_BYTES}
 
     def add_motion(self, motion: Motion) -> str:
         """Store a motion of the program, and return its key."""
         components = [motion] if motion.vertical is None else [motion, motion.vertical]
-        parts = [
-            part
-            for one in components
-            for part in (one.breakpoints.tobytes(), one.coefficients.tobytes(), one.name.encode())
+        contents = [
+            content
+            for component in components
+            for content in (component.breakpoints.tobytes(), component.coefficients.tobytes(), component.name.encode())
         ]
-        key = hashlib.sha256(b"".join(parts)).hexdigest()[:_HASH]
+        key = hashlib.sha256(b"".join(contents)).hexdigest()[:_KEY_LENGTH]
         with self._lock:
             self._motions[key] = motion
         return key
@@ -193,96 +196,99 @@ class UploadStore:
             raise UnreadableRecord("this link names a motion of another program: open the page from there again")
         return self._motions[key]
 
-    def file(self, key: str, what: str = "record") -> Upload:
+    def file(self, key: str, kind: str = "record") -> Upload:
         """Return a stored file."""
         with self._lock:
             if key not in self._files:
-                raise UnreadableRecord(f"this {what} is not here any more: drop its file on the page again")
+                raise UnreadableRecord(f"this {kind} is not here any more: drop its file on the page again")
             return self._files[key]
 
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
         """Return the motion of a file, with the arguments of `rocking.read`."""
         upload = self.file(key)
-        request = _request(dt, units, channel)
-        return self._read.get(
+        request = _create_request(dt, units, channel)
+        return self._record_motions.get(
             (key, str(channel), str(dt), str(units)),
-            lambda: _shown(upload, formats.read_channel(upload.stream(), request)),
+            lambda: _read_channel(upload, formats.read_channel(upload.stream(), request)),
         )
 
-    def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> Body:
+    def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> MeshBody:
         """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts of a case."""
         upload = self.file(name.removeprefix("file:"), "mesh") if name.startswith("file:") else None
         if upload is None:
             checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED_MESHES])
-        given = options_of(texts, tolerance, gravity)
-        key = name, upload.name if upload else "", json.dumps(given)
-        found = self._bodies.get(key, lambda: read_body(name, upload, given))
-        if isinstance(found, RockingError):
-            raise found
-        return found
+        options = read_options(texts, tolerance, gravity)
+        key = name, upload.name if upload else "", json.dumps(options)
+        body = self._bodies.get(key, lambda: read_body(name, upload, options))
+        if isinstance(body, RockingError):
+            raise body
+        return body
 
-    def contents(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
+    def describe_file(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
         """Describe a file: its format, channels, and arguments that reading requires."""
         upload = self.file(key)
-        return self._told.get((key, str(dt), str(units)), lambda: self._contents(key, upload, dt, units))
+        return self._descriptions.get((key, str(dt), str(units)), lambda: self._describe_file(key, upload, dt, units))
 
-    def _contents(self, key: str, upload: Upload, dt: float | None, units: str | None) -> dict[str, Any]:
-        given: dict[str, Any] = {"dt": dt, "units": units}
+    def _describe_file(self, key: str, upload: Upload, dt: float | None, units: str | None) -> dict[str, Any]:
+        options: dict[str, Any] = {"dt": dt, "units": units}
         missing: list[str] = []
         while True:
             try:
-                identification, channels = formats.read_content(upload.stream(), _request(**given))
+                identification, channels = formats.read_content(upload.stream(), _create_request(**options))
                 break
             except (UnreadableRecord, InvalidMotion) as error:
                 name = error.argument
-                if name not in _STAND_INS or given[name] is not None:
+                if name not in _PLACEHOLDERS or options[name] is not None:
                     raise
                 missing.append(name)
-                given[name] = _STAND_INS[name]
+                options[name] = _PLACEHOLDERS[name]
         return {
             "key": key,
             "name": upload.name,
             "format": identification.format,
             "reason": identification.reason,
             "missing": missing,
-            "channels": [{**_about(each), **_told(_shown(upload, each), missing)} for each in channels],
+            "channels": [
+                {**_list_metadata(channel), **_describe_motion(_read_channel(upload, channel), missing)}
+                for channel in channels
+            ],
         }
 
 
-def _about(channel: Channel) -> dict[str, Any]:
+def _list_metadata(channel: Channel) -> dict[str, Any]:
     """Return the metadata of a channel."""
-    said = {name: getattr(channel, name) for name in ("number", "name", "station", "event", "azimuth")}
-    return {**said, "samples": len(channel.acceleration), "step": channel.dt}
+    metadata = {name: getattr(channel, name) for name in ("number", "name", "station", "event", "azimuth")}
+    return {**metadata, "samples": len(channel.acceleration), "step": channel.dt}
 
 
-def _request(dt: float | None, units: str | None, channel: str | None = None) -> Request:
-    return replace(Request.create(dt, units, channel), max_samples=_MOST_SAMPLES)
+def _create_request(dt: float | None, units: str | None, channel: str | None = None) -> Request:
+    return replace(Request.create(dt, units, channel), max_samples=_MAX_FILE_SAMPLES)
 
 
-def _shown(upload: Upload, channel: Channel) -> Motion:
+def _read_channel(upload: Upload, channel: Channel) -> Motion:
     """Return a channel as a motion; reject motions longer than the limit of the page."""
     samples = len(channel.acceleration)
-    if samples > LONGEST:
-        raise InvalidMotion(f"{samples} samples; at most {LONGEST} are shown here", path=upload.name)
+    if samples > MAX_SAMPLES:
+        raise InvalidMotion(f"{samples} samples; at most {MAX_SAMPLES} are shown here", path=upload.name)
     return channel.motion()
 
 
-def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
+def _describe_motion(motion: Motion, missing: list[str]) -> dict[str, Any]:
     """Return likely mistakes in a channel and its measures, or the effect of each choice of missing metadata."""
     if not missing:
-        return {"notes": list(motion_notes(motion)), "choices": {}, "measures": measures(motion)}
+        return {"notes": list(motion_notes(motion)), "choices": {}, "measures": compute_measures(motion)}
     choices: dict[str, list[tuple[str, dict[str, float]]]] = {}
     if "units" in missing:
         units = {name: unit for name in UNIT_NAMES if (unit := find_unit(name)) is not None}
         peaks = {name: motion.pga * unit.multiplier / unit.divisor for name, unit in units.items()}
         choices["units"] = [(name, {"peak": peak}) for name, peak in peaks.items()]
     if "dt" in missing:
-        steps = motion.duration / _STAND_INS["dt"]
+        steps = motion.duration / _PLACEHOLDERS["dt"]
         choices["dt"] = [(f"{step:g}", {"lasts": steps * step}) for step in (0.002, 0.005, 0.01, 0.02)]
     return {"notes": [], "choices": choices, "measures": None}
 
 
-def measures(motion: Motion) -> dict[str, float]:
+def compute_measures(motion: Motion) -> dict[str, float]:
     """Return the listed measures of a record: PGA (m/s^2), PGV (m/s), 5-95 % duration and total duration (s)."""
     return {
         "pga": motion.pga,
@@ -296,14 +302,14 @@ def _is_mesh(name: str) -> bool:
     return PurePosixPath(name).suffix.lower().removeprefix(".") in MESH_KINDS
 
 
-def bare_name(name: str) -> str:
+def clean_file_name(name: str) -> str:
     r"""Return a file's name without folders and control characters, truncated.
 
     Examples
     --------
-    >>> bare_name("../../etc/passwd"), bare_name("C:\\data\\RSN6.AT2"), bare_name("\x00")
+    >>> clean_file_name("../../etc/passwd"), clean_file_name("C:\\data\\RSN6.AT2"), clean_file_name("\x00")
     ('passwd', 'RSN6.AT2', 'record')
     """
-    last = PurePosixPath(PureWindowsPath(name).name).name
-    shown = "".join(letter for letter in last if letter.isprintable()).strip()
-    return shown[-_NAME:] or "record"
+    file_name = PurePosixPath(PureWindowsPath(name).name).name
+    printable = "".join(letter for letter in file_name if letter.isprintable()).strip()
+    return printable[-_NAME_LENGTH:] or "record"

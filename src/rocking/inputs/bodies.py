@@ -18,7 +18,7 @@ from rocking.inputs.notes import block_notes, restraint_notes
 from rocking.inputs.quantities import Quantity
 
 #: Number of bodies that are checked for likely mistakes.
-_NOTED: Final = 100
+_MAX_CHECKED: Final = 100
 
 
 #: Hint if a slenderness is the only input of a block.
@@ -28,87 +28,91 @@ _FREQUENCY_PARAMETER: Final = (
 )
 
 
-def shape_of(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
+def find_shape(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
     """Return the description that contains the named inputs, or raise `InvalidBlock` if there is not exactly one."""
-    given = [name for name in BLOCK if name in {*names} and name != "restitution"]
+    provided = [name for name in BLOCK if name in {*names} and name != "restitution"]
     for shape in shapes:
-        if {*shape.needed} <= {*given} <= {*shape.needed, *shape.optional}:
+        if {*shape.needed} <= {*provided} <= {*shape.needed, *shape.optional}:
             return shape
-    having = {shape.needed: {*shape.needed, *shape.optional} for shape in shapes}
-    having = {needed: known for needed, known in having.items() if known & {*given}} or having
-    begun = [needed for needed in having if {*needed} & {*given}] or [*having]
-    if not given:
-        raise InvalidBlock(f"a block is needed: give {one_of(having)}", *itertools.chain(*having))
-    if any(not {*given} <= having[needed] for needed in begun):
-        sentence = f"{all_of(given)} belong to different descriptions of a block; give one: {one_of(having)}"
-        raise InvalidBlock(sentence, *given, *itertools.chain(*having))
-    hint = f"; {_FREQUENCY_PARAMETER}" if given == ["alpha"] and "p" in begun[0] else ""
+    candidates = {shape.needed: {*shape.needed, *shape.optional} for shape in shapes}
+    candidates = {needed: allowed for needed, allowed in candidates.items() if allowed & {*provided}} or candidates
+    started = [needed for needed in candidates if {*needed} & {*provided}] or [*candidates]
+    if not provided:
+        raise InvalidBlock(f"a block is needed: give {name_either(candidates)}", *itertools.chain(*candidates))
+    if any(not {*provided} <= candidates[needed] for needed in started):
+        sentence = (
+            f"{name_all(provided)} belong to different descriptions of a block; give one: {name_either(candidates)}"
+        )
+        raise InvalidBlock(sentence, *provided, *itertools.chain(*candidates))
+    hint = f"; {_FREQUENCY_PARAMETER}" if provided == ["alpha"] and "p" in started[0] else ""
     raise InvalidBlock(
-        f"a block needs more than {all_of(given)}: give {one_of(begun)}{hint}", *given, *itertools.chain(*begun)
+        f"a block needs more than {name_all(provided)}: give {name_either(started)}{hint}",
+        *provided,
+        *itertools.chain(*started),
     )
 
 
-def block_of(values: Mapping[str, Any], shapes: Sequence[Shape] = SHAPES) -> Block:
+def create_block(values: Mapping[str, Any], shapes: Sequence[Shape] = SHAPES) -> Block:
     """Create the block that the values describe.
 
     Examples
     --------
-    >>> block_of({"width": 0.24, "height": 1.1}).half_width, call_of({"p": 2.0, "alpha": 0.2})
+    >>> create_block({"width": 0.24, "height": 1.1}).half_width, write_block_call({"p": 2.0, "alpha": 0.2})
     (0.12, 'Block.from_parameters(p=2.0, alpha=0.2)')
     """
-    described = {name: value for name, value in values.items() if name in BLOCK or name == "gravity"}
-    return shape_of(described, shapes).make(**_arguments(described))
+    block_values = {name: value for name, value in values.items() if name in BLOCK or name == "gravity"}
+    return find_shape(block_values, shapes).make(**_find_arguments(block_values))
 
 
-def call_of(values: Mapping[str, Any]) -> str:
+def write_block_call(values: Mapping[str, Any]) -> str:
     """Return the Python call that creates the block."""
-    return f"{shape_of(values).make.__qualname__}({texts.arguments(_arguments(values))})"
+    return f"{find_shape(values).make.__qualname__}({texts.write_arguments(_find_arguments(values))})"
 
 
-def body_of(block: Block, values: Mapping[str, Any], restraints: Sequence[Restraint] = ()) -> Body:
+def create_body(block: Block, values: Mapping[str, Any], restraints: Sequence[Restraint] = ()) -> Body:
     """Return a block with its restraints, as a wall or leaning if the values require it; by default the block alone."""
-    held = {name: values[name] for name in ("one_sided", "lean") if name in values}
-    if not restraints and not held:
+    options = {name: values[name] for name in ("one_sided", "lean") if name in values}
+    if not restraints and not options:
         return block
-    return RestrainedBlock(block, *restraints, **held, restitution=values.get("restitution"))
+    return RestrainedBlock(block, *restraints, **options, restitution=values.get("restitution"))
 
 
 def note_likely_mistakes(blocks: Sequence[Block], bodies: Sequence[Body] = ()) -> None:
     """Issue a note on each likely mistake in the first of some blocks, or in their restraints, without repetition."""
-    notes = [sentence for block in blocks[:_NOTED] for sentence in block_notes(block)]
-    for body in bodies[:_NOTED]:
+    notes = [sentence for block in blocks[:_MAX_CHECKED] for sentence in block_notes(block)]
+    for body in bodies[:_MAX_CHECKED]:
         notes += restraint_notes(body) if isinstance(body, RestrainedBlock) else ()
     for sentence in dict.fromkeys(notes):
         note(sentence)
 
 
-def quantity_of(parameter: str) -> Quantity:
+def find_reader(parameter: str) -> Quantity:
     """Return the reader of a parameter of a restraint or of another body."""
     kind = INPUTS[parameter].kind if parameter in INPUTS else "number"
     return READERS.get(kind, READERS["number"])[0]
 
 
-def check_parameters(kind: Callable[..., object], given: Iterable[str], of: str, *names: str) -> None:
+def check_parameters(factory: Callable[..., object], provided: Iterable[str], owner: str, *names: str) -> None:
     """Check that names are parameters of a kind and that none is missing; ``names`` are the parameters in ``of``."""
-    known = inspect.signature(kind).parameters
-    for name in given:
-        if name not in known:
-            hint = checks.meant(name, [*known], f"there are {', '.join(known)}")
-            raise InvalidOption(f"{of} has no {literal(name)}; {hint}", *names, name)
-    missing = [name for name, each in known.items() if each.default is each.empty and name not in {*given}]
+    parameters = inspect.signature(factory).parameters
+    for name in provided:
+        if name not in parameters:
+            hint = checks.meant(name, [*parameters], f"there are {', '.join(parameters)}")
+            raise InvalidOption(f"{owner} has no {literal(name)}; {hint}", *names, name)
+    missing = [name for name, item in parameters.items() if item.default is item.empty and name not in {*provided}]
     if missing:
-        raise InvalidOption(f"{of} needs {' and '.join(missing)} as well", *names)
+        raise InvalidOption(f"{owner} needs {' and '.join(missing)} as well", *names)
 
 
-def all_of(names: Sequence[str]) -> str:
-    """Return placeholders for all of some names in a sentence."""
+def name_all(names: Sequence[str]) -> str:
+    """Return placeholders of a message for all names."""
     return " and ".join(["{}"] * len(names))
 
 
-def one_of(descriptions: Iterable[Sequence[str]]) -> str:
-    """Return placeholders for the names of one of several descriptions in a sentence."""
-    return ", or ".join(map(all_of, descriptions))
+def name_either(descriptions: Iterable[Sequence[str]]) -> str:
+    """Return placeholders of a message for the names of alternative descriptions."""
+    return ", or ".join(map(name_all, descriptions))
 
 
-def _arguments(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {each.argument or name: values[name] for name, each in INPUTS.items() if name in values}
+def _find_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {declared_input.argument or name: values[name] for name, declared_input in INPUTS.items() if name in values}

@@ -15,22 +15,22 @@ from rocking.records.units import normalise_spelling
 
 #: Reader of a number of each kind, and its SI unit.
 READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
-    "number": (quantities.number, ""),
-    "length": (quantities.length, "m"),
-    "position": (quantities.position, "m"),
-    "angle": (quantities.angle, "rad"),
-    "tilt": (quantities.tilt, "rad"),
-    "rate": (quantities.rate, "rad/s"),
-    "duration": (quantities.duration, "s"),
-    "velocity": (quantities.velocity, "m/s"),
-    "frequency": (quantities.frequency, "Hz"),
-    "acceleration": (quantities.acceleration, "m/s^2"),
+    "number": (quantities.read_number, ""),
+    "length": (quantities.read_length, "m"),
+    "position": (quantities.read_position, "m"),
+    "angle": (quantities.read_angle, "rad"),
+    "tilt": (quantities.read_tilt, "rad"),
+    "rate": (quantities.read_rate, "rad/s"),
+    "duration": (quantities.read_duration, "s"),
+    "velocity": (quantities.read_velocity, "m/s"),
+    "frequency": (quantities.read_frequency, "Hz"),
+    "acceleration": (quantities.read_acceleration, "m/s^2"),
 }
 
 
-def noted_acceleration(text: str, name: str) -> float:
+def read_noted_acceleration(text: str, name: str) -> float:
     """Return an acceleration, m/s^2, with a note if a number without a unit is probably in g."""
-    value = quantities.acceleration(text, name)
+    value = quantities.read_acceleration(text, name)
     for sentence in level_notes(text, value, name):
         note(sentence)
     return value
@@ -85,17 +85,17 @@ class Input:
         ((0.1, 0.2), (2.0, 0.5), (0.2, 0.2))
         """
         if self.kind == "acceleration at a period":
-            return quantities.at_a_period(text, self.name)
+            return quantities.read_level_at_period(text, self.name)
         if self.kind not in READERS:
             return text
         if self.values == "one":
-            return self.one(text)
-        found = quantities.sides(text, self.name, READERS[self.kind][0])
-        if self.values == "two" and not isinstance(found, list):
-            found = [found, found]
-        return tuple(found) if isinstance(found, list) else found
+            return self.read_one(text)
+        sides_read = quantities.read_sides(text, self.name, READERS[self.kind][0])
+        if self.values == "two" and not isinstance(sides_read, list):
+            sides_read = [sides_read, sides_read]
+        return tuple(sides_read) if isinstance(sides_read, list) else sides_read
 
-    def one(self, text: str) -> float:
+    def read_one(self, text: str) -> float:
         """Return a number for one side, or for both."""
         return READERS[self.kind][0](text, self.name)
 
@@ -105,44 +105,44 @@ class Input:
             return [value]
         reader = READERS[self.kind][0]
         if self.values != "two":
-            return [*map(float, quantities.axis(value, self.name, reader))]
+            return [*map(float, quantities.read_axis(value, self.name, reader))]
         pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
-        found = [tuple(map(float, quantities.axis(pair, self.name, reader))) for pair in pairs]
-        if any(len(pair) != 2 for pair in found):
+        pairs_read = [tuple(map(float, quantities.read_axis(pair, self.name, reader))) for pair in pairs]
+        if any(len(pair) != 2 for pair in pairs_read):
             raise InvalidOption(
                 "{} must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs", self.name, value=value
             )
-        return [*found]
+        return [*pairs_read]
 
-    def described(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, Any]:
         """Return the properties that the page requires, in plain values."""
         names = ("name", "group", "unit", "default", "low", "high", "logarithmic", "values", "step")
         plain = {name: getattr(self, name) for name in names}
         kind = "angle" if self.kind == "tilt" else self.kind
-        return {**plain, "kind": kind, "text": self.text or self.name, "suffix": self.suffix, "units": self._units()}
+        return {**plain, "kind": kind, "text": self.text or self.name, "suffix": self.suffix, "units": self._sizes()}
 
     @property
     def suffix(self) -> str:
         """Unit written after a number in the displayed unit; empty for an azimuth, always in degrees."""
         return "" if self.kind == "number" else {"°": "deg", "g": "g"}.get(self.unit, "")
 
-    def _units(self) -> dict[str, float]:
+    def _sizes(self) -> dict[str, float]:
         """Return the sizes of units relative to the displayed unit, by their plain spellings in `quantities.UNITS`."""
         kind = {"acceleration at a period": "acceleration", "tilt": "angle"}.get(self.kind, self.kind)
         if kind not in quantities.UNITS:
             return {}
         units = quantities.UNITS[kind]
-        shown = units[normalise_spelling(self.suffix)]
-        return {name: unit.multiplier * shown.divisor / unit.divisor / shown.multiplier for name, unit in units.items()}
+        base = units[normalise_spelling(self.suffix)]
+        return {name: unit.multiplier * base.divisor / unit.divisor / base.multiplier for name, unit in units.items()}
 
 
-def by_name(*inputs: Input) -> dict[str, Input]:
+def index_by_name(*inputs: Input) -> dict[str, Input]:
     """Return inputs by their names."""
-    return {each.name: each for each in inputs}
+    return {declared_input.name: declared_input for declared_input in inputs}
 
 
 #: All inputs of a single simulation, in the order of the address of the page.
-INPUTS: Final = by_name(
+INPUTS: Final = index_by_name(
     Input("half_width", "", "position", "Half the width of a rectangular block, 0.12 (m) or 12cm."),
     Input("half_height", "", "position", "Half its height, m."),
     Input("width", "block", "position", "Width of a rectangular block, 0.24 (m) or 24cm; with --height.",
@@ -238,9 +238,9 @@ SHAPES: Final = (
     Shape("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
 )
 
-BLOCK: Final = (*dict.fromkeys(n for shape in SHAPES for n in (*shape.needed, *shape.optional)), "restitution")
+BLOCK: Final = (*dict.fromkeys(name for shape in SHAPES for name in (*shape.needed, *shape.optional)), "restitution")
 
 #: Restraints by the names of their inputs. Couples are numbers, the others have parameters.
 COUPLES: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}
 FORCES: Final[Mapping[str, Callable[..., Restraint]]] = {"tendon": Tendon, "thrust": Thrust, "load": Load}
-HELD: Final = ("one_sided", "lean", "tendon", "spring", "damper", "thrust", "load")
+SUPPORTS: Final = ("one_sided", "lean", "tendon", "spring", "damper", "thrust", "load")

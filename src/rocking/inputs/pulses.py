@@ -12,29 +12,29 @@ from rocking import pulses
 from rocking.core import checks
 from rocking.errors import InvalidOption
 from rocking.inputs import quantities
-from rocking.inputs.declared import READERS, Input, by_name
+from rocking.inputs.declared import READERS, Input, index_by_name
 from rocking.motion.motion import Motion
 
 
-def _parameter(name: str, kind: str, unit: str, default: str, low: float, high: float, text: str = "") -> Input:
+def _declare(name: str, kind: str, unit: str, default: str, low: float, high: float, text: str = "") -> Input:
     """Declare a parameter of pulses, with a logarithmic slider if possible."""
     logarithmic = low > 0.0 and name not in ("cycles", "gamma")
     return Input(name, "pulse", kind, "", unit, default, low, high, logarithmic, text=text or f"pulse_{name}")
 
 
 #: Parameters of pulses, each declared once for all pulses.
-PARAMETERS: Final = by_name(
-    _parameter("amplitude", "acceleration", "g", "0.3g", 0.02, 2.0),
-    _parameter("frequency", "frequency", "Hz", "1", 0.1, 10.0),
-    _parameter("duration", "duration", "s", "0.5", 0.05, 5.0),
-    _parameter("cycles", "number", "", "2.5", 0.5, 20.0),
-    _parameter("phase", "angle", "°", "0deg", 0.0, 360.0),
-    _parameter("gamma", "number", "cycles", "2", 1.0, 6.0),
+PARAMETERS: Final = index_by_name(
+    _declare("amplitude", "acceleration", "g", "0.3g", 0.02, 2.0),
+    _declare("frequency", "frequency", "Hz", "1", 0.1, 10.0),
+    _declare("duration", "duration", "s", "0.5", 0.05, 5.0),
+    _declare("cycles", "number", "", "2.5", 0.5, 20.0),
+    _declare("phase", "angle", "°", "0deg", 0.0, 360.0),
+    _declare("gamma", "number", "cycles", "2", 1.0, 6.0),
     Input("lobes", "pulse"),
     Input("kind", "pulse", "text"),
 )
 #: Amplitude of a pulse that is specified by its velocity.
-_VELOCITY: Final = _parameter("amplitude", "velocity", "m/s", "0.6", 0.05, 3.0, "pulse_velocity")
+_VELOCITY: Final = _declare("amplitude", "velocity", "m/s", "0.6", 0.05, 3.0, "pulse_velocity")
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class PulseFamily:
     def parameter(self, name: str) -> Input:
         """Return the declaration of a parameter."""
         if name not in self._defaults:
-            hint = checks.meant(name, [*self._defaults], f"it takes {_listed(self._defaults)}")
+            hint = checks.meant(name, [*self._defaults], f"it takes {_join_names(self._defaults)}")
             raise InvalidOption(f"the pulse {self.name} has no {name}; {hint}")
         return _VELOCITY if name == "amplitude" and self.is_of_velocity else PARAMETERS[name]
 
@@ -78,30 +78,30 @@ class PulseFamily:
         """Return the reader of a parameter; None for a word."""
         return READERS.get(self.parameter(parameter).kind, (None, ""))[0]
 
-    def motion(self, values: Mapping[str, Any]) -> Motion:
+    def create_motion(self, values: Mapping[str, Any]) -> Motion:
         """Create a pulse from the values of its parameters."""
         for name in values:
             self.parameter(name)
         missing = [name for name in self.needed if name not in values]
         if missing:
-            raise InvalidOption(f"the pulse {self.name} needs {_listed(missing)} as well")
-        return self.make(**{name: _whole(value) if name == "lobes" else value for name, value in values.items()})
+            raise InvalidOption(f"the pulse {self.name} needs {_join_names(missing)} as well")
+        return self.make(**{name: _round_count(value) if name == "lobes" else value for name, value in values.items()})
 
     @cached_property
     def _defaults(self) -> Mapping[str, Any]:
-        return {name: each.default for name, each in inspect.signature(self.make).parameters.items()}
+        return {name: parameter.default for name, parameter in inspect.signature(self.make).parameters.items()}
 
 
 FAMILIES: Final = {family.name: family for family in (PulseFamily(getattr(pulses, name)) for name in pulses.__all__)}
 
 
-def pulse_family(name: str) -> PulseFamily:
+def find_family(name: str) -> PulseFamily:
     """Return the family of pulses with a name; blanks, hyphens and underscores are equivalent."""
-    plain = checks.text(name, "pulse", InvalidOption).strip().lower().replace("_", "-").replace(" ", "-")
-    if plain not in FAMILIES:
-        hint = checks.meant(plain, [*FAMILIES], f"there are {_listed(FAMILIES)}")
+    plain_name = checks.text(name, "pulse", InvalidOption).strip().lower().replace("_", "-").replace(" ", "-")
+    if plain_name not in FAMILIES:
+        hint = checks.meant(plain_name, [*FAMILIES], f"there are {_join_names(FAMILIES)}")
         raise InvalidOption(f"there is no pulse {name!r}; {hint}")
-    return FAMILIES[plain]
+    return FAMILIES[plain_name]
 
 
 def named_pulse(text: str) -> Motion:
@@ -129,22 +129,22 @@ def named_pulse(text: str) -> Motion:
     >>> named_pulse("sine:amplitude=0.2g,frequency=2Hz,cycles=5").description
     <Description: sine, amplitude 1.9613, frequency 2, cycles 5, phase 0>
     """
-    family, values = pulse_values(text)
-    return family.motion(values)
+    family, values = read_pulse(text)
+    return family.create_motion(values)
 
 
-def pulse_values(text: str) -> tuple[PulseFamily, dict[str, Any]]:
+def read_pulse(text: str) -> tuple[PulseFamily, dict[str, Any]]:
     """Return the family and the parameter values (SI units) of a text of `named_pulse`."""
-    family, texts = pulse_texts(text)
-    return family, {parameter: _value(family, parameter, parts) for parameter, parts in texts.items()}
+    family, texts = split_pulse(text)
+    return family, {parameter: _read_value(family, parameter, parts) for parameter, parts in texts.items()}
 
 
-def pulse_texts(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
+def split_pulse(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
     """Return family and parameters of a text of `named_pulse` as written, mostly one value each, without blanks."""
     name, _, rest = checks.text(text, "pulse", InvalidOption).partition(":")
-    family, texts = pulse_family(name), dict[str, list[str]]()
+    family, texts = find_family(name), dict[str, list[str]]()
     for part in filter(None, rest.split(",")):
-        name, equals, value = (each.strip() for each in part.partition("="))
+        name, equals, value = (word.strip() for word in part.partition("="))
         if equals and name in texts:
             raise InvalidOption(f"{name} is given twice in {rest!r}")
         if equals:
@@ -156,22 +156,22 @@ def pulse_texts(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
     return family, texts
 
 
-def _value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:
+def _read_value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:
     quantity = family.quantity(parameter)
-    shown = f"the {parameter} of a {family.name} pulse"
+    label = f"the {parameter} of a {family.name} pulse"
     if len(texts) > 1 and not (family.make is pulses.n_lobe and parameter == "amplitude"):
-        raise InvalidOption(f"{shown} is one value, not {', '.join(texts)}")
+        raise InvalidOption(f"{label} is one value, not {', '.join(texts)}")
     if quantity is None:
         return texts[0]
-    values = [quantity(text, shown) for text in texts]
+    values = [quantity(text, label) for text in texts]
     return values if len(values) > 1 else values[0]
 
 
-def _whole(value: Any) -> Any:
-    """Return a count as an int, and leave other values for the pulse to reject."""
+def _round_count(value: Any) -> Any:
+    """Return a whole float as an int, and other values unchanged, because the pulse rejects them."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _listed(names: Iterable[str]) -> str:
+def _join_names(names: Iterable[str]) -> str:
     *others, last = names
     return f"{', '.join(others)} and {last}" if others else last

@@ -20,9 +20,9 @@ from rocking.records.units import ACCELERATION_UNITS, TIME_UNITS, Unit, normalis
 Quantity = Callable[[str, str], float]
 
 #: Maximum count of numbers in a range.
-_MOST: Final = 100_000
+_MAX_COUNT: Final = 100_000
 
-_WRITTEN: Final = re.compile(
+_NUMBER_AND_UNIT: Final = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)\s*(\D.*?)?\s*", re.IGNORECASE
 )
 
@@ -30,22 +30,26 @@ _SI: Final = Unit("", 1.0, 1.0)
 _DEGREE: Final = Unit("deg", math.pi / 180.0, 1.0)
 
 
-def _units(*units: Unit, **spellings: str) -> dict[str, Unit]:
+def _index_units(*units: Unit, **spellings: str) -> dict[str, Unit]:
     """Return units by their plain spellings, with the unit of a number without one, and further spellings."""
     known = {normalise_spelling(unit.name): unit for unit in units}
-    return {"": _SI, **known, **{other: known[name] for name, others in spellings.items() for other in others.split()}}
+    return {
+        "": _SI,
+        **known,
+        **{spelling: known[name] for name, line in spellings.items() for spelling in line.split()},
+    }
 
 
-_LENGTHS: Final = _units(
+_LENGTHS: Final = _index_units(
     _SI._replace(name="m"),
     Unit("cm", 1.0, 100.0),
     Unit("mm", 1.0, 1000.0),
     Unit("ft", 3048.0, 1e4),
     Unit("in", 254.0, 1e4),
 )
-_ANGLES: Final = _units(_SI._replace(name="rad"), _DEGREE, deg="° º degree degrees", rad="radian radians")
-_VELOCITIES: Final = _units(*(unit._replace(name=f"{name}/s") for name, unit in _LENGTHS.items() if name))
-_RATES: Final = _units(_SI._replace(name="rad/s"), _DEGREE._replace(name="deg/s"), degs="°s")
+_ANGLES: Final = _index_units(_SI._replace(name="rad"), _DEGREE, deg="° º degree degrees", rad="radian radians")
+_VELOCITIES: Final = _index_units(*(unit._replace(name=f"{name}/s") for name, unit in _LENGTHS.items() if name))
+_RATES: Final = _index_units(_SI._replace(name="rad/s"), _DEGREE._replace(name="deg/s"), degs="°s")
 
 #: Units by their plain spellings, in SI units and radians: the single list, also used by the page of the explorer.
 UNITS: Final[Mapping[str, Mapping[str, Unit]]] = {
@@ -54,91 +58,91 @@ UNITS: Final[Mapping[str, Mapping[str, Unit]]] = {
     "angle": _ANGLES,
     "acceleration": {"": _SI, **ACCELERATION_UNITS},
     "velocity": _VELOCITIES,
-    "frequency": _units(_SI._replace(name="Hz"), Unit("rad/s", 0.5 / math.pi, 1.0)),
+    "frequency": _index_units(_SI._replace(name="Hz"), Unit("rad/s", 0.5 / math.pi, 1.0)),
     "rate": _RATES,
-    "duration": {"": _SI, **{normalise_spelling(each): unit for each, unit in TIME_UNITS.items()}},
+    "duration": {"": _SI, **{normalise_spelling(name): unit for name, unit in TIME_UNITS.items()}},
     "number": {"": _SI},
 }
 
 
-def number(text: str, name: str) -> float:
+def read_number(text: str, name: str) -> float:
     """Return a number without a unit."""
-    value, unit = _parts(text)
+    value, unit = _split_unit(text)
     if value is None or unit:
         raise InvalidOption(f"{{}} takes a number, not {text.strip()!r}", name, value=text)
     return value
 
 
-def _reader(units: Mapping[str, Unit], wanted: str) -> Quantity:
+def _create_reader(units: Mapping[str, Unit], expected: str) -> Quantity:
     """Return a reader of a number with or without one of some units."""
 
     def read(text: str, name: str) -> float:
-        value, spelling = _parts(text)
+        value, spelling = _split_unit(text)
         unit = units.get(normalise_spelling(spelling))
         if value is None or unit is None:
-            raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", name, value=text)
+            raise InvalidOption(f"{{}} takes {expected}, not {text.strip()!r}", name, value=text)
         return value * unit.multiplier / unit.divisor
 
     return read
 
 
-acceleration: Final = _reader(UNITS["acceleration"], "an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2)")
-angle: Final = _reader(UNITS["angle"], "an angle as 12deg or 0.2 (rad)")
-duration: Final = _reader(UNITS["duration"], "a time as 1.5 (s)")
-frequency: Final = _reader(UNITS["frequency"], "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
-position: Final = _reader(UNITS["position"], "a length as 0.2, 0.2m or 20cm")
-rate: Final = _reader(UNITS["rate"], "an angular velocity as 2, 2rad/s or 5deg/s")
-velocity: Final = _reader(UNITS["velocity"], "a velocity as 40cm/s or 0.4 (m/s)")
+read_acceleration: Final = _create_reader(UNITS["acceleration"], "an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2)")
+read_angle: Final = _create_reader(UNITS["angle"], "an angle as 12deg or 0.2 (rad)")
+read_duration: Final = _create_reader(UNITS["duration"], "a time as 1.5 (s)")
+read_frequency: Final = _create_reader(UNITS["frequency"], "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
+read_position: Final = _create_reader(UNITS["position"], "a length as 0.2, 0.2m or 20cm")
+read_rate: Final = _create_reader(UNITS["rate"], "an angular velocity as 2, 2rad/s or 5deg/s")
+read_velocity: Final = _create_reader(UNITS["velocity"], "a velocity as 40cm/s or 0.4 (m/s)")
 
 
-def length(text: str, name: str) -> float:
+def read_length(text: str, name: str) -> float:
     """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
-    value = position(text, name)
+    value = read_position(text, name)
     if not value > 0.0:
         raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", name, value=text)
     return value
 
 
-def tilt(text: str, name: str) -> float:
-    """Return the angle of a standing block, rad, as `angle`, but below pi/2 and with an explicit unit for degrees."""
-    value = angle(text, name)
+def read_tilt(text: str, name: str) -> float:
+    """Return the angle of a standing block, rad, below pi/2, with an explicit unit for degrees."""
+    value = read_angle(text, name)
     if abs(value) < 0.5 * math.pi:
         return value
-    if abs(value) < 90.0 and not _parts(text)[1]:
+    if abs(value) < 90.0 and not _split_unit(text)[1]:
         raise InvalidOption(
             f"{{}} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?", name
         )
     raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name, value=text)
 
 
-def sides(text: str, name: str, quantity: Quantity = number) -> float | list[float]:
+def read_sides(text: str, name: str, quantity: Quantity = read_number) -> float | list[float]:
     """Return one number, or a list of two: side + and side -."""
-    return _one_or_two(text, name, quantity, "a number, or two with a comma between (side +, side -)")
+    return _read_one_or_two(text, name, quantity, "a number, or two with a comma between (side +, side -)")
 
 
-def bounds(text: str, name: str, quantity: Quantity = number) -> float | tuple[float, ...]:
+def read_bounds(text: str, name: str, quantity: Quantity = read_number) -> float | tuple[float, ...]:
     """Return one known number, or two: the lowest and highest plausible values."""
-    wanted = "a number, if it is known, or two with a comma between, the lowest and the highest thinkable"
-    found = _one_or_two(text, name, quantity, wanted)
-    return tuple(found) if isinstance(found, list) else found
+    expected = "a number, if it is known, or two with a comma between, the lowest and the highest thinkable"
+    numbers = _read_one_or_two(text, name, quantity, expected)
+    return tuple(numbers) if isinstance(numbers, list) else numbers
 
 
-def _one_or_two(text: str, name: str, quantity: Quantity, wanted: str) -> float | list[float]:
-    found = [quantity(part, name) for part in text.split(",")]
-    if len(found) > 2:
-        raise InvalidOption(f"{{}} takes {wanted}, not {text!r}", name, value=text)
-    return found[0] if len(found) == 1 else found
+def _read_one_or_two(text: str, name: str, quantity: Quantity, expected: str) -> float | list[float]:
+    numbers = [quantity(part, name) for part in text.split(",")]
+    if len(numbers) > 2:
+        raise InvalidOption(f"{{}} takes {expected}, not {text!r}", name, value=text)
+    return numbers[0] if len(numbers) == 1 else numbers
 
 
-def axis(value: Any, name: str, quantity: Quantity = number) -> Floats:
+def read_axis(value: Any, name: str, quantity: Quantity = read_number) -> Floats:
     """Return the numbers of an entry of a study file: one, a list, or a range."""
     if isinstance(value, str):
-        return values(value, name, quantity)
-    numbers = value if isinstance(value, list) else [value]
-    return np.array([quantity(one if isinstance(one, str) else repr(one), name) for one in numbers])
+        return read_values(value, name, quantity)
+    entries = value if isinstance(value, list) else [value]
+    return np.array([quantity(entry if isinstance(entry, str) else repr(entry), name) for entry in entries])
 
 
-def values(text: str, name: str, quantity: Quantity = number) -> Floats:
+def read_values(text: str, name: str, quantity: Quantity = read_number) -> Floats:
     """Return numbers from "1,2,5" or from "START:STOP:COUNT", with ":log" at the end for equal ratios."""
     parts = text.split(":")
     if len(parts) == 1:
@@ -148,69 +152,71 @@ def values(text: str, name: str, quantity: Quantity = number) -> Floats:
             f"{{}} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}", name, value=text
         )
     start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
-    if not 2 <= count <= _MOST:
-        sentence = f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}"
+    if not 2 <= count <= _MAX_COUNT:
+        sentence = f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MAX_COUNT}, not {text!r}"
         raise InvalidOption(sentence, name, value=text)
     if not math.isfinite(stop - start):
         raise InvalidOption(f"{{}}: a range needs finite ends, not {text!r}", name, value=text)
     if len(parts) == 3:
-        return _decimals(np.linspace(start, stop, count))
+        return _round_decimals(np.linspace(start, stop, count))
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
         raise InvalidOption(f"{{}}: a range with :log needs positive ends, not {text!r}", name, value=text)
-    return _decimals(np.geomspace(start, stop, count))
+    return _round_decimals(np.geomspace(start, stop, count))
 
 
-def at_a_period(text: str, name: str, quantity: Quantity = acceleration) -> tuple[float, float]:
+def read_level_at_period(text: str, name: str, quantity: Quantity = read_acceleration) -> tuple[float, float]:
     """Return an acceleration, m/s^2, and a period, s, from "0.4g@1.0"."""
     level, at, period = text.partition("@")
     if not at:
         raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
-    return quantity(level, name), duration(period, name)
+    return quantity(level, name), read_duration(period, name)
 
 
-def scaling(given: Mapping[str, str | float | None], quantity: Quantity = acceleration) -> tuple[float, Measure] | None:
-    """Return the level to which a motion is scaled, and its measure; None without a level."""
-    chosen = {name: value for name, value in given.items() if value is not None}
-    if not chosen:
+def read_scaling(
+    texts: Mapping[str, str | float | None], quantity: Quantity = read_acceleration
+) -> tuple[float, Measure] | None:
+    """Return the level to which a motion is scaled and its measure, or None without a level."""
+    options = {name: value for name, value in texts.items() if value is not None}
+    if not options:
         return None
-    if len(chosen) > 1:
-        raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} scale the same motion; give one of them", *chosen)
-    ((name, value),) = chosen.items()
+    if len(options) > 1:
+        raise InvalidOption(f"{' and '.join(['{}'] * len(options))} scale the same motion; give one of them", *options)
+    ((name, value),) = options.items()
     if name == "pga":
         return checks.finite(quantity(str(value), name), name, InvalidOption), Measure("pga")
     if name == "sa":
         read_level, read_period = (
-            checks.finite(each, name, InvalidOption) for each in at_a_period(str(value), name, quantity)
+            checks.finite(number, name, InvalidOption) for number in read_level_at_period(str(value), name, quantity)
         )
         return read_level, Measure("sa", read_period)
-    read = number if name == "scale" else velocity
-    plain = read(value, name) if isinstance(value, str) else float(value)
+    read = read_number if name == "scale" else read_velocity
+    value_read = read(value, name) if isinstance(value, str) else float(value)
     if name == "scale":
-        return checks.finite(plain, name, InvalidOption), FACTOR
-    return checks.positive(plain, name, InvalidOption, "m/s"), Measure("pgv")
+        return checks.finite(value_read, name, InvalidOption), FACTOR
+    return checks.positive(value_read, name, InvalidOption, "m/s"), Measure("pgv")
 
 
-def _decimals(numbers: Floats) -> Floats:
+def _round_decimals(numbers: Floats) -> Floats:
     """Round numbers to their usual decimals: 0.3, not 0.30000000000000004."""
     return np.array([decimal(value) for value in numbers])
 
 
-def _parts(text: str) -> tuple[float | None, str]:
-    """Return number and unit; None without a number."""
-    found = _WRITTEN.fullmatch(text)
-    return (None, "") if found is None else (float(found[1]), found[2] or "")
+def _split_unit(text: str) -> tuple[float | None, str]:
+    """Split a text into its number, or None, and its unit."""
+    match = _NUMBER_AND_UNIT.fullmatch(text)
+    return (None, "") if match is None else (float(match[1]), match[2] or "")
 
 
-def densities(text: str, name: str) -> float | dict[str, float]:
+def read_densities(text: str, name: str) -> float | dict[str, float]:
     """Return one density, kg/m^3, or densities of parts by name from entries PART=NUMBER."""
     if "=" not in text:
-        return number(text, name)
-    found = {}
-    for each in text.split(","):
-        part, equals, value = each.rpartition("=")
+        return read_number(text, name)
+    densities_read = {}
+    for entry in text.split(","):
+        part, equals, value = entry.rpartition("=")
         if not equals:
             raise InvalidOption(
                 f"{{}} takes a number, or PART=NUMBER with commas between, not {literal(repr(text))}", name, value=text
             )
-        found[part.strip()] = number(value, name)
-    return found
+        densities_read[part.strip()] = read_number(value, name)
+    return densities_read

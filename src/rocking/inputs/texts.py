@@ -7,33 +7,33 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 
-def arguments(values: Mapping[str, Any]) -> str:
+def write_arguments(values: Mapping[str, Any]) -> str:
     """Format the arguments of a Python call."""
     return ", ".join(f"{name}={value!r}" for name, value in values.items())
 
 
-def option_of(name: str) -> str:
+def write_option_name(name: str) -> str:
     """Return the option of an argument: --half-width of half_width."""
     return f"--{name.replace('_', '-')}"
 
 
-def as_option(name: str, value: str) -> tuple[str, ...]:
+def write_option(name: str, value: str) -> tuple[str, ...]:
     """Return an option and its value, as one word if the value alone would be read as another option.
 
     Examples
     --------
-    >>> as_option("channel", "HNE"), as_option("channel", "--out")
+    >>> write_option("channel", "HNE"), write_option("channel", "--out")
     (('--channel', 'HNE'), ('--channel=--out',))
     """
-    option = option_of(name)
+    option = write_option_name(name)
     return (f"{option}={value}",) if value.startswith("-") else (option, value)
 
 
-def as_path(name: str) -> str:
+def write_path(name: str) -> str:
     """Return a file name as an argument that no program reads as an option or as standard input."""
     return f"./{name}" if name.startswith("-") else name
 
 
-def command_line(words: Iterable[str], options: Mapping[str, str]) -> str:
+def write_command(words: Iterable[str], options: Mapping[str, str]) -> str:
     """Format a shell command with its options."""
-    return shlex.join([*words, *(word for name, value in options.items() for word in as_option(name, value))])
+    return shlex.join([*words, *(word for name, value in options.items() for word in write_option(name, value))])

@@ -1,4 +1,4 @@
-"""TOML files: their tables, and the line of every mistake in them."""
+"""TOML files with the line of every mistake."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from rocking.core import checks
 from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
 
-_Kept = TypeVar("_Kept", bound=RockingError)
+_Error = TypeVar("_Error", bound=RockingError)
 
 
 class Tables:
@@ -36,69 +36,71 @@ class Tables:
         return content[occurrence] if isinstance(content, list) else content
 
     @contextlib.contextmanager
-    def located(self, *tables: str, key: str | None = None, occurrence: int = 0) -> Iterator[None]:
+    def locating_errors(self, *tables: str, key: str | None = None, occurrence: int = 0) -> Iterator[None]:
         """Add to an error the line of this key, of the first key in these tables that it names, or of the heading."""
         try:
             yield
         except RockingError as error:
-            named = error.message.arguments if key is None else (key,)
-            places = [(table, name) for table in tables for name in named if name in self.table(table, occurrence)]
-            table, name = places[0] if places else (tables[0], None)
-            raise moved(error, StudyError, self.file, self.line_of(table, name, occurrence)) from None
+            keys = error.message.arguments if key is None else (key,)
+            locations = [(table, name) for table in tables for name in keys if name in self.table(table, occurrence)]
+            table, name = locations[0] if locations else (tables[0], None)
+            raise relocate_error(error, StudyError, self.file, self.find_line(table, name, occurrence)) from None
 
     @contextlib.contextmanager
-    def located_record(self, name: str) -> Iterator[None]:
+    def locating_record_errors(self, name: str) -> Iterator[None]:
         """Add to an error about a record the line that names the record."""
         try:
             yield
         except (UnreadableRecord, InvalidMotion) as error:
-            first = self.line_of("motions", "records")
+            first = self.find_line("motions", "records")
             lines = self.text.splitlines()[first - 1 :]
             line = next((k for k, text in enumerate(lines, start=first) if name in text), first)
-            raise moved(error, type(error), self.file, line) from None
+            raise relocate_error(error, type(error), self.file, line) from None
 
-    def wrong(self, table: str, key: str | None, message: str, *names: str, value: object = None) -> StudyError:
+    def create_error(self, table: str, key: str | None, message: str, *names: str, value: object = None) -> StudyError:
         """Return the error about a key of a table, or about the table."""
-        return StudyError(message, *names, path=str(self.file), line=self.line_of(table, key), value=value)
+        return StudyError(message, *names, path=str(self.file), line=self.find_line(table, key), value=value)
 
-    def line_of(self, table: str, key: str | None, occurrence: int = 0) -> int:
+    def find_line(self, table: str, key: str | None, occurrence: int = 0) -> int:
         """Return the line of a key in a table (by its occurrence), of the heading without a key, or 1 if not found."""
         if "." in table and not re.search(rf"^\s*\[+\s*{re.escape(table)}\b", self.text, re.MULTILINE):
             parent, _, name = table.rpartition(".")
-            return self.line_of(parent, name)
-        here, seen, heading_line = "", -1, 0
+            return self.find_line(parent, name)
+        current, count, heading_line = "", -1, 0
         for number, line in enumerate(self.text.splitlines(), start=1):
             if heading := re.match(r"\s*\[+\s*([\w.]+)\s*\]+", line):
-                here = heading[1]
-                seen += here == table
-                if key is not None and here == f"{table}.{key}":
+                current = heading[1]
+                count += current == table
+                if key is not None and current == f"{table}.{key}":
                     return number
-                if here == table and seen == occurrence:
+                if current == table and count == occurrence:
                     heading_line = number
-                elif here.startswith(f"{table}."):
+                elif current.startswith(f"{table}."):
                     heading_line = heading_line or number  # only a part of the table has a heading
-            found = re.match(r"\s*([\w.-]+)\s*=", line)
-            if found and key is not None and here == table and max(seen, 0) == occurrence and found[1] == key:
+            match = re.match(r"\s*([\w.-]+)\s*=", line)
+            if match and key is not None and current == table and max(count, 0) == occurrence and match[1] == key:
                 return number
         return heading_line or 1
 
 
 @contextlib.contextmanager
-def in_line(file: Path, line: int) -> Iterator[None]:
+def locate_errors(file: Path, line: int) -> Iterator[None]:
     """Add to an error the line of a file."""
     try:
         yield
     except RockingError as error:
-        raise moved(error, StudyError, file, line) from None
+        raise relocate_error(error, StudyError, file, line) from None
 
 
-def moved(error: RockingError, kind: type[_Kept], file: Path, line: int, where: str = "") -> _Kept:
-    """Return an error with the same data at another line, after the location that the error already contains."""
-    where += error.text().removesuffix(error.message.text())
-    return kind(where + error.message.template, *error.message.arguments, path=str(file), line=line, value=error.value)
+def relocate_error(error: RockingError, error_type: type[_Error], file: Path, line: int, location: str = "") -> _Error:
+    """Return an error with the same data, and with a line of a file before its own location."""
+    location += error.text().removesuffix(error.message.text())
+    return error_type(
+        location + error.message.template, *error.message.arguments, path=str(file), line=line, value=error.value
+    )
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def suggest_key(name: str, known: Iterable[str]) -> str:
     """Return the closest known name, or the list of known names."""
     names = [*known]
     return checks.meant(name, names, f"there are {', '.join(names)}")

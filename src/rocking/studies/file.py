@@ -18,11 +18,18 @@ from rocking.core.tables import counted, csv_rows
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import InvalidMotion, InvalidOption, StudyError, UnreadableRecord
 from rocking.inputs import quantities
-from rocking.inputs.bodies import block_of, body_of, check_parameters, note_likely_mistakes, quantity_of, shape_of
-from rocking.inputs.declared import BLOCK, COUPLES, FORCES, HELD, INPUTS, noted_acceleration
+from rocking.inputs.bodies import (
+    check_parameters,
+    create_block,
+    create_body,
+    find_reader,
+    find_shape,
+    note_likely_mistakes,
+)
+from rocking.inputs.declared import BLOCK, COUPLES, FORCES, INPUTS, SUPPORTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes
-from rocking.inputs.pulses import pulse_family
-from rocking.inputs.toml import Tables, in_line, nearest
+from rocking.inputs.pulses import find_family
+from rocking.inputs.toml import Tables, locate_errors, suggest_key
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.named import expand_record_names, load_motion, path_exists
@@ -33,14 +40,14 @@ TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")
 
 #: Measures for scaling motions, and how their levels are read.
 _MEASURES: Final[Mapping[str, quantities.Quantity]] = {
-    "factor": quantities.number,
-    "pga": noted_acceleration,
-    "pgv": quantities.velocity,
-    "sa": noted_acceleration,
+    "factor": quantities.read_number,
+    "pga": read_noted_acceleration,
+    "pgv": quantities.read_velocity,
+    "sa": read_noted_acceleration,
 }
 
 #: Keys of restraints; keys of tables are plurals.
-_HELD: Final = tuple(f"{name}s" if name in FORCES else name for name in HELD)
+_HELD: Final = tuple(f"{name}s" if name in FORCES else name for name in SUPPORTS)
 
 #: Tables of a file and their keys.
 SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
@@ -116,9 +123,9 @@ def read_study(path: str | Path) -> StudyFile:
     blocks, scales = _bodies(tables), _scales(tables)
     motions, names, skipped = _motions(tables, scales)
     rules, polarity = tables.table("simulation"), tables.table("scales").get("polarity", "+")
-    with tables.located("simulation", key="chattering"):
+    with tables.locating_errors("simulation", key="chattering"):
         chattering = chattering_scheme(rules.get("chattering", "certified"))
-    with tables.located("simulation", "scales", "blocks"):
+    with tables.locating_errors("simulation", "scales", "blocks"):
         model, duration = rules.get("model", "nonlinear"), rules.get("duration")
         product = Product(blocks, tuple(motions), scales, polarity, model, chattering, duration)
     return StudyFile(product, tuple(skipped), tuple(names))
@@ -129,18 +136,18 @@ def _check_tables(tables: Tables) -> None:
     for table, content in tables.tables.items():
         if table not in SCHEMA:
             moved = "its options are now those of rocking study report"
-            hint = moved if table == "report" else nearest(table, SCHEMA)
-            raise tables.wrong(table, None, f"there is no table [{{}}]; {hint}", table)
+            hint = moved if table == "report" else suggest_key(table, SCHEMA)
+            raise tables.create_error(table, None, f"there is no table [{{}}]; {hint}", table)
         if not isinstance(content, dict):
-            raise tables.wrong(table, None, f"{{}} must be one table, [{table}], once", table)
+            raise tables.create_error(table, None, f"{{}} must be one table, [{table}], once", table)
         for key, value in content.items():
             if key not in SCHEMA[table]:
-                raise tables.wrong(table, key, f"[{table}] has no {{}}; {nearest(key, SCHEMA[table])}", key)
+                raise tables.create_error(table, key, f"[{table}] has no {{}}; {suggest_key(key, SCHEMA[table])}", key)
             kind, wanted = _TYPES.get(key, (object, ""))
             is_right = isinstance(value, list if isinstance(kind, list) else kind)
             if not is_right or (isinstance(kind, list) and not all(isinstance(one, kind[0]) for one in value)):
                 sentence = f"{{}} must be {wanted}, not {checks.shown(value)}"
-                raise tables.wrong(table, key, sentence, key, value=value)
+                raise tables.create_error(table, key, sentence, key, value=value)
     for needed in ("blocks", "motions"):
         if needed not in tables.tables:
             raise StudyError("the table [{}] is missing", needed, path=str(tables.file))
@@ -151,28 +158,28 @@ def _bodies(tables: Tables) -> Bodies:
     given = tables.table("blocks")
     if "csv" in given:
         if len(given) > 1:
-            raise tables.wrong("blocks", "csv", "{} goes without other keys", "csv")
+            raise tables.create_error("blocks", "csv", "{} goes without other keys", "csv")
         return _blocks_of_csv(tables, tables.file.parent / given["csv"])
-    with tables.located("blocks"):
-        shape_of(given)
+    with tables.locating_errors("blocks"):
+        find_shape(given)
     axes: dict[str, Any] = {}
     for name in (*(name for name in given if name in BLOCK), "one_sided", "lean", *COUPLES):
-        with tables.located("blocks", key=name):
+        with tables.locating_errors("blocks", key=name):
             if name in given:
                 values = INPUTS[name].axis(given[name])
                 axes[name] = [COUPLES[name](value) for value in values] if name in COUPLES else values
     for name in FORCES:
         for k in range(len(given.get(f"{name}s", []))):
             axes[f"{name} {k + 1}"] = _forces(tables, name, k)
-    with tables.located("blocks"):
+    with tables.locating_errors("blocks"):
         if "p" in given and axes.keys() <= {*BLOCK}:
             return Blocks.grid(**axes)
         checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
         rows = [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
-        blocks = [block_of(row) for row in rows]
+        blocks = [create_block(row) for row in rows]
         pairs = zip(blocks, rows, strict=True)
         bodies: list[Any] = [
-            body_of(block, row, [one for one in row.values() if isinstance(one, Restraint)]) for block, row in pairs
+            create_body(block, row, [one for one in row.values() if isinstance(one, Restraint)]) for block, row in pairs
         ]
         note_likely_mistakes(blocks, bodies)
         return Blocks.from_bodies(bodies)
@@ -189,10 +196,10 @@ def _made(
     """Create the object of the k-th table, or several for lists or ranges."""
     axes: dict[str, Any] = {}
     for key, value in given.items():
-        with tables.located(table, key=key, occurrence=k):
+        with tables.locating_errors(table, key=key, occurrence=k):
             quantity = None if isinstance(value, bool) else reader(key)
-            axes[key] = [value] if quantity is None else quantities.axis(value, key, quantity)
-    with tables.located(table, occurrence=k):
+            axes[key] = [value] if quantity is None else quantities.read_axis(value, key, quantity)
+    with tables.locating_errors(table, occurrence=k):
         return [make(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())]
 
 
@@ -203,14 +210,14 @@ def _forces(tables: Tables, name: str, k: int) -> list[Any]:
         check_parameters(FORCES[name], values, f"[[{table}]]")
         return FORCES[name](**values)
 
-    return _made(tables, table, k, tables.table(table, k), quantity_of, made)
+    return _made(tables, table, k, tables.table(table, k), find_reader, made)
 
 
 def _pulses(tables: Tables, k: int) -> list[Motion]:
     given, table = dict(tables.table("motions.pulses", k)), "motions.pulses"
-    with tables.located(table, key="family", occurrence=k):
-        family = pulse_family(str(given.pop("family", "")))
-    return _made(tables, table, k, given, family.quantity, family.motion)
+    with tables.locating_errors(table, key="family", occurrence=k):
+        family = find_family(str(given.pop("family", "")))
+    return _made(tables, table, k, given, family.quantity, family.create_motion)
 
 
 def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
@@ -218,24 +225,24 @@ def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
         rows = csv_rows(file.read_text("utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is no text table in UTF-8; save it as CSV"
-        raise tables.wrong("blocks", "csv", f"{file} cannot be read: {why}") from None
+        raise tables.create_error("blocks", "csv", f"{file} cannot be read: {why}") from None
     if len(rows) < 2:
-        raise tables.wrong("blocks", "csv", f"{file} holds no blocks: a heading and a row for each are needed")
+        raise tables.create_error("blocks", "csv", f"{file} holds no blocks: a heading and a row for each are needed")
     headings, known = rows[0][1], [name + end for name in BLOCK for end in ("", *_SIDES)]
     for name in headings:
         meant = "" if name in known else checks.meant(name, known, "")
         if meant or name in _HELD or (name in known and headings.count(name) > 1):
             fault = meant or ("it goes under [blocks]" if name in _HELD else "it is there twice")
-            raise tables.wrong("blocks", "csv", f"column {name} of {file} cannot be read; {fault}")
+            raise tables.create_error("blocks", "csv", f"column {name} of {file} cannot be read; {fault}")
     blocks = []
     for line, row in rows[1:]:
-        with in_line(file, line):
+        with locate_errors(file, line):
             if len(row) != len(headings):
                 raise StudyError(f"{counted(len(row), 'cell')} under {counted(len(headings), 'column')}; correct it")
             cells = dict(zip(headings, row, strict=True))
             texts = {name: ",".join(cells[name + end] for end in _SIDES if name + end in cells) for name in BLOCK}
             given = {name: cells.get(name, text) for name, text in texts.items()}
-            blocks.append(block_of({name: INPUTS[name].read(text) for name, text in given.items() if text}))
+            blocks.append(create_block({name: INPUTS[name].read(text) for name, text in given.items() if text}))
     note_likely_mistakes(blocks)
     return Blocks.from_bodies(blocks)
 
@@ -246,15 +253,15 @@ def _scales(tables: Tables) -> Scales:
     if len(measures) > 1:
         listed = " and ".join(["{}"] * len(measures))
         sentence = f"motions can be scaled to one measure only, not to {listed}"
-        raise tables.wrong("scales", measures[0], sentence, *measures)
+        raise tables.create_error("scales", measures[0], sentence, *measures)
     options = {option: given[option] for option in ("period", "damping") if option in given}
     for option in () if "sa" in given else options:
-        raise tables.wrong("scales", option, "{} goes with {}, and only with it", option, "sa")
+        raise tables.create_error("scales", option, "{} goes with {}, and only with it", option, "sa")
     if not measures:
         return Scales.from_levels(None, FACTOR)
     (name,) = measures
-    with tables.located("scales", key=name):
-        values = quantities.axis(given[name], name, _MEASURES[name])
+    with tables.locating_errors("scales", key=name):
+        values = quantities.read_axis(given[name], name, _MEASURES[name])
         checks.positive_numbers(values, name, InvalidOption)
         return Scales.from_levels(values, Measure(cast(MeasureName, name), **options))
 
@@ -263,15 +270,15 @@ def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], l
     """Return the motions, their records, and a sentence for each skipped record."""
     given, folder = tables.table("motions"), tables.file.parent
     if "vertical" in given and not given.get("records"):
-        raise tables.wrong("motions", "vertical", "{} is that of the records, and there are none", "vertical")
+        raise tables.create_error("motions", "vertical", "{} is that of the records, and there are none", "vertical")
     found: dict[str, str] = {}  # names in the file by path or record name
     for name in given.get("records", []):
-        with tables.located_record(name):
+        with tables.locating_record_errors(name):
             found |= dict.fromkeys(_records_of(folder, name), name)
     motions, names, skipped = [], [], []
     for path, name in found.items():
         try:
-            with tables.located_record(name):
+            with tables.locating_record_errors(name):
                 motion = _record(tables, path, several=len(found) > 1)
                 scales.factors(motion)  # raises if the motion cannot be scaled
         except (UnreadableRecord, InvalidMotion) as error:
@@ -285,7 +292,7 @@ def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], l
     for k in range(len(given.get("pulses", []))):
         motions += _pulses(tables, k)
     if not motions:
-        raise tables.wrong("motions", None, "[motions] holds no motion that can be read: name records or pulses")
+        raise tables.create_error("motions", None, "[motions] holds no motion that can be read: name records or pulses")
     return motions, names + [""] * (len(motions) - len(names)), skipped
 
 
