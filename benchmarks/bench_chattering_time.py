@@ -12,7 +12,7 @@ import numpy as np
 
 from rocking import chattering
 from rocking.chattering import duration
-from rocking.core.threads import cores
+from rocking.core.threads import count_cores
 
 CASE = (1.03, 2.0, 0.92)
 REPETITIONS = 5
@@ -50,7 +50,9 @@ def main():
         with patch.object(duration, "cores", lambda: 1):
             each = seconds_per_call(lambda parameters=parameters: chattering.chattering_time(*parameters)) / LARGE
         print(f"{name}: {1e9 * each:.0f} ns, {1e-6 / each:.2f} million per second and core")
-        print(f"  on {cores()} cores (wall) {1e-6 * LARGE / wall:.2f} million per second, {incomplete:.0%} incomplete")
+        print(
+            f"  on {count_cores()} cores (wall) {1e-6 * LARGE / wall:.2f} million per second, {incomplete:.0%} incomplete"
+        )
     single = seconds_per_call(lambda: [chattering.chattering_time(*CASE) for _ in range(1000)]) / 1000
     critical = seconds_per_call(lambda: chattering.critical_amplitude(np.linspace(0.4, 10.0, 200), 0.92)) / 200
     series = seconds_per_call(lambda: [chattering.series_coefficients(2.0, 0.92, order=4) for _ in range(100)]) / 100

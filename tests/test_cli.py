@@ -17,7 +17,7 @@ import pytest
 import rocking
 from rocking import cli
 from rocking.cli import app
-from rocking.core.threads import in_threads
+from rocking.core.threads import map_in_threads
 from rocking.errors import INTERRUPTED
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
@@ -170,7 +170,7 @@ def test_an_interrupt_is_one_sentence_and_closes_what_is_half_done(monkeypatch, 
 
     def run(_):
         rocking.set_options(threads=2)
-        for _ in in_threads(lambda each: (begun.append(each), time.sleep(0.01)), itertools.count()):
+        for _ in map_in_threads(lambda each: (begun.append(each), time.sleep(0.01)), itertools.count()):
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(cli, "_run", run)

@@ -265,7 +265,12 @@ def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
     data = SHIPPED_MESHES["statue"].read_bytes()
     made, sections = apart.read_mesh_in_process("statue.obj", data, {"unit": "ft"})
     assert rocking.Solid(**made).to_dict() == rocking.Solid.from_mesh("statue", unit="ft").to_dict()
-    assert np.abs(sections.compute_outline(30.0) - apart.read_mesh("statue", {"unit": "ft"})[1].compute_outline(30.0)).max() < 1e-5
+    assert (
+        np.abs(
+            sections.compute_outline(30.0) - apart.read_mesh("statue", {"unit": "ft"})[1].compute_outline(30.0)
+        ).max()
+        < 1e-5
+    )
     monkeypatch.setattr(apart, "_MAX_WAIT", 0.05)
     with pytest.raises(
         InvalidBlock, match=r"statue\.obj: takes more than 20 s or 2 GiB to read: make the mesh coarser"

@@ -75,11 +75,11 @@ def test_texts_have_one_encoding_and_one_end_of_line_everywhere() -> None:
 def test_cores_are_all_where_no_affinity_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 3}, raising=False)
-    assert threads.cores() == 2
+    assert threads.count_cores() == 2
     monkeypatch.delattr(os, "sched_getaffinity")
-    assert threads.cores() == 7
+    assert threads.count_cores() == 7
     monkeypatch.setattr(os, "cpu_count", lambda: None)
-    assert threads.cores() == 1
+    assert threads.count_cores() == 1
 
 
 def limits(refused: set[int]) -> tuple[SimpleNamespace, dict[int, tuple[int, int]]]:

@@ -6,13 +6,13 @@ import time
 
 import pytest
 
-from rocking.core.threads import LOOKAHEAD, in_threads, set_options
+from rocking.core.threads import LOOKAHEAD, map_in_threads, set_options
 
 
 @pytest.mark.parametrize("threads", [1, 4])
 def test_results_come_in_the_order_of_the_items_whichever_is_done_first(threads):
     with set_options(threads=threads):
-        found = list(in_threads(lambda each: (time.sleep(0.002 * (each % 3 == 0)), each)[1], range(50)))
+        found = list(map_in_threads(lambda each: (time.sleep(0.002 * (each % 3 == 0)), each)[1], range(50)))
     assert found == [*range(50)]
 
 
@@ -24,7 +24,7 @@ def test_of_several_errors_that_of_the_first_item_is_raised(threads):
             raise ValueError(f"item {each}")
         return each
 
-    found = in_threads(work, range(20))
+    found = map_in_threads(work, range(20))
     with set_options(threads=threads):
         assert list(itertools.islice(found, 3)) == [0, 1, 2]
     with pytest.raises(ValueError, match="item 3"):
@@ -34,7 +34,7 @@ def test_of_several_errors_that_of_the_first_item_is_raised(threads):
 def test_items_are_taken_a_few_ahead_of_the_results():
     taken = []
     items = (taken.append(each) or each for each in itertools.count())
-    found = in_threads(lambda each: -each, items)
+    found = map_in_threads(lambda each: -each, items)
     with set_options(threads=2):
         assert [*itertools.islice(found, 10)] == [-each for each in range(10)]
     assert len(taken) == 9 + 2 * LOOKAHEAD
@@ -50,7 +50,7 @@ def test_whoever_leaves_early_cancels_the_work_in_hand_waits_for_it_and_leaves_t
             pass
         ended.append(each)
 
-    found = in_threads(work, range(100), cancelled=cancelled)
+    found = map_in_threads(work, range(100), cancelled=cancelled)
     with set_options(threads=3):
         next(found)
     assert not cancelled.is_set()

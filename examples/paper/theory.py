@@ -33,7 +33,7 @@ from rocking.chattering.duration import (
 )
 from rocking.chattering.expansions import checked_loss, first_impact_speed, first_interval, single
 from rocking.core.arrays import Floats
-from rocking.core.bisection import bisected
+from rocking.core.bisection import bisect
 from rocking.errors import InvalidOption
 
 #: Amplitudes of Fig. 5, gathered towards both of its vertical tangents, and how far it goes past the second.
@@ -225,7 +225,7 @@ def _crossing(case: BlockUnderSine) -> float | str:
         return "nowhere"
     if exceeds(high):
         return "a_cr"
-    return bisected(low, high, lambda a: not exceeds(a), width=1e-9)[0]
+    return bisect(low, high, lambda a: not exceeds(a), width=1e-9)[0]
 
 
 def _exponent(values: Floats) -> float:

@@ -17,7 +17,7 @@ from rocking.analysis.levels import units_of
 from rocking.analysis.probit import Outcomes, Probit, normal_scores, probabilities
 from rocking.block.body import Body
 from rocking.core import checks
-from rocking.core.arrays import Floats, Integers, as_asked
+from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.tables import within
 from rocking.errors import InvalidOption, Unfitted
@@ -137,7 +137,7 @@ class FragilityCurve:
     def probability(self, intensity: ArrayLike) -> Floats:
         """Compute the fitted probability at intensities >= 0 (SI units or a block's own), with their shape."""
         at = check_intensities(intensity)
-        return as_asked(probabilities(self.fitted, _logarithm(at).ravel())[0].reshape(at.shape))
+        return unwrap_scalar(probabilities(self.fitted, _logarithm(at).ravel())[0].reshape(at.shape))
 
     def intensity_of(self, probability: float) -> float:
         """Compute the intensity (SI units or a block's own) for a fitted probability between 0 and 1.
@@ -169,7 +169,7 @@ class FragilityCurve:
         at = check_intensities(intensity)
         z = _logarithm(at).ravel()
         ends = extremes(self.region, lambda fits: normal_scores(fits, z))
-        low, high = (as_asked(np.asarray(ndtr(end)).reshape(at.shape)) for end in ends)
+        low, high = (unwrap_scalar(np.asarray(ndtr(end)).reshape(at.shape)) for end in ends)
         return low, high
 
     def to_dict(self) -> dict[str, Any]:

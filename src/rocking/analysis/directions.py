@@ -213,11 +213,11 @@ class ResponseRose(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.core.arrays import evenly
+        from rocking.core.arrays import select_evenly
         from rocking.plot.maps import shares_figure
 
         data = self.data
-        chosen = [*evenly(data.sizes["level"], 4)]
+        chosen = [*select_evenly(data.sizes["level"], 4)]
         azimuth = data.azimuth.values
         # An opposite azimuth that was not requested has the same outcome.
         opposite = np.mod(azimuth + 180.0, 360.0)

@@ -46,7 +46,7 @@ from rocking.analysis.risk import Risk, Survival, mean_of_blocks, risk_of
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY, Model
-from rocking.core.progress import spelled
+from rocking.core.progress import spell
 from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, counted, text_table, write_text
 from rocking.engine.problem import bodies_of, slenderness_of
@@ -150,7 +150,7 @@ class Fragility(Result):
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
-                + spelled(Message('{} "both" counts both', ("polarity",)))
+                + spell(Message('{} "both" counts both', ("polarity",)))
             )
         if not self.curves[0].bounded:
             notes.append(f"intervals and bands go from 0 to infinity: {self._too_few}")

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rocking.analysis.probit import Probit
 from rocking.core import checks
-from rocking.core.arrays import Floats, Integers, as_asked
+from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Result
 from rocking.core.tables import csv_rows, text_table
@@ -161,7 +161,7 @@ class HazardCurve(Result):
         exponents, factors = powers(self)
         segment = np.clip(np.searchsorted(self.intensity, at, side="right") - 1, 0, len(self.rate) - 2)
         with np.errstate(divide="ignore", over="ignore"):
-            return as_asked(np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(at))))
+            return unwrap_scalar(np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(at))))
 
     def to_dict(self) -> dict[str, Any]:
         return {

@@ -25,7 +25,7 @@ from rocking.analysis.levels import (
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.core.bisection import bisected
+from rocking.core.bisection import bisect
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
 from rocking.core.tables import as_written, counted, named, text_table
@@ -483,7 +483,7 @@ def critical_scale(
         if response(bound).overturned is not expected:
             does, change = ("does not overturn", "raise") if expected else ("overturns", "lower")
             raise InvalidOption(f"the block {does} at the scale {bound:g}: {change} it in {{}}", "bounds", value=bounds)
-    _, scale = bisected(low, high, lambda scale: response(scale).overturned)
+    _, scale = bisect(low, high, lambda scale: response(scale).overturned)
     last = response(scale)
     by_scale = {name: float(last.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")}
     turned, share = gradient(last, "event", -1), -scale / by_scale["motion"]

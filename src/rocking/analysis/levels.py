@@ -323,7 +323,7 @@ class Boundaries:
     @property
     def level(self) -> Floats:
         """Midpoint of every bracket."""
-        return bisection.middle(self.low, self.high)
+        return bisection.find_middles(self.low, self.high)
 
 
 def boundaries(
@@ -364,7 +364,7 @@ def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) ->
     few = np.bincount(origin)[origin] < 64
     third = wide & few & (found != here.below) & (found != here.above)
     up = wide & (found == here.below)
-    low, high = bisection.halved(here.low, here.high, up, wide & ~up)
+    low, high = bisection.halve(here.low, here.high, up, wide & ~up)
     lower = Boundaries(here.column, low, high, here.below, np.where(third, found, here.above))
     upper = Boundaries(here.column[third], here.level[third], here.high[third], found[third], here.above[third])
     both = (np.concatenate(pair) for pair in zip(vars(lower).values(), vars(upper).values(), strict=True))

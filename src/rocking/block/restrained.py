@@ -16,7 +16,7 @@ from rocking.block.sides import Side, checked_pair, checked_parameter, one_sided
 from rocking.block.single import Block, Rocking, one_block
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.core.bisection import bisected
+from rocking.core.bisection import bisect
 from rocking.core.constants import MODELS, Model
 from rocking.errors import InvalidBlock, InvalidOption
 
@@ -308,7 +308,7 @@ def _balance_of(side: Side, terms: Terms) -> float:
     if not len(negative):
         return math.inf
     k = int(negative[0])
-    return bisected(float(looks[k]), float(looks[k + 1]), lambda u: moment(u) <= 0.0)[1]
+    return bisect(float(looks[k]), float(looks[k + 1]), lambda u: moment(u) <= 0.0)[1]
 
 
 SINGLE["restrained"] = RestrainedBlock

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.calibration.space import Space
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.core.bisection import bisected
+from rocking.core.bisection import bisect
 from rocking.core.progress import Progress
 from rocking.core.threads import thread_count
 from rocking.kernels import population as kernel
@@ -408,4 +408,4 @@ def _step(likelihood: Floats, most: float) -> float:
     def too_few(step: float) -> bool:
         return 1.0 / float((_tempered(likelihood, step) ** 2).sum()) / len(likelihood) < 0.5
 
-    return bisected(0.0, most, too_few, halvings=50)[1] if too_few(most) else most
+    return bisect(0.0, most, too_few, halvings=50)[1] if too_few(most) else most

@@ -26,10 +26,10 @@ from rocking.chattering.expansions import (
 )
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.bisection import bisected
+from rocking.core.bisection import bisect
 from rocking.core.progress import Progress
 from rocking.core.tables import counted
-from rocking.core.threads import in_threads
+from rocking.core.threads import map_in_threads
 from rocking.engine.schemes import critical_amplitudes_by
 from rocking.engine.tasks import require_finished
 from rocking.errors import InvalidOption, Unfinished
@@ -315,7 +315,7 @@ def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
         phases[statuses == SequenceStatus.UNRESOLVED] = math.inf
         times[some] = phases / frequencies[some]
 
-    for _ in in_threads(part, range(0, rock.size, _PART)):  # the compiled function holds no lock
+    for _ in map_in_threads(part, range(0, rock.size, _PART)):  # the compiled function holds no lock
         pass
     return times.reshape(shape)[()]
 
@@ -424,7 +424,7 @@ def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayL
     cases = list(zip(*(values.tolist() for values in flat), strict=True))
     found = np.empty(len(cases))
     with Progress("bisecting", len(cases)) as bar:
-        for k, amplitude in enumerate(in_threads(lambda case: _critical(*case), cases)):
+        for k, amplitude in enumerate(map_in_threads(lambda case: _critical(*case), cases)):
             found[k] = amplitude
             bar.advance()
     return found.reshape(shape)[()]
@@ -439,7 +439,7 @@ def _critical(omega: float, eta: float, alpha: float) -> float:
     try:
         while _comes_to_rest(block, high, omega):
             low, high = high, 2.0 * high
-        return bisected(low, high, lambda a: not _comes_to_rest(block, a, omega), width=1e-12)[0]
+        return bisect(low, high, lambda a: not _comes_to_rest(block, a, omega), width=1e-12)[0]
     except Unfinished:
         return math.nan
 

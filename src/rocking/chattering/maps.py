@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.block import one_block
 from rocking.chattering.families import Family, SimulationInput
 from rocking.core import checks
-from rocking.core.arrays import Integers, without_dust
+from rocking.core.arrays import Integers, clear_rounding
 from rocking.core.constants import VERSION
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, Result
 from rocking.core.tables import as_written, rows_of, text_table
-from rocking.core.threads import in_threads
+from rocking.core.threads import map_in_threads
 from rocking.engine.tasks import OUTCOME, complete_chattering
 from rocking.errors import InvalidOption
 from rocking.kernels import state
@@ -168,7 +168,7 @@ def chattering_map(
             )
     points: list[_Point] = []
     with Progress("mapping", len(inputs)) as bar:
-        for point in in_threads(_simulated, inputs):
+        for point in map_in_threads(_simulated, inputs):
             points.append(point)
             bar.advance()
     columns = zip(_Point._fields, zip(*points, strict=True), strict=True)
@@ -456,5 +456,5 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)
     # The shaking starts with an uplift, within rounding error.
-    at_rest = without_dust(np.diff(np.clip(response.rest_intervals, start, end)), end).sum()
+    at_rest = clear_rounding(np.diff(np.clip(response.rest_intervals, start, end)), end).sum()
     return ChatteringEpisodes(episodes, (start, end), float(at_rest))

@@ -10,7 +10,7 @@ import numpy as np
 from rocking.core.arrays import Flags, Floats
 
 
-def bisected(
+def bisect(
     low: float, high: float, condition: Callable[[float], bool], *, width: float = 0.0, halvings: float = math.inf
 ) -> tuple[float, float]:
     """Return a bracket of where a condition begins to hold, limited by width, number of halvings or resolution."""
@@ -23,18 +23,18 @@ def bisected(
     return low, high
 
 
-def middle(low: Floats, high: Floats) -> Floats:
+def find_middles(low: Floats, high: Floats) -> Floats:
     """Return the midpoints of brackets."""
     return 0.5 * (low + high)
 
 
 def is_wide(low: Floats, high: Floats, tolerance: Floats | float) -> Flags:
     """Return which brackets are wider than this fraction of their upper end and contain a number between their ends."""
-    midpoints = middle(low, high)
+    midpoints = find_middles(low, high)
     return np.asarray((high - low > tolerance * high) & (midpoints > low) & (midpoints < high))
 
 
-def halved(low: Floats, high: Floats, in_upper: Flags, in_lower: Flags) -> tuple[Floats, Floats]:
+def halve(low: Floats, high: Floats, in_upper: Flags, in_lower: Flags) -> tuple[Floats, Floats]:
     """Return brackets cut at their middle, on the side that contains the change if known."""
-    midpoints = middle(low, high)
+    midpoints = find_middles(low, high)
     return np.where(in_upper, midpoints, low), np.where(in_lower, midpoints, high)

@@ -37,7 +37,7 @@ class _Listener:
 _listener = _Listener()
 
 
-def spelled(message: Message) -> str:
+def spell(message: Message) -> str:
     """Return a message with argument names for the present reader, options on the command line."""
     return message.text(_listener.spelling)
 
@@ -51,7 +51,7 @@ def note(message: Message | str) -> None:
             return
         _listener.seen.add(sentence)
     if _listener.audience == "everybody" or (_listener.audience == "terminal" and sys.stderr.isatty()):
-        print(f"rocking: note: {spelled(sentence)}", file=sys.stderr)
+        print(f"rocking: note: {spell(sentence)}", file=sys.stderr)
 
 
 @contextlib.contextmanager

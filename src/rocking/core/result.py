@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from rocking.core import checks
-from rocking.core.arrays import evenly
+from rocking.core.arrays import select_evenly
 from rocking.core.tables import (
     Column,
     columns_of,
@@ -258,6 +258,6 @@ def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: 
 
 def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """Return a table of at most a dozen rows, evenly from first to last, with a remark if there are more."""
-    indices = evenly(len(rows), _MAX_ROWS)
+    indices = select_evenly(len(rows), _MAX_ROWS)
     table = text_table(header, [rows[k] for k in indices])
     return table if len(indices) == len(rows) else f"{table}\n({len(indices)} of {len(rows)} rows)"

@@ -84,7 +84,7 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
 
 def thread_count() -> int:
     """Return the number of threads of long computations."""
-    return _options.get(_DEFAULT).threads or cores()
+    return _options.get(_DEFAULT).threads or count_cores()
 
 
 def progress_option() -> bool | None:
@@ -92,12 +92,12 @@ def progress_option() -> bool | None:
     return _options.get(_DEFAULT).progress
 
 
-def cores() -> int:
+def count_cores() -> int:
     """Count the cores available to this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_threads(
+def map_in_threads(
     function: Callable[[Item], Output],
     items: Iterable[Item],
     *,

@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.core.arrays import Flags, Floats, Integers, evenly
+from rocking.core.arrays import Flags, Floats, Integers, select_evenly
 from rocking.core.tables import counted
-from rocking.core.threads import in_threads
+from rocking.core.threads import map_in_threads
 from rocking.dynamics.maps import StroboscopicMap, parts_of
 from rocking.dynamics.orbits import multipliers_at, sizes_of
 from rocking.errors import InvalidOption
@@ -214,7 +214,7 @@ class KnownAttractors:
         def follow(part: slice) -> None:
             iterate(setting, new_scratch(), made[part], periods, orbits[part], traps, found[part], taken[part])
 
-        for _ in in_threads(follow, parts_of(len(made), periods)):
+        for _ in map_in_threads(follow, parts_of(len(made), periods)):
             pass
         return found, taken
 
@@ -235,7 +235,9 @@ class KnownAttractors:
                 near = np.abs((known.states - attractor.states[0]) / self.size).max(axis=1)
                 if near.min() < RETURN:
                     return number
-        points = attractor.states[evenly(attractor.period, 8)]  # some points of a long orbit have a neighbourhood
+        points = attractor.states[
+            select_evenly(attractor.period, 8)
+        ]  # some points of a long orbit have a neighbourhood
         pairs = zip(points, self.strobe._states(points)[1], strict=True)
         traps = [row for pair in pairs if (row := _trap(self.strobe, attractor, *pair, self.size)) is not None]
         if not traps:

@@ -18,7 +18,7 @@ from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, Result, table_of_some, variable
 from rocking.core.tables import as_written, counted
-from rocking.core.threads import in_threads
+from rocking.core.threads import map_in_threads
 from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.bodies import LinearBody
 from rocking.dynamics.maps import TOGETHER, Fate, Scale, StroboscopicMap, described, scale_of, stroboscopic_map
@@ -238,7 +238,7 @@ def bifurcation_diagram(
     with Progress("bifurcation diagram", len(ways) * levels.size) as bar:
         for start in range(0, levels.size, _CHUNK):
             chunks = [(w, each[start : start + _CHUNK]) for w, each in order.items()]
-            for done in in_threads(follow, [(0, [k]) for k in chunks[0][1]] if afresh else chunks):
+            for done in map_in_threads(follow, [(0, [k]) for k in chunks[0][1]] if afresh else chunks):
                 bar.advance(done)
 
     import xarray as xr

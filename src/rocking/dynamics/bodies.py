@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 import rocking.response
 from rocking.block.body import KINDS, Coordinate
 from rocking.core import checks
-from rocking.core.arrays import Floats, Integers, as_asked
+from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.problem import never_rests
 from rocking.engine.schemes import ChatteringScheme
@@ -419,11 +419,11 @@ class Response(rocking.response.Response):
 
     def position(self, time: ArrayLike) -> Floats:
         """Return the position relative to the table or the support at any time, m; NaN outside the response."""
-        return as_asked(self.states(time)[..., 0])
+        return unwrap_scalar(self.states(time)[..., 0])
 
     def velocity(self, time: ArrayLike) -> Floats:
         """Return the derivative of `position`, m/s; at an impact, the velocity just after it."""
-        return as_asked(self.states(time)[..., 1])
+        return unwrap_scalar(self.states(time)[..., 1])
 
 
 def in_positions(response: rocking.response.Response) -> Response:

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.block.body import Body
 from rocking.block.sides import in_line
 from rocking.core import checks
-from rocking.core.arrays import Flags, Floats, Integers, ranges
+from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import MODELS, Model
-from rocking.core.threads import in_threads
+from rocking.core.threads import map_in_threads
 from rocking.dynamics.bodies import LinearBody
 from rocking.engine.problem import FASTEST, one_body, set_start
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
@@ -199,7 +199,7 @@ def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
 def parts_of(count: int, periods: int) -> Sequence[slice]:
     """Divide states into ranges, one per call of a kernel, over a number of periods."""
     # About half a second.
-    return [*ranges(count, min(TOGETHER, max(1, 100_000 // periods)))]
+    return [*split_range(count, min(TOGETHER, max(1, 100_000 // periods)))]
 
 
 def sensible(values: Floats, name: str) -> None:
@@ -326,7 +326,7 @@ class StroboscopicMap(PeriodicForcing):
             found, taken = counts[:, part]
             iterate(setting, state.new_scratch(), made[part], n_periods, orbits[part], traps, found, taken)
 
-        for _ in in_threads(follow, parts_of(len(made), n_periods)):
+        for _ in map_in_threads(follow, parts_of(len(made), n_periods)):
             pass
 
 

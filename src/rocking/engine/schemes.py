@@ -13,7 +13,7 @@ from numpy.polynomial import polynomial
 from rocking.block import Blocks
 from rocking.block.body import Bodies
 from rocking.core import checks
-from rocking.core.arrays import Flags, Floats, ranges
+from rocking.core.arrays import Flags, Floats, split_range
 from rocking.core.constants import Model
 from rocking.errors import InvalidOption, OutsideFit
 from rocking.kernels import state
@@ -344,7 +344,7 @@ def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
         return fitted
     found = np.ones(omega.size)
     lossy = np.flatnonzero(eta < 1.0)
-    for some in ranges(lossy.size, _CRITICAL_TOGETHER):
+    for some in split_range(lossy.size, _CRITICAL_TOGETHER):
         here = np.zeros(lossy[some].size)
         write_critical_amplitudes(omega[lossy[some]], eta[lossy[some]], here)
         found[lossy[some]] = here

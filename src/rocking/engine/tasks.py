@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from rocking.block.body import Bodies
 from rocking.block.single import ROTATION
-from rocking.core.arrays import Flags, Floats, Integers, ranges
+from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import Model
 from rocking.core.tables import counted
-from rocking.core.threads import in_threads
+from rocking.core.threads import map_in_threads
 from rocking.engine.problem import ground_of, highest, set_start, settings_of, step_of
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidMotion, Unfinished
@@ -122,13 +122,13 @@ def simulate_tasks(setup: Setup, tasks: Iterable[Task]) -> Iterator[tuple[Task, 
     def simulated(task: Task) -> tuple[Task, NDArray[np.void]]:
         return task, simulate_task(setup, task, cancelled)
 
-    yield from in_threads(simulated, tasks, cancelled=cancelled)
+    yield from map_in_threads(simulated, tasks, cancelled=cancelled)
 
 
 def parts_of(count: int, motion: Motion) -> Iterator[slice]:
     """Divide ``count`` bodies into ranges of the size of a task."""
     size = _TOGETHER * max(1, _TASK // (_TOGETHER * len(motion.coefficients)))
-    yield from ranges(count, size)
+    yield from split_range(count, size)
 
 
 def simulate_each(setup: Setup, motion: Motion, factors: Floats) -> Iterator[tuple[Task, NDArray[np.void]]]:
@@ -197,7 +197,7 @@ def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> I
     size = min(_TOGETHER, max(1, _PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
-        for some in ranges(len(chosen), size):
+        for some in split_range(len(chosen), size):
             yield chosen[some], int(count)
 
 

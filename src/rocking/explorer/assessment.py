@@ -13,7 +13,7 @@ from rocking.analysis.fragility import fit_fragility
 from rocking.analysis.levels import simulate_levels
 from rocking.block import Blocks
 from rocking.core.arrays import Flags, Floats
-from rocking.core.bisection import bisected
+from rocking.core.bisection import bisect
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
 from rocking.explorer.catalogue import find_title, number_stations, read_entries
@@ -267,7 +267,7 @@ def _find_overturning_factor(case: Case) -> dict[str, Any] | None:
         overturning = np.flatnonzero(is_overturned(factors[start : start + _BATCH_SIZE]))
         if overturning.size:
             low, high = factors[start + overturning[0] - 1 : start + overturning[0] + 1]
-            factor = bisected(
+            factor = bisect(
                 float(low), float(high), lambda factor: bool(is_overturned(np.array([factor]))[0]), halvings=24
             )[1]
             return margin | {"factor": factor, "pga": factor * motion.pga}

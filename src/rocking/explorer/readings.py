@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rocking.block import one_block
-from rocking.core.arrays import without_dust
+from rocking.core.arrays import clear_rounding
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
@@ -103,7 +103,7 @@ def _find_ground_acceleration(simulated: SimulatedCase, time: float) -> dict[str
     return {
         name: None
         if component is None
-        else float(without_dust(component.acceleration(time), component.pga)) / STANDARD_GRAVITY
+        else float(clear_rounding(component.acceleration(time), component.pga)) / STANDARD_GRAVITY
         for name, component in components.items()
     }
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rocking.block import Block
 from rocking.chattering.maps import chattering_episodes
-from rocking.core.arrays import Floats, Integers, without_dust
+from rocking.core.arrays import Floats, Integers, clear_rounding
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import Certified
 from rocking.errors import InvalidOption
@@ -253,7 +253,7 @@ def _sample_ground_acceleration(case: Case, start: float, end: float, points: in
         return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
     motion_end = motion.duration if motion.vertical is None else max(motion.duration, motion.vertical.duration)
     corners = motion.drawing_times(start, min(end, max(start, motion_end)))
-    acceleration = without_dust(motion.acceleration(corners), motion.pga) / STANDARD_GRAVITY
+    acceleration = clear_rounding(motion.acceleration(corners), motion.pga) / STANDARD_GRAVITY
     if motion.vertical is None:
         indices = thin_line(acceleration, points)
         return {"ground_time": corners[indices] - start, "ground_g": acceleration[indices]}

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.bisection import bisected
+from rocking.core.bisection import bisect
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import named
 from rocking.errors import InvalidMotion
@@ -225,4 +225,4 @@ def _find_time_at_energy(motion: MotionMeasures, energy: Floats, fraction: float
     def is_reached(span: float) -> bool:
         return bool(energy[piece] + _integrate_square(motion.coefficients[piece], np.asarray(span)) >= target)
 
-    return float(start + bisected(0.0, end - start, is_reached, halvings=53)[1])
+    return float(start + bisect(0.0, end - start, is_reached, halvings=53)[1])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack
 
 import numpy as np
 
-from rocking.core.arrays import Flags, Floats, evenly
+from rocking.core.arrays import Flags, Floats, select_evenly
 from rocking.core.tables import as_written
 from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, page_for, scale_by_ratio, styles_of
 
@@ -208,7 +208,7 @@ def spectrum_figure(
     middle = min(fractiles, key=lambda share: abs(share - 0.5))
     chosen = fractiles if len(motions) > 1 and len(curves) <= _WITH_ALL_FRACTILES else [middle]
     widths = {share: 1.8 if share == middle else 0.9 for share in chosen}
-    named, with_singles = evenly(len(curves), _NAMED), len(curves) <= _WITH_ALL_MOTIONS
+    named, with_singles = select_evenly(len(curves), _NAMED), len(curves) <= _WITH_ALL_MOTIONS
     with page_for((5.6, 4.8), **place) as page:
         peaks, *shares = panels = page.panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
         for k, (style, curve) in enumerate(zip(styles_of(len(curves)), curves, strict=True)):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.core.bisection import bisected, halved, middle
+from rocking.core.bisection import bisect, find_middles, halve
 from rocking.core.tables import counted
 from rocking.errors import InvalidOption
 from rocking.kernels import state
@@ -119,7 +119,7 @@ class History:
         within = np.flatnonzero(np.abs(self.states(times)[:, 0]) < balance)
         if not len(within):
             return float(ends[0])  # beyond it from the start
-        return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
+        return bisect(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
 
     def largest(self) -> tuple[float, float]:
         """Return the largest rotation of a block on each side, rad, from parts of steps and turning points."""
@@ -133,8 +133,8 @@ class History:
         step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
         low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
         for _ in range(_TURNINGS if len(step) else 0):
-            out = sign * self.states_in(middle(low, high), rows)[:, 1] > 0.0
-            low, high = halved(low, high, out, ~out)
+            out = sign * self.states_in(find_middles(low, high), rows)[:, 1] > 0.0
+            low, high = halve(low, high, out, ~out)
         np.maximum.at(found, step, np.abs(self.states_in(low, rows)[:, 0]))
         plus, minus = (float(np.max(found[side == k], initial=0.0)) for k in range(2))
         return plus, minus

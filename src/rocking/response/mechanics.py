@@ -19,7 +19,7 @@ from rocking.block import Block, RestrainedBlock
 from rocking.block.body import Body, ContactLaw
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.core.bisection import bisected
+from rocking.core.bisection import bisect
 from rocking.errors import InvalidOption
 from rocking.kernels.ground import component_coefficients
 from rocking.kernels.state import Record
@@ -127,7 +127,7 @@ class Contact:
         def passes(time: float) -> bool:
             return bool(is_beyond(self._measured(measure, np.array([time]), rows[step, :1]))[0])
 
-        return bisected(float(before.max()), high, passes)[1]
+        return bisect(float(before.max()), high, passes)[1]
 
     def _peaks(self, measure: Measure, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
         """Return the times and values of the maxima in these steps."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.block import RestrainedBlock
 from rocking.block.body import Body
-from rocking.core.arrays import Floats, as_asked
+from rocking.core.arrays import Floats, unwrap_scalar
 from rocking.core.constants import Model
 from rocking.core.result import Result
 from rocking.engine.schemes import ChatteringScheme
@@ -273,15 +273,15 @@ class Simulated(Result):
 
     def rotation(self, time: ArrayLike) -> Floats:
         """Return the rotation theta, rad, at any time, from the series of the arc; NaN outside [0, duration]."""
-        return as_asked(self.states(time)[..., 0])
+        return unwrap_scalar(self.states(time)[..., 0])
 
     def angular_velocity(self, time: ArrayLike) -> Floats:
         """Return the angular velocity, rad/s, at any time (at an impact, just after it); NaN outside [0, duration]."""
-        return as_asked(self.states(time)[..., 1])
+        return unwrap_scalar(self.states(time)[..., 1])
 
     def angular_acceleration(self, time: ArrayLike) -> Floats:
         """Return the angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
-        return as_asked(self.states(time)[..., 2])
+        return unwrap_scalar(self.states(time)[..., 2])
 
     def kinetic_energy(self, time: ArrayLike) -> Floats:
         """Return the kinetic energy divided by the overturning energy, at any time (at an impact, just after it).
@@ -305,7 +305,7 @@ class Simulated(Result):
             any rotation.
         """
         states, sides = self._history.states_and_sides(time)
-        return as_asked(self._energy.kinetic(states[..., 1], sides))
+        return unwrap_scalar(self._energy.kinetic(states[..., 1], sides))
 
     def potential_energy(self, time: ArrayLike) -> Floats:
         """Return the potential energy of weight and restraints, zero upright, in the unit of `kinetic_energy`.
@@ -314,7 +314,7 @@ class Simulated(Result):
         motion and damping. Arguments and errors are the same as of `kinetic_energy`.
         """
         states, sides = self._history.states_and_sides(time)
-        return as_asked(self._energy.potential(states[..., 0], sides))
+        return unwrap_scalar(self._energy.potential(states[..., 0], sides))
 
     @cached_property
     def impact_losses(self) -> Floats:
@@ -323,11 +323,11 @@ class Simulated(Result):
 
     def normal_force(self, time: ArrayLike) -> Floats:
         """Return the ratio of normal force to weight, without the impulses of impacts; NaN outside the response."""
-        return as_asked(self._contact.forces(time)[1])
+        return unwrap_scalar(self._contact.forces(time)[1])
 
     def friction_demand(self, time: ArrayLike) -> Floats:
         """Return the friction coefficient for sticking: infinite without normal force, NaN outside the response."""
-        return as_asked(friction_demand(*self._contact.forces(time)))
+        return unwrap_scalar(friction_demand(*self._contact.forces(time)))
 
     @cached_property
     def _extremes(self) -> tuple[float, float]:

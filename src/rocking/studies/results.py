@@ -33,7 +33,7 @@ from rocking.analysis.levels import (
 from rocking.analysis.spectrum import fractiles_of, overturned_share
 from rocking.block.body import Bodies
 from rocking.core import checks
-from rocking.core.arrays import Flags, Floats, evenly, ranges
+from rocking.core.arrays import Flags, Floats, select_evenly, split_range
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, table_of_some, variable
 from rocking.core.tables import as_written, columns_of, counted, frame_of, records_of, whole_file
@@ -129,7 +129,7 @@ def write_table(kind: str, path: str | Path, dataset: xr.Dataset, step: int) -> 
     with Progress("writing", count) as bar:
 
         def frames() -> Iterator[pd.DataFrame]:
-            for part in ranges(count, step):
+            for part in split_range(count, step):
                 yield frame_of(columns_of(table.isel({along: part}).load()))
                 bar.advance(part.stop - part.start)
 
@@ -174,7 +174,7 @@ def critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     store.require_complete()
     names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
     holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
-    for part in ranges(len(product.motions), store.grid.unit[0]):
+    for part in split_range(len(product.motions), store.grid.unit[0]):
         outcomes = _selected(store, names, True, (part, _EVERYTHING, _EVERYTHING, _EVERYTHING))
         unfinished, stopped, overturned, completes, rests, rests_by_rounding = (values != 0.0 for values in outcomes)
         holds[part], known[part] = overturned, ~(unfinished | stopped)
@@ -227,7 +227,7 @@ def _peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     *others, count = store.product.shape
     polarities = slice(0, 1 if store.product.bodies.is_symmetric else None)
     names = ["peak_rotation", "overturned", "unfinished", "stopped"]
-    for blocks in ranges(count, max(1, _HELD // math.prod(others))):
+    for blocks in split_range(count, max(1, _HELD // math.prod(others))):
         selection = _EVERYTHING, _EVERYTHING, polarities, blocks
         peak, overturned, unfinished, stopped = _selected(store, names, True, selection)
         if stopped.any():
@@ -305,7 +305,7 @@ class BlockTable(DatasetResult):
         return blocks_figure(
             p,
             alpha,
-            panels={names[k]: shown[k] for k in evenly(len(names), 4)},
+            panels={names[k]: shown[k] for k in select_evenly(len(names), 4)},
             value_label=label,
             missing_label=missing,
             title=title or as_written(self.data.description),

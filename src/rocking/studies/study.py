@@ -30,7 +30,7 @@ from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.tables import counted, write_netcdf
-from rocking.core.threads import cores, thread_count
+from rocking.core.threads import count_cores, thread_count
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
@@ -522,7 +522,7 @@ def _workers(executor: Any) -> Iterator[tuple[Callable[[Work], Future[bytes]], C
 
     def count() -> int:
         if client is None:
-            return getattr(foreign, "_max_workers", None) or cores()
+            return getattr(foreign, "_max_workers", None) or count_cores()
         if client.status != "running":
             raise _gone("no connection to the scheduler")
         try:
