@@ -14,11 +14,11 @@ NOT_REAL = ["1", b"1", True, np.True_, np.array(True), None, 1j, np.array([1.0])
 NOT_FINITE = [np.nan, np.inf, -np.inf, 10**400, np.float32(np.nan)]
 
 CHECKS = {
-    "number": lambda value: checks.number(value, "it", InvalidOption),
+    "number": lambda value: checks.real(value, "it", InvalidOption),
     "finite": lambda value: checks.finite(value, "it", InvalidOption),
     "positive": lambda value: checks.positive(value, "it", InvalidOption, "s"),
-    "within": lambda value: checks.within(value, "it", InvalidOption, 0.5, 2.0),
-    "share": lambda value: checks.share(value, "it", InvalidOption, below=1.5),
+    "within": lambda value: checks.between(value, "it", InvalidOption, 0.5, 2.0),
+    "share": lambda value: checks.fraction(value, "it", InvalidOption, below=1.5),
 }
 
 
@@ -48,19 +48,19 @@ def test_the_error_is_the_one_that_is_asked_for_and_says_the_unit():
     with pytest.raises(InvalidBlock, match=r"^height must be a positive number, in m, not -1$"):
         checks.positive(-1.0, "height", InvalidBlock, "m")
     with pytest.raises(InvalidBlock, match=r"^p must be a number from 1 to 2, in rad/s, not 3$"):
-        checks.within(3.0, "p", InvalidBlock, 1.0, 2.0, "rad/s")
+        checks.between(3.0, "p", InvalidBlock, 1.0, 2.0, "rad/s")
 
 
 @pytest.mark.parametrize("value", [2, np.int64(2), np.uint8(2), np.array(2)])
 def test_whole_numbers_are_of_a_whole_type(value):
-    found = checks.whole(value, "it", InvalidOption, 1, 2)
+    found = checks.integer(value, "it", InvalidOption, 1, 2)
     assert (found, type(found)) == (2, int)
 
 
 @pytest.mark.parametrize("value", [0, 3, 2.0, "2", True, np.True_, None, np.float64(2)])
 def test_other_whole_numbers_are_refused(value):
     with pytest.raises(InvalidOption, match="it must be a whole number from 1 to 2, not"):
-        checks.whole(value, "it", InvalidOption, 1, 2)
+        checks.integer(value, "it", InvalidOption, 1, 2)
 
 
 @pytest.mark.parametrize("values", [[1, 2], (1.0, 2.0), np.array([1, 2], np.int8), [Fraction(1), 2], range(1, 3)])

@@ -267,7 +267,7 @@ def _check_parameters(**numbers: float) -> dict[str, float]:
             checked[name] = checks.positive(value, name, InvalidMotion, "s")
         else:
             positive = checks.positive(value, name, InvalidMotion, "Hz")
-            checked[name] = checks.within(positive, "frequency of a pulse", InvalidMotion, 1e-9, 1e6, "Hz")
+            checked[name] = checks.between(positive, "frequency of a pulse", InvalidMotion, 1e-9, 1e6, "Hz")
     return checked
 
 
@@ -299,7 +299,7 @@ def _expand_amplitudes(amplitude: float | Sequence[float], lobes: int | None) ->
         raise InvalidMotion("the amplitudes of the lobes must be one number or a flat sequence of numbers")
     values = np.atleast_1d(np.asarray(amplitude, dtype=object))
     amplitudes = [checks.finite(value, "amplitude of a lobe", InvalidMotion) for value in values]
-    count = None if lobes is None else checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * _MAX_CYCLES)
+    count = None if lobes is None else checks.integer(lobes, "number of lobes", InvalidMotion, 1, 2 * _MAX_CYCLES)
     if np.ndim(amplitude) == 0 and count is not None:
         return amplitudes * count
     if np.ndim(amplitude) == 0 or not amplitudes or count not in (None, len(amplitudes)):
@@ -353,7 +353,7 @@ def ricker(
     """
     amplitude, frequency = _check_parameters(amplitude=amplitude, frequency=frequency).values()
     kinds = ("symmetric", "antisymmetric")
-    symmetric = checks.one_of(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
+    symmetric = checks.choice(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
     rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
     limit = 2.0 * (9.1 if symmetric else 9.3) / rate  # limit at 1e-16 of the peak
     span = limit if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")

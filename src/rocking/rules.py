@@ -351,8 +351,8 @@ def rate(
     >>> [*rate(rocking.Block(width=0.3, height=0.9), record, ["west", "ishiyama"])]
     ['west', 'ishiyama']
     """
-    wanted = [*RULES] if rules is None else checks.several(rules, "rules", InvalidOption)
-    names = [checks.one_of(name, "rules", InvalidOption, [*RULES]) for name in wanted]
+    wanted = [*RULES] if rules is None else checks.items(rules, "rules", InvalidOption)
+    names = [checks.choice(name, "rules", InvalidOption, [*RULES]) for name in wanted]
     many = _free(blocks)
     return {name: RULES[name](many, motion) for name in names}
 
@@ -453,7 +453,7 @@ def check(
     0.93 0.93 0.64 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
     """
     named_motions = index_motions(motions)
-    names = None if rules is None else checks.several(rules, "rules", InvalidOption)
+    names = None if rules is None else checks.items(rules, "rules", InvalidOption)
     # Raise errors before the simulations.
     values_of([*named_motions.values()], Measure("pga"))
     ratios = [

@@ -146,7 +146,7 @@ class FragilityCurve:
         """
         from scipy.special import ndtri
 
-        share = checks.share(probability, "probability", InvalidOption)
+        share = checks.fraction(probability, "probability", InvalidOption)
         score = float(ndtri(share))
         with np.errstate(over="ignore", under="ignore"):
             return float(np.exp((score - self.fitted.intercept[0]) / self.fitted.slope[0]))
@@ -158,7 +158,7 @@ class FragilityCurve:
         and infinite at 0. A precarious rock that has stood for so long contradicts hazard curves above them.
         """
         time = checks.positive(years, "years", InvalidOption)
-        share = checks.share(confidence, "confidence", InvalidOption)
+        share = checks.fraction(confidence, "confidence", InvalidOption)
         with np.errstate(divide="ignore"):
             return -math.log1p(-share) / (time * self.probability(intensity))
 
@@ -254,7 +254,7 @@ def fragility_line(curve: FragilityCurve, intensity: Floats, measure: Measure) -
 
 def whole_numbers(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
     """Return integers between two bounds, one for each intensity."""
-    given = checks.answers_or_numbers(values, name, InvalidOption)
+    given = checks.booleans_or_numbers(values, name, InvalidOption)
     try:
         numbers = np.broadcast_to(given, size)
     except ValueError:
@@ -321,7 +321,7 @@ def fragility_model(
     `imt` contains OpenQuake's measure and the factor of its unit, `valid` the range (SI) of the data, `no_damage` the
     lowest damaging intensity in OpenQuake's unit, and `about` the model's id, assetCategory and lossCategory.
     """
-    checks.one_of(about["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
+    checks.choice(about["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
     for what, name in (("taxonomy", taxonomy), ("model_id", about["id"]), ("asset_category", about["assetCategory"])):
         check_names([name], what)
     check_names([curve.limit_state for curve in curves], "a limit state")

@@ -238,7 +238,7 @@ class ResponseRose(DatasetResult):
 
 def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
     """Return pairs by name, or raise an error if one is not a pair of motions."""
-    given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.several(pairs, "pairs", InvalidOption)
+    given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.items(pairs, "pairs", InvalidOption)
     found = [list_motions(pair) for pair in given if not isinstance(pair, Motion)]
     if not found or len(found) < len(given) or any(len(components) != 2 for components in found):
         raise InvalidOption(

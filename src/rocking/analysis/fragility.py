@@ -196,7 +196,7 @@ class Fragility(Result):
     def curve(self, limit_state: str) -> FragilityCurve:
         """Return the curve of a limit state."""
         curves = {curve.limit_state: curve for curve in self.curves}
-        return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
+        return curves[checks.choice(limit_state, "limit_state", InvalidOption, list(curves))]
 
     def annual_rate(self, hazard: HazardCurve) -> Risk:
         """Compute annual rates of exceeding the limit states from the hazard curve of a site.
@@ -397,8 +397,8 @@ def fragility(
     many, how = bodies_of(blocks), Measure.parse(measure)
     slenderness = slenderness_of(many)
     shares = weights_of(weights, len(many))
-    mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
-    checks.share(confidence, "confidence", InvalidOption)
+    mirrored = checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
+    checks.fraction(confidence, "confidence", InvalidOption)
     states = checked_limit_states(limit_states)
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
@@ -517,11 +517,11 @@ def fit_fragility(
     how = Measure.parse(measure)
     x = checks.positive_numbers(intensity, "intensity", InvalidOption)
     for end in (x.min(), x.max()):
-        checks.within(float(end), "intensity", InvalidOption, 1e-50, 1e50)
+        checks.between(float(end), "intensity", InvalidOption, 1e-50, 1e50)
     count = whole_numbers(trials, "trials", x.size, 1.0, 2.0**53)
     outcomes = by_limit_state(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
     groups = None if clusters is None else groups_of(clusters, "clusters", x.size)
-    checks.share(confidence, "confidence", InvalidOption)
+    checks.fraction(confidence, "confidence", InvalidOption)
     curves = [
         fitted_curve(name, (x, whole_numbers(values, "exceeded", x.size, 0.0, count), count), groups, confidence, how)
         for name, values in outcomes.items()

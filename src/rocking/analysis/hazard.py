@@ -134,7 +134,7 @@ class HazardCurve(Result):
             If the file cannot be read, has another format, or does not contain the site.
         """
         file = checks.path(path, "path of a hazard curve", InvalidOption)
-        checks.whole(site, "site", InvalidOption, 0)
+        checks.integer(site, "site", InvalidOption, 0)
         if period is not None:
             period = checks.positive(period, "period", InvalidOption, "s")
         try:

@@ -121,7 +121,7 @@ def incremental_dynamic_analysis(
     values = values_of(shaken, how)
     if never_rests(many):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
-    width = checks.within(rtol, "rtol", InvalidOption, 1e-15, 0.5)
+    width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model}
     first = _lowest_uplift(many, shaken, values, how, model)
     if levels is None:
@@ -204,7 +204,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
     def _position(self, given: object, name: str) -> int:
-        return checks.whole(given, name, InvalidOption, 0, self.data.sizes[name] - 1)
+        return checks.integer(given, name, InvalidOption, 0, self.data.sizes[name] - 1)
 
     def summary(self) -> str:
         data = self.data

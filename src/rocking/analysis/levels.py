@@ -40,7 +40,7 @@ def numbered(labels: Sequence[object]) -> Integers:
 
 def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> Integers:
     """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
-    given = checks.several(labels, name, InvalidOption)
+    given = checks.items(labels, name, InvalidOption)
     if len(given) != count or not all(isinstance(label, Hashable) for label in given):
         raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {each}", name, value=labels)
     return numbered([(k,) if _is_missing(label) else label for k, label in enumerate(given)])
@@ -224,7 +224,7 @@ def passed(ratio: Floats, limit: float, name: str) -> Floats:
 def checked_limit(limit: float, name: str) -> float:
     """Validate a limit of the ratio of peak rotation to slenderness."""
     what = f"the limit {name!r} (rotation over slenderness)"
-    least = checks.number(limit, what, InvalidOption)
+    least = checks.real(limit, what, InvalidOption)
     if not least >= 0.0:
         raise InvalidOption(f"{{}} must be 0 or more, not {limit!r}", what, value=limit)
     return least

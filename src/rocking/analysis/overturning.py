@@ -153,7 +153,7 @@ def overturning_map(
     levels = checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption)
     ratios = checks.increasing_numbers(frequencies, "frequencies", InvalidOption)
     checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
-    width = checks.within(rtol, "rtol", InvalidOption, 1e-15, 0.5)
+    width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     one_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption(

@@ -147,7 +147,7 @@ class Risk(Result):
     def rate(self, limit_state: str) -> Rate:
         """Return the rate of a limit state."""
         rates = {one.limit_state: one for one in self.rates}
-        return rates[checks.one_of(limit_state, "limit_state", InvalidOption, [*rates])]
+        return rates[checks.choice(limit_state, "limit_state", InvalidOption, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
         """Return rates, return periods, and probabilities in a time (years) as a text table."""
@@ -311,7 +311,7 @@ class Survival(Result):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
-        checks.share(self.confidence, "confidence", InvalidOption)
+        checks.fraction(self.confidence, "confidence", InvalidOption)
 
     @property
     def intensity(self) -> Floats:

@@ -113,7 +113,7 @@ def rocking_spectrum(
     [0.367, inf, inf]
     """
     each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
-    shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in each])
+    shares = np.array([checks.fraction(value, "each of fractiles", InvalidOption) for value in each])
     options: dict[str, Any] = {"model": model, "chattering": chattering}
     gathered, shaken = bodies_of(blocks), list_motions(motions)
     if not isinstance(gathered, Blocks):
@@ -258,7 +258,7 @@ class RockingSpectrum(DatasetResult):
         """
         from rocking.plot.curves import SpectrumCurves, spectrum_figure
 
-        checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
+        checks.choice(against, "against", InvalidOption, get_args(Abscissa))
         # Lines are drawn in the order of the abscissa, whatever the order of p.
         data = self.data.sortby("p") if "p" in self.data.dims else self.data
         named_curves = curves_of(data)

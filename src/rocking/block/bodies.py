@@ -337,7 +337,7 @@ class Blocks:
         if rows.ndim != 1:
             raise InvalidBlock(
                 f"select takes a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} truth "
-                f"values, not {checks.shown(index)}; for one block alone blocks[0]"
+                f"values, not {checks.short_repr(index)}; for one block alone blocks[0]"
             )
         chosen = {name: values[rows] for name, values in self._arrays().items()}
         return Blocks.__new__(Blocks)._fill(self.gravity, chosen)

@@ -93,7 +93,7 @@ class RestrainedBlock(Rocking):
     ) -> None:
         if isinstance(block, RestrainedBlock):
             raise InvalidBlock("this block has restraints already: give all of them at once, after the Block itself")
-        own, one_way = one_block(block), checks.flag(one_sided, "one_sided", InvalidBlock)
+        own, one_way = one_block(block), checks.boolean(one_sided, "one_sided", InvalidBlock)
         _check(restraints, own)
         tilt = checks.finite(lean, "lean", InvalidBlock)
         law = restitution if isinstance(restitution, Restitution) else None
@@ -161,7 +161,7 @@ class RestrainedBlock(Rocking):
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
-        checks.one_of(model, "model", InvalidOption, MODELS)
+        checks.choice(model, "model", InvalidOption, MODELS)
         made = self.alone().kernel_records(model, np.zeros((1, 2)))
         plus, minus = (self.gravity * (made["threshold"] + made["restraint_threshold"])[0]).tolist()
         return plus, minus
@@ -217,7 +217,7 @@ def _check(restraints: Sequence[object], block: Block) -> None:
     """Reject invalid restraints, and restraints of a block without a mass."""
     for each in restraints:
         if not isinstance(each, Restraint):
-            raise InvalidBlock(f"{checks.shown(each)} is no restraint: give {_SOME}, one by one")
+            raise InvalidBlock(f"{checks.short_repr(each)} is no restraint: give {_SOME}, one by one")
     if restraints and block.mass is None:
         raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
 

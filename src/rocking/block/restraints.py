@@ -157,7 +157,7 @@ class Tendon(Restraint):
                 raise InvalidBlock(f"{{}} of a tendon must be at least 0 {unit}, not {value:g}", name, value=value)
         if stiffness == prestress == 0.0:
             raise InvalidBlock("a tendon needs {} (N/m) or {} (N)", "stiffness", "prestress")
-        object.__setattr__(self, "strength", checks.number(self.strength, "strength", InvalidBlock))
+        object.__setattr__(self, "strength", checks.real(self.strength, "strength", InvalidBlock))
         if not self.strength > prestress:
             raise InvalidBlock(
                 f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}",
@@ -371,7 +371,7 @@ class Load(Restraint):
         self._positive("mass", "kg")
         self._positive("height", "m")
         self._finite("offset")
-        object.__setattr__(self, "follows", checks.flag(self.follows, "follows", InvalidBlock))
+        object.__setattr__(self, "follows", checks.boolean(self.follows, "follows", InvalidBlock))
 
     def _terms(self, pivot: Pivot) -> Terms:
         if self.follows:  # part of the block
@@ -449,7 +449,7 @@ class Restitution:
             )
         for low, high in zip(checked_pair(self.least, "least"), checked_pair(self.largest, "largest"), strict=True):
             if not 0.0 < high <= 1.0:
-                hint = checks.hint_of_percent(high)
+                hint = checks.hint_at_percent(high)
                 raise InvalidBlock(f"{{}} must be in (0, 1], not {high:g}{hint}", "largest", value=self.largest)
             if not 0.0 < low <= high:
                 raise InvalidBlock(
@@ -457,7 +457,7 @@ class Restitution:
                     value=self.least,
                 )  # fmt: skip
         if self.seed is not None:
-            checks.whole(self.seed, "seed", InvalidBlock, 0, _LARGEST_SEED)
+            checks.integer(self.seed, "seed", InvalidBlock, 0, _LARGEST_SEED)
             if max(slopes) > 0.0:
                 raise InvalidBlock("a restitution either falls or is drawn: give a {} or a {}", "slope", "seed")
 

@@ -35,8 +35,8 @@ def checked_parameter(value: float, name: str, *, origin: str = "", which: str =
     """Return p, alpha or restitution of a side, or raise InvalidBlock that names its origin and its block."""
     low, high, rule = _LIMITS[name]
     if not low <= value <= high:
-        hint = checks.hint_of_degrees(value) if name == "alpha" else ""
-        hint = checks.hint_of_percent(value) if name == "restitution" else hint
+        hint = checks.hint_at_degrees(value) if name == "alpha" else ""
+        hint = checks.hint_at_percent(value) if name == "restitution" else hint
         raise InvalidBlock(f"{{}}{origin} must be {rule}, not {value:g}{which}{hint}", name, value=value)
     return value
 
@@ -184,8 +184,8 @@ def impact_restitution(
             "give either {} of a rectangular block, or {}, {} and {} of a body",
             "alpha", "distances", "height", "radius_of_gyration",
         )  # fmt: skip
-    share = checks.share(contact, "contact", InvalidBlock, below=math.nextafter(1.0, 2.0))
-    count = checks.whole(points, "points", InvalidBlock, 2, _MOST_POINTS)
+    share = checks.fraction(contact, "contact", InvalidBlock, below=math.nextafter(1.0, 2.0))
+    count = checks.integer(points, "points", InvalidBlock, 2, _MOST_POINTS)
     if share < 1.0 and count > 2:
         raise InvalidBlock("give either a {} or {}, not both", "contact", "points")
     inertia = k * k + h * h

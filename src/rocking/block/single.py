@@ -361,7 +361,7 @@ class Block(Rocking):
         """
         b, h = checked_length(half_width, "half_width"), checked_length(half_height, "half_height")
         g = checked_gravity(gravity)
-        gamma = checks.within(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _HEAVIEST_BEAM)
+        gamma = checks.between(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _HEAVIEST_BEAM)
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
@@ -490,7 +490,7 @@ class Block(Rocking):
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
-        steepness = math.tan if checks.one_of(model, "model", InvalidOption, MODELS) == "nonlinear" else float
+        steepness = math.tan if checks.choice(model, "model", InvalidOption, MODELS) == "nonlinear" else float
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 

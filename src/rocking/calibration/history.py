@@ -223,7 +223,7 @@ def calibrate_history(
     '2.50'
     """
     at, measured = _checked(times, rotation)
-    has_two = checks.flag(two_sided, "two_sided", InvalidOption)
+    has_two = checks.boolean(two_sided, "two_sided", InvalidOption)
     settled, unknowns = _split({"p": p, "alpha": alpha, "restitution": restitution}, has_two)
     if initial_rotation is not None:
         settled["initial_rotation"] = checks.finite(initial_rotation, "initial_rotation", InvalidOption)
@@ -238,7 +238,7 @@ def calibrate_history(
             f"{counted(len(at), 'sample')} cannot determine {counted(len(unknowns), 'parameter')}: give more"
         )
     problem = _Problem(at, measured, motion, model, settled, tuple(unknowns))
-    rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
+    rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
     return _result(problem, _best(problem, rng))
 
 

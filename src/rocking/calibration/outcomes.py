@@ -188,9 +188,9 @@ class Calibration(Result):
             If there are fewer groups than folds, or the labels do not match the motions.
         """
         labels = group_labels(groups, len(self.observed), folds)
-        rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
+        rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
         evidence = replace(self._evidence)
-        probabilities = np.empty((checks.whole(repeats, "repeats", InvalidOption, 1), len(self.observed)))
+        probabilities = np.empty((checks.integer(repeats, "repeats", InvalidOption, 1), len(self.observed)))
         for row in probabilities:
             parts = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
             for part in range(folds):
@@ -298,7 +298,7 @@ def chances_of(share: Floats, effective: float, outlier_probability: float) -> F
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
     """Return the group of each motion, numbered from 0. By default each motion is a group."""
     labels = groups_of(range(count) if groups is None else groups, "groups", count)
-    checks.whole(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
+    checks.integer(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
 
 
@@ -383,11 +383,11 @@ def calibrate(
     """
     tested = list_motions(motions)
     observed = checked_outcomes(overturned, len(tested))
-    space = Space.from_bounds(p, alpha, restitution, two_sided=checks.flag(two_sided, "two_sided", InvalidOption))
-    checks.share(outlier_probability, "outlier_probability", InvalidOption, below=0.5)
-    checks.whole(candidates, "candidates", InvalidOption, 128)
-    checks.whole(max_blocks, "max_blocks", InvalidOption, 1)
-    rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
+    space = Space.from_bounds(p, alpha, restitution, two_sided=checks.boolean(two_sided, "two_sided", InvalidOption))
+    checks.fraction(outlier_probability, "outlier_probability", InvalidOption, below=0.5)
+    checks.integer(candidates, "candidates", InvalidOption, 128)
+    checks.integer(max_blocks, "max_blocks", InvalidOption, 1)
+    rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
     distinct, which = find_distinct_motions(tested)
 
     def tried(points: Floats) -> NDArray[np.float32]:

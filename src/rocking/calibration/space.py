@@ -191,12 +191,12 @@ def known_value(value: object, name: str) -> float:
 def value_range(pair: Any, name: str, highest: float) -> Range:
     """Return the ends of a range, increasing numbers between 0 and `highest`."""
     try:
-        low, high = (checks.number(value, f"each of {name}", InvalidOption) for value in pair)
+        low, high = (checks.real(value, f"each of {name}", InvalidOption) for value in pair)
     except (TypeError, ValueError):
         raise InvalidOption(f"{{}} must be a pair (lowest, highest), not {pair!r}", name, value=pair) from None
     if not 0.0 < low < high <= highest or math.isinf(high):
         limit = "" if math.isinf(highest) else f" and at most {highest:g}"
-        hint = checks.hint_of_degrees(high) if name == "alpha" else ""
+        hint = checks.hint_at_degrees(high) if name == "alpha" else ""
         raise InvalidOption(
             f"{{}} must be a pair (lowest, highest) of positive, increasing numbers{limit}, "
             f"not {low:g}, {high:g}{hint}",

@@ -73,7 +73,7 @@ class ShakeTest:
         for label in ("name", "group"):
             checks.text(getattr(self, label), label, InvalidOption)
         if not isinstance(fell, (bool, int, np.bool_, np.integer)) or fell not in (0, 1):
-            raise InvalidOption(f"{{}} must be True or False, not {checks.shown(fell)}", "overturned", value=fell)
+            raise InvalidOption(f"{{}} must be True or False, not {checks.short_repr(fell)}", "overturned", value=fell)
         object.__setattr__(self, "overturned", bool(fell))
         object.__setattr__(self, "name", self.name or motion.name)
 
@@ -311,19 +311,21 @@ def validate(
     >>> rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9)).brier.value
     0.25
     """
-    given = checks.several(tests, "tests", InvalidOption)
+    given = checks.items(tests, "tests", InvalidOption)
     if not given:
         raise InvalidOption("{} must hold at least one test", "tests", value=tests)
     for test in given:
         if not isinstance(test, ShakeTest):
             raise InvalidOption(
-                f"{{}} must hold tests, ShakeTest(motion, overturned), not {checks.shown(test)}", "tests", value=test
+                f"{{}} must hold tests, ShakeTest(motion, overturned), not {checks.short_repr(test)}",
+                "tests",
+                value=test,
             )
-    checks.whole(bins, "bins", InvalidOption, 1, 1000)
-    checks.whole(simulations, "simulations", InvalidOption, 100)
-    rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
+    checks.integer(bins, "bins", InvalidOption, 1, 1000)
+    checks.integer(simulations, "simulations", InvalidOption, 100)
+    rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
     if outlier_probability is not None:
-        checks.within(outlier_probability, "outlier_probability", InvalidOption, 0.0, 0.5)
+        checks.between(outlier_probability, "outlier_probability", InvalidOption, 0.0, 0.5)
     distinct, which = find_distinct_motions([test.motion for test in given])
     observed = np.array([test.overturned for test in given], dtype=bool)
     clusters = levels.numbered(

@@ -118,9 +118,9 @@ def chattering_time(
     >>> round(float(chattering_time(1.03, 2.0, 0.92)), 12)
     1.125947676934
     """
-    order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER)
+    order = checks.integer(order, "order", InvalidOption, 1, HIGHEST_ORDER)
     if resolved is not None:
-        resolved = checks.whole(resolved, "resolved", InvalidOption, 1, 1_000_000)
+        resolved = checks.integer(resolved, "resolved", InvalidOption, 1, 1_000_000)
     parameters = checked_amplitude(a), checked_frequency(omega), checked_restitution(eta)
     methods: dict[str, Callable[[], Floats]] = {
         "exact": lambda: _exact_times(*parameters),
@@ -128,7 +128,7 @@ def chattering_time(
         "series": lambda: series_times(*parameters, order),
         "semianalytical": lambda: _semianalytical_times(*parameters, resolved),
     }
-    chosen = checks.one_of(method, "method", InvalidOption, list(methods))
+    chosen = checks.choice(method, "method", InvalidOption, list(methods))
     return methods[chosen]()
 
 
@@ -272,7 +272,7 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     (0.74, 0.74)
     """
     amplitude, frequency, restitution = _single_case(a, omega, eta)
-    n = checks.whole(n, "n", InvalidOption, 1, 100_000)
+    n = checks.integer(n, "n", InvalidOption, 1, 100_000)
     ratios = np.full(n, math.nan)
     intervals = _resolved(amplitude, frequency, restitution, -1.0, n + 2)[1]["interval"]
     intervals = intervals[intervals > 0.0]
@@ -383,7 +383,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     >>> round(float(critical_amplitude(2.0, 0.92)), 12)
     1.03801553873
     """
-    chosen = checks.one_of(method, "method", InvalidOption, ("exact", "eq76", "eq77"))
+    chosen = checks.choice(method, "method", InvalidOption, ("exact", "eq76", "eq77"))
     shape, flat = broadcast(checked_frequency(omega), checked_restitution(eta))
     return critical_amplitudes_by(chosen, *flat).reshape(shape)[()]
 

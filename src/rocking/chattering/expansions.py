@@ -296,7 +296,7 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
     >>> (2.0 * series_coefficients(2.0, 0.92, order=2)).round(6)
     array([10.827448, 40.030207])
     """
-    order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER)
+    order = checks.integer(order, "order", InvalidOption, 1, HIGHEST_ORDER)
     return _coefficients(checked_frequency(omega), checked_restitution(eta), order)
 
 

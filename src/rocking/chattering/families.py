@@ -100,7 +100,7 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
     """
     scale = _threshold(block, model)
     frequency = _hertz(block, checks.positive(omega, "omega", InvalidOption))
-    number = checks.whole(count, "count", InvalidOption, minimum=1)
+    number = checks.integer(count, "count", InvalidOption, minimum=1)
 
     def case(a: float, ratio: float) -> SimulationInput:
         return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in range(number)], frequency), model)

@@ -183,7 +183,7 @@ def chattering_report(
     exact = sequence(a, omega, eta)
     no_arc = 0.0 if exact.complete else math.nan
     interval, speed = exact.impacts[["interval", "speed_before"]][0] if exact.impacts.size else (no_arc, no_arc)
-    checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER)
+    checks.integer(order, "order", InvalidOption, 1, HIGHEST_ORDER)
     series = math.nan
     with suppress(InvalidOption):  # double precision does not resolve this many terms
         series = float(chattering_time(a, omega, eta, method="series", order=order))

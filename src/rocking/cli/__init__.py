@@ -13,7 +13,7 @@ from pathlib import Path
 
 from cyclopts import App, Argument, CycloptsError, MissingArgumentError, UnknownCommandError
 
-from rocking.core.checks import meant
+from rocking.core.checks import suggest
 from rocking.core.progress import notes_for
 from rocking.errors import INTERRUPTED, DamagedStudy, InvalidOption, RockingError, Spelling
 from rocking.inputs.texts import write_option_name
@@ -127,7 +127,7 @@ def _sentence(error: Exception, given: list[str]) -> str:
         return error.text(spelling_of(command_of(given))).rstrip(".")
     if isinstance(error, UnknownCommandError):
         unknown, commands = (error.unused_tokens or given)[0], [*filter(str.isalpha, command_of(given))]
-        hint = meant(unknown, commands, f"there are {', '.join(commands)}")
+        hint = suggest(unknown, commands, f"there are {', '.join(commands)}")
         return f"there is no command {unknown}; {hint}"
     if isinstance(error, MissingArgumentError) and (missing := error.argument) is not None:
         is_given = any(each.partition("=")[0] in missing.names for each in given)
@@ -187,7 +187,7 @@ def refuse_unknown_options(given: Iterable[object], arguments: Sequence[str]) ->
             # Short names are too alike to guess: a suggestion must not lead to another quantity.
             known = [each for each in _options(command_of(arguments)) if min(len(each), len(option)) > len("--pga")]
             words = {each.lstrip("-"): each for each in known}
-            hint = meant(option.lstrip("-"), words, "see its --help", 0.8)  # a typo of one or two letters in six
+            hint = suggest(option.lstrip("-"), words, "see its --help", 0.8)  # a typo of one or two letters in six
             raise InvalidOption(f"{_named(arguments)} has no option {option}; {hint}")
 
 

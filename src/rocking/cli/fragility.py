@@ -118,7 +118,7 @@ def fragility(
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
         not_passed = _limit_of_standing([*states])
-    checks.share(confidence, "confidence", InvalidOption)
+    checks.fraction(confidence, "confidence", InvalidOption)
     with output.folder() as folder:
         read = None
         if outcomes is not None:

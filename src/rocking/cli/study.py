@@ -214,7 +214,7 @@ def report(
     """
     how, states = measure.wanted, parse_limit_states(limit_states)
     shares = checked_fractiles(read_values(fractiles, "fractiles").tolist())
-    checks.share(confidence, "confidence", InvalidOption)
+    checks.fraction(confidence, "confidence", InvalidOption)
     found, made = Study(folder), dict[str, Result]()
     fit = found.fragility if together else found.block_fragilities
     with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:

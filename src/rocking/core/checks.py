@@ -31,11 +31,11 @@ class Error(Protocol):
         """Return the error."""
 
 
-def number(value: object, name: str, error: Error) -> float:
+def real(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one real number (possibly not finite)."""
     result = _convert_real(value)
     if result is None:
-        raise error(f"{{}} must be a number, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be a number, not {short_repr(value)}", name, value=value)
     return result
 
 
@@ -43,7 +43,7 @@ def finite(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one finite number."""
     result = _convert_real(value)
     if result is None or not math.isfinite(result):
-        raise error(f"{{}} must be a finite number, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be a finite number, not {short_repr(value)}", name, value=value)
     return result
 
 
@@ -53,45 +53,47 @@ def positive(
     """Return `value` as a float, or raise `error` unless it is one positive finite number within its limits."""
     result = _convert_real(value)
     if result is None or not (math.isfinite(result) and result > 0.0):
-        raise error(f"{{}} must be a positive number{_format_unit(unit)}, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be a positive number{_format_unit(unit)}, not {short_repr(value)}", name, value=value)
     low, high = limits
     if not low <= result <= high:
         raise error(
-            f"{{}} must be a number from {low:g} to {high:g}{_format_unit(unit)}, not {shown(result)}",
+            f"{{}} must be a number from {low:g} to {high:g}{_format_unit(unit)}, not {short_repr(result)}",
             name,
             value=result,
         )
     return result
 
 
-def within(value: object, name: str, error: Error, low: float, high: float, unit: str = "") -> float:
+def between(value: object, name: str, error: Error, low: float, high: float, unit: str = "") -> float:
     """Return `value` as a float, or raise `error` unless it is a number from `low` to `high` inclusive."""
     result = _convert_real(value)
     if result is None or not low <= result <= high:
         raise error(
-            f"{{}} must be a number from {low:g} to {high:g}{_format_unit(unit)}, not {shown(value)}", name, value=value
+            f"{{}} must be a number from {low:g} to {high:g}{_format_unit(unit)}, not {short_repr(value)}",
+            name,
+            value=value,
         )
     return result
 
 
-def share(value: object, name: str, error: Error, below: float = 1.0) -> float:
+def fraction(value: object, name: str, error: Error, below: float = 1.0) -> float:
     """Return `value` as a float, or raise `error` unless it is a number above 0 and below `below`."""
     result = _convert_real(value)
     if result is None or not 0.0 < result < below:
-        raise error(f"{{}} must be a number between 0 and {below:g}, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be a number between 0 and {below:g}, not {short_repr(value)}", name, value=value)
     return result
 
 
-def flag(value: object, name: str, error: Error) -> bool:
+def boolean(value: object, name: str, error: Error) -> bool:
     """Return `value` as a bool, or raise `error` unless it is True or False of Python or NumPy."""
     if not isinstance(value, bool | np.bool_):
-        raise error(f"{{}} must be True or False, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be True or False, not {short_repr(value)}", name, value=value)
     return bool(value)
 
 
 def increasing_pair(value: object, name: str, error: Error) -> tuple[float, float]:
     """Return two finite numbers, the lower one first, or raise `error`."""
-    ends = several(value, name, error)
+    ends = items(value, name, error)
     if len(ends) != 2:
         raise error("{} must be two numbers (lower, higher)", name, value=value)
     low, high = (finite(end, name, error) for end in ends)
@@ -100,34 +102,34 @@ def increasing_pair(value: object, name: str, error: Error) -> tuple[float, floa
     return low, high
 
 
-def whole(value: object, name: str, error: Error, minimum: int, maximum: int | None = None) -> int:
+def integer(value: object, name: str, error: Error, minimum: int, maximum: int | None = None) -> int:
     """Return `value` as an int, or raise `error` unless it has an integer type and is within its bounds."""
     item = _unwrap(value)
     is_integer = isinstance(item, Integral) and not isinstance(item, bool)
     if not is_integer or not minimum <= item or not (maximum is None or item <= maximum):
         bounds = f"of at least {minimum}" if maximum is None else f"from {minimum} to {maximum}"
-        raise error(f"{{}} must be a whole number {bounds}, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be a whole number {bounds}, not {short_repr(value)}", name, value=value)
     return int(item)
 
 
 def text(value: object, name: str, error: Error) -> str:
     """Return `value`, or raise `error` unless it is text."""
     if not isinstance(value, str):
-        raise error(f"{{}} must be text, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be text, not {short_repr(value)}", name, value=value)
     return value
 
 
 def path(value: object, name: str, error: Error) -> Path:
     """Return `value` as a path, or raise `error` unless it is a path or text."""
     if not isinstance(value, (str, PathLike)):
-        raise error(f"{{}} must be text or a path, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be text or a path, not {short_repr(value)}", name, value=value)
     return Path(value)
 
 
-def one_of(value: object, name: str, error: Error, choices: Sequence[str]) -> str:
+def choice(value: object, name: str, error: Error, choices: Sequence[str]) -> str:
     """Return `value`, or raise `error` unless it is one of the choices."""
     if not isinstance(value, str) or value not in choices:
-        raise error(f"{{}} must be one of {', '.join(choices)}, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be one of {', '.join(choices)}, not {short_repr(value)}", name, value=value)
     return value
 
 
@@ -135,15 +137,15 @@ def mapping(value: object, name: str, error: Error, example: str) -> Mapping[Any
     """Return `value`, or raise `error` unless it is a nonempty mapping."""
     if not isinstance(value, Mapping) or not value:
         raise error(
-            f"{{}} must be a mapping with one entry or more, as {example}, not {shown(value)}", name, value=value
+            f"{{}} must be a mapping with one entry or more, as {example}, not {short_repr(value)}", name, value=value
         )
     return value
 
 
-def several(value: object, name: str, error: Error) -> list[Any]:
+def items(value: object, name: str, error: Error) -> list[Any]:
     """Return the items of `value`, or raise `error` if it is text, a mapping or not a collection."""
     if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
-        raise error(f"{{}} must be a list, not {shown(value)}", name, value=value)
+        raise error(f"{{}} must be a list, not {short_repr(value)}", name, value=value)
     return [*value]
 
 
@@ -162,15 +164,17 @@ def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     try:
         array = np.asarray(values)
         if array.dtype.kind == "O":
-            array = np.reshape([number(value, name, error) for value in array.ravel()], array.shape)
+            array = np.reshape([real(value, name, error) for value in array.ravel()], array.shape)
     except (TypeError, ValueError):
-        raise error(f"{{}} must be a number or an array of numbers, not {shown(values)}", name, value=values) from None
+        raise error(
+            f"{{}} must be a number or an array of numbers, not {short_repr(values)}", name, value=values
+        ) from None
     if array.dtype.kind not in "iuf" and array.size:
-        raise error(f"{{}} must be a number or an array of numbers, not {shown(values)}", name, value=values)
+        raise error(f"{{}} must be a number or an array of numbers, not {short_repr(values)}", name, value=values)
     return np.asarray(array, dtype=np.float64)
 
 
-def answers_or_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
+def booleans_or_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return real numbers, or truth values as 1 and 0, like `numbers`."""
     if np.ma.is_masked(values):
         raise error("{} must be given throughout, but some are masked", name, value=values)
@@ -202,34 +206,34 @@ def axis(values: ArrayLike, name: str, error: Error) -> Floats:
     return array
 
 
-def shown(value: object) -> str:
+def short_repr(value: object) -> str:
     """Return a value for a message, in one line of limited length."""
     text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())
     return literal(text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH - 10]}...{text[-7:]}")
 
 
-def nearest(name: str, known: Iterable[str], similarity: float = 0.6) -> str | None:
+def find_similar(name: str, known: Iterable[str], similarity: float = 0.6) -> str | None:
     """Return the known name that shares at least this fraction of its letters with `name`, or None."""
     matches = difflib.get_close_matches(name, [*known], n=1, cutoff=similarity)
     return matches[0] if matches else None
 
 
-def meant(name: str, known: Iterable[str], default: str = "", similarity: float = 0.6) -> str:
+def suggest(name: str, known: Iterable[str], default: str = "", similarity: float = 0.6) -> str:
     """Return the end of a message about an unknown name: a similar known name, or another hint."""
-    similar = nearest(name, known, similarity)
+    similar = find_similar(name, known, similarity)
     if similar is None:
         return default
     return f"did you mean {known[similar] if isinstance(known, Mapping) else similar}?"
 
 
-def hint_of_degrees(angle: float) -> str:
+def hint_at_degrees(angle: float) -> str:
     """Return a hint for a message if a rejected angle, rad, is plausible in degrees, else an empty text."""
     if not 0.5 * math.pi <= abs(angle) < 90.0:
         return ""
     return f"; if it is in degrees, give math.radians({angle:g})"
 
 
-def hint_of_percent(factor: float) -> str:
+def hint_at_percent(factor: float) -> str:
     """Return a hint for a message if a rejected factor (at most 1) is plausible in per cent, else an empty text."""
     return f"; if it is in per cent, give {factor / 100.0:g}" if 2.0 < factor <= 100.0 else ""
 

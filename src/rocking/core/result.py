@@ -120,7 +120,7 @@ class Result(ABC):
         names = [*self.TABLES]
         if not names:
             raise InvalidOption(f"a {type(self).__name__} has no tables; use to_dict or to_json")
-        return frame_of(self._columns(checks.one_of(table or names[0], "table", InvalidOption, names)))
+        return frame_of(self._columns(checks.choice(table or names[0], "table", InvalidOption, names)))
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
         """Write a table of `to_dataframe` to a CSV file, with "inf" for infinity, like `to_json`."""
@@ -223,7 +223,7 @@ class DatasetResult(Result):
         except (KeyError, TypeError, ValueError, IndexError):
             names = ", ".join(map(str, data.sizes))
             raise InvalidOption(
-                f"there is nothing at {checks.shown(labels)}; the dimensions are {names}", value=labels
+                f"there is nothing at {checks.short_repr(labels)}; the dimensions are {names}", value=labels
             ) from None
         return type(self)(self._restrict(data))
 

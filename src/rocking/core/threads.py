@@ -68,9 +68,9 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
     def __init__(self, *, threads: int | None = None, progress: bool | None = None) -> None:
         before = _options.get(_DEFAULT)
         if threads is not None:
-            threads = checks.whole(threads, "threads", InvalidOption, minimum=1)
+            threads = checks.integer(threads, "threads", InvalidOption, minimum=1)
         if progress is not None:
-            progress = checks.flag(progress, "progress", InvalidOption)
+            progress = checks.boolean(progress, "progress", InvalidOption)
         self._token = _options.set(
             _Options(before.threads if threads is None else threads, before.progress if progress is None else progress)
         )

@@ -187,7 +187,7 @@ def basins(
     sensible(x, "positions")
     sensible(v, "velocities")
     checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
-    most = checks.whole(n_periods, "n_periods", InvalidOption, minimum=1)
+    most = checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)
     work = _Grid(strobe, x, v, most)
     work.run()
     return Basins(work.dataset())

@@ -72,8 +72,8 @@ class BifurcationDiagram(DatasetResult):
         for missing periods, as in ``data``. Raise `InvalidOption` if there is no such direction or start.
         """
         ways = self.data.direction.values.tolist()
-        way = ways.index(checks.one_of(ways[0] if direction is None else direction, "direction", InvalidOption, ways))
-        number = checks.whole(start, "start", InvalidOption, minimum=0, maximum=self.data.sizes["start"] - 1)
+        way = ways.index(checks.choice(ways[0] if direction is None else direction, "direction", InvalidOption, ways))
+        number = checks.integer(start, "start", InvalidOption, minimum=0, maximum=self.data.sizes["start"] - 1)
         values, periods = self.data.value.values, self.data.period.values[way, :, number]
         if ways[way] == "down":
             values, periods = values[::-1], periods[::-1]
@@ -200,14 +200,14 @@ def bifurcation_diagram(
     """
     if not callable(case):
         raise InvalidOption("{} must be a function of the parameter that returns a body and one period", "case")
-    way = checks.one_of(direction, "direction", InvalidOption, get_args(Direction))
+    way = checks.choice(direction, "direction", InvalidOption, get_args(Direction))
     levels = checks.axis(values, "values", InvalidOption)
     first = checks.numbers(starts, "starts", InvalidOption)
     if first.ndim not in (1, 2) or first.shape[-1] != 2 or first.size == 0:
         raise InvalidOption("{} must be one pair (coordinate, velocity) or several", "starts")
     first = first.reshape(-1, 2)
-    before = checks.whole(transient, "transient", InvalidOption, minimum=0)
-    count = checks.whole(recorded, "recorded", InvalidOption, minimum=2)
+    before = checks.integer(transient, "transient", InvalidOption, minimum=0)
+    count = checks.integer(recorded, "recorded", InvalidOption, minimum=2)
     name = checks.text(parameter, "parameter", InvalidOption)
     checks.grid_size({"values": levels.size, "starts": len(first), "recorded": count}, InvalidOption)
 
@@ -466,8 +466,8 @@ def lyapunov_exponents(
     if given.shape != (2,):
         raise InvalidOption(f"{{}} must be one pair (coordinate, velocity), not of shape {given.shape}", "state")
     strobe.checked_starts(given, "state")
-    count = checks.whole(n_periods, "n_periods", InvalidOption, minimum=_BATCHES)
-    before = checks.whole(transient, "transient", InvalidOption, minimum=0)
+    count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=_BATCHES)
+    before = checks.integer(transient, "transient", InvalidOption, minimum=0)
     made, marching = strobe._states(given[None])[1][0], strobe._marching()
     frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((before + count, 2), np.nan), 0
     for start, stop in pairwise(sorted({*range(0, before + count, TOGETHER), before, before + count})):

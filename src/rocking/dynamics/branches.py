@@ -133,7 +133,7 @@ class Branch(Result):
 
     def orbit(self, index: int) -> PeriodicOrbit:
         """Return the orbit at a point of the branch, with its multipliers."""
-        index = checks.whole(index, "index", InvalidOption, minimum=-len(self), maximum=len(self) - 1)
+        index = checks.integer(index, "index", InvalidOption, minimum=-len(self), maximum=len(self) - 1)
         body, motion = self.family(float(self.values[index]))
         return orbit_at(StroboscopicMap(body, motion, self.model, self.chattering), self.states[index], self.period)
 

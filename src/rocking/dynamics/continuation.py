@@ -114,9 +114,9 @@ def continue_orbit(
     if not isinstance(orbit, PeriodicOrbit):
         raise InvalidOption("{} must be one of those that periodic_orbits returns", "orbit", value=orbit)
     low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
-    start = checks.within(value, "value", InvalidOption, low, high)
+    start = checks.between(value, "value", InvalidOption, low, high)
     longest = checks.positive(step, "step", InvalidOption)
-    count = checks.whole(max_points, "max_points", InvalidOption, minimum=1)
+    count = checks.integer(max_points, "max_points", InvalidOption, minimum=1)
     equations = OrbitEquations.from_orbit(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
     backward, forward = (_Walk(equations, z, direction, longest) for direction in (-1.0, 1.0))

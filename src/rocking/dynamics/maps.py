@@ -51,7 +51,7 @@ class PeriodicForcing:
         self.bodies = self.body.alone()
         self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
         if model is not None:
-            checks.one_of(model, "model", InvalidOption, MODELS)
+            checks.choice(model, "model", InvalidOption, MODELS)
             self.model = model
         self.chattering = chattering_scheme(chattering)
         self.forcing_period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
@@ -259,7 +259,7 @@ class StroboscopicMap(PeriodicForcing):
     def orbit(self, states: ArrayLike, n_periods: int) -> Floats:
         """Return states after 0, 1, ... periods, shape (..., n_periods + 1, 2), as the map does."""
         given, made = self._states(states)
-        count = checks.whole(n_periods, "n_periods", InvalidOption, minimum=1)
+        count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)
         rows = np.full((len(made), count, 3), np.nan)
         self._iterate(made, count, rows)
         known = ~np.isnan(rows[..., 0])
@@ -270,7 +270,7 @@ class StroboscopicMap(PeriodicForcing):
     def followed(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
         """Return states after a number of periods, the `Fate` of each, and the numbers of resolved impacts."""
         given, made = self._states(states)
-        self._iterate(made, checks.whole(n_periods, "n_periods", InvalidOption, minimum=1))
+        self._iterate(made, checks.integer(n_periods, "n_periods", InvalidOption, minimum=1))
         fates, impacts = (np.array(made[name]).reshape(given.shape[:-1]) for name in ("ending", "impacts"))
         return self._known(made).reshape(given.shape), fates, impacts
 
@@ -284,7 +284,7 @@ class StroboscopicMap(PeriodicForcing):
         given, made = self._states(states)
         total = np.broadcast_to(np.eye(2), (len(made), 2, 2)).copy()
         change, ended = np.empty_like(total), np.zeros(len(made), dtype=np.bool_)
-        for _ in range(checks.whole(n_periods, "n_periods", InvalidOption, minimum=1)):
+        for _ in range(checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)):
             signs, before = _signs(made["side"]), made.copy()
             self._iterate(made)
             differentiate(*self._marching(), state.expose_fields(before), change)

@@ -314,7 +314,7 @@ def periodic_orbits(
     <PeriodicOrbit: stable orbit of 1 period with 1 impact, multipliers -0.0342 + 0.499i, -0.0342 - 0.499i>
     <PeriodicOrbit: stable orbit of 1 period with complete chattering, multipliers 0, 0>
     """
-    count = checks.whole(period, "period", InvalidOption, minimum=1)
+    count = checks.integer(period, "period", InvalidOption, minimum=1)
     search = _Search(StroboscopicMap(body, motion, model, chattering), count)
     distinct = np.empty((0, 2))
     for state in search.converged(search.starts(starts), count):
@@ -340,7 +340,7 @@ class _Search:
         """Return the given initial states, or about as many as requested."""
         if given is not None and np.ndim(given) > 0:
             return self.strobe.checked_starts(given, "starts")
-        wanted = 1024 if given is None else checks.whole(given, "starts", InvalidOption, minimum=1)
+        wanted = 1024 if given is None else checks.integer(given, "starts", InvalidOption, minimum=1)
         strobe, (low, high) = self.strobe, self.strobe.body.stops
         both = strobe._is_two_sided
         speed = self._fastest()

@@ -166,7 +166,7 @@ def _check_start(
         )
     if abs(u) >= fallen:
         limit = "pi/2" if fallen == 0.5 * math.pi else f"{fallen:g}"
-        hint = checks.hint_of_degrees(u) if kind.unit == "rad" else ""
+        hint = checks.hint_at_degrees(u) if kind.unit == "rad" else ""
         raise InvalidOption(
             f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", called, value=coordinate
         )
@@ -182,7 +182,7 @@ def settings_of(
     bodies: Bodies, model: Model, scheme: ChatteringScheme, duration: float | None, *, record: bool
 ) -> state.Record:
     """Check and return the settings of a simulation; a duration is required if nothing comes to rest."""
-    checks.one_of(model, "model", InvalidOption, MODELS)
+    checks.choice(model, "model", InvalidOption, MODELS)
     if duration is None:
         if never_rests(bodies):
             raise InvalidOption(

@@ -136,7 +136,7 @@ class AsymptoticTime(ChatteringScheme):
     critical: Critical = "eq76"
 
     def __post_init__(self) -> None:
-        checks.one_of(self.critical, "critical", InvalidOption, get_args(Critical))
+        checks.choice(self.critical, "critical", InvalidOption, get_args(Critical))
 
     @property
     def label(self) -> str:

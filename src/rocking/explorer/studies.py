@@ -92,9 +92,9 @@ class StudyView:
         axes = self.axes()
         x, y = (texts.get(direction, "") for direction in ("x", "y"))
         for direction, name in {"x": x, "y": y}.items():
-            checks.one_of(name, direction, InvalidOption, [*axes])
+            checks.choice(name, direction, InvalidOption, [*axes])
         quantity = texts.get("quantity", self.quantities[0])
-        checks.one_of(quantity, "quantity", InvalidOption, [*self.quantities])
+        checks.choice(quantity, "quantity", InvalidOption, [*self.quantities])
         if x == y:
             raise InvalidOption("{} and {} must be two different parameters of the study", "x", "y")
         if axes[x].size * axes[y].size > _MAX_POINTS:

@@ -216,7 +216,7 @@ class UploadStore:
         """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts of a case."""
         upload = self.file(name.removeprefix("file:"), "mesh") if name.startswith("file:") else None
         if upload is None:
-            checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED_MESHES])
+            checks.choice(name, "mesh", InvalidBlock, [*SHIPPED_MESHES])
         options = read_options(texts, tolerance, gravity)
         key = name, upload.name if upload else "", json.dumps(options)
         body = self._bodies.get(key, lambda: read_body(name, upload, options))

@@ -97,7 +97,7 @@ def check_parameters(factory: Callable[..., object], provided: Iterable[str], ow
     parameters = inspect.signature(factory).parameters
     for name in provided:
         if name not in parameters:
-            hint = checks.meant(name, [*parameters], f"there are {', '.join(parameters)}")
+            hint = checks.suggest(name, [*parameters], f"there are {', '.join(parameters)}")
             raise InvalidOption(f"{owner} has no {literal(name)}; {hint}", *names, name)
     missing = [name for name, item in parameters.items() if item.default is item.empty and name not in {*provided}]
     if missing:

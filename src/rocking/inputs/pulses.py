@@ -66,7 +66,7 @@ class PulseFamily:
     def parameter(self, name: str) -> Input:
         """Return the declaration of a parameter."""
         if name not in self._defaults:
-            hint = checks.meant(name, [*self._defaults], f"it takes {_join_names(self._defaults)}")
+            hint = checks.suggest(name, [*self._defaults], f"it takes {_join_names(self._defaults)}")
             raise InvalidOption(f"the pulse {self.name} has no {name}; {hint}")
         return _VELOCITY if name == "amplitude" and self.is_of_velocity else PARAMETERS[name]
 
@@ -99,7 +99,7 @@ def find_family(name: str) -> PulseFamily:
     """Return the family of pulses with a name; blanks, hyphens and underscores are equivalent."""
     plain_name = checks.text(name, "pulse", InvalidOption).strip().lower().replace("_", "-").replace(" ", "-")
     if plain_name not in FAMILIES:
-        hint = checks.meant(plain_name, [*FAMILIES], f"there are {_join_names(FAMILIES)}")
+        hint = checks.suggest(plain_name, [*FAMILIES], f"there are {_join_names(FAMILIES)}")
         raise InvalidOption(f"there is no pulse {name!r}; {hint}")
     return FAMILIES[plain_name]
 

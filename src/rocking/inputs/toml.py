@@ -103,4 +103,4 @@ def relocate_error(error: RockingError, error_type: type[_Error], file: Path, li
 def suggest_key(name: str, known: Iterable[str]) -> str:
     """Return the closest known name, or the list of known names."""
     names = [*known]
-    return checks.meant(name, names, f"there are {', '.join(names)}")
+    return checks.suggest(name, names, f"there are {', '.join(names)}")

@@ -97,7 +97,7 @@ class Description:
         checks.text(self.family, "family of a description", InvalidMotion)
         checks.text(self.text, "text of a description", InvalidMotion)
         parameters = self.parameters.items()
-        numbers = {name: checks.number(value, f"{name} of a description", InvalidMotion) for name, value in parameters}
+        numbers = {name: checks.real(value, f"{name} of a description", InvalidMotion) for name, value in parameters}
         object.__setattr__(self, "parameters", MappingProxyType(numbers))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -23,7 +23,7 @@ DAMPING: Final = 0.05
 
 def check_damping(value: object, error: checks.Error) -> float:
     """Return a damping ratio, or raise `error`."""
-    ratio = checks.number(value, "damping", error)
+    ratio = checks.real(value, "damping", error)
     if not 0.0 <= ratio < 1.0:
         raise error(f"{{}} must be a fraction of critical from 0 to below 1, not {ratio:g}", "damping", value=value)
     return ratio

@@ -93,7 +93,7 @@ class Motion(Processable):
             sentence = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
             raise InvalidMotion(sentence, value=self.history)
         history = tuple(checks.text(entry, "sentence of a motion's history", InvalidMotion) for entry in self.history)
-        error = checks.within(
+        error = checks.between(
             self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.MAX_ACCELERATION
         )
         if self.vertical is not None and not isinstance(self.vertical, Motion):

@@ -311,7 +311,7 @@ def check_step(dt: float) -> float:
     if np.ndim(dt) != 0:
         raise InvalidMotion("{} must be one number; for uneven times use Motion.from_points(times, acceleration)", "dt")
     positive = checks.positive(dt, "dt", InvalidMotion, "s")
-    return checks.within(positive, "dt", InvalidMotion, MIN_DURATION, 1.0 / MIN_DURATION, "s: check its units")
+    return checks.between(positive, "dt", InvalidMotion, MIN_DURATION, 1.0 / MIN_DURATION, "s: check its units")
 
 
 def check_times(times: ArrayLike, count: int) -> Floats:

@@ -93,7 +93,7 @@ class Processable(MotionMeasures):
         if delay := compute_start_delay(self.description, other.description, self.dt):
             early, late = (self, other) if delay > 0.0 else (other, self)
             raise InvalidMotion(
-                f"by their files {checks.shown(late.name)} begins {abs(delay):.6g} s after {checks.shown(early.name)}: "
+                f"by their files {checks.short_repr(late.name)} begins {abs(delay):.6g} s after {checks.short_repr(early.name)}: "
                 f"cut what comes first with processed(trim=({abs(delay):.6g}, {early.duration:.6g})) of the latter"
             )
         target = checks.finite(azimuth, "azimuth", InvalidMotion)
@@ -291,7 +291,7 @@ def _remove_baseline(motion: Piecewise, degree: int) -> ProcessedPieces:
     """Subtract the polynomial of this degree with the best least-squares fit to the samples."""
     step = _require_even_step(motion, "baseline")
     times, samples = piecewise.sample_breakpoints(motion)
-    degree = checks.whole(degree, "degree of a baseline", InvalidMotion, 0, min(10, len(samples) - 1))
+    degree = checks.integer(degree, "degree of a baseline", InvalidMotion, 0, min(10, len(samples) - 1))
     baseline = np.polynomial.Legendre.fit(times, samples, degree)(times)
     return _join_samples(samples - baseline, step, f"baseline of degree {degree} removed")
 
@@ -311,7 +311,7 @@ def _apply_band_pass(motion: Piecewise, low: float | None, high: float | None, o
     if corners[0] * duration < 0.1:
         sentence = f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s"
         raise InvalidMotion(sentence, value=(low, high))
-    order = checks.whole(order, "order of a filter", InvalidMotion, 1, 12)
+    order = checks.integer(order, "order of a filter", InvalidMotion, 1, 12)
     kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     frequencies = corners if kind == "bandpass" else corners[0]
     sections = signal.butter(order, frequencies, btype=kind, output="sos", fs=1.0 / step)
@@ -366,7 +366,7 @@ def _compute_floor_motion(
         raise InvalidMotion("a floor without {} moves for ever: give {}, s", "damping", "ringing")
     # By default a free oscillation continues until it has decayed to a thousandth.
     tail = -math.log(1e-3) / (damping_ratio * rate) if ringing is None else ringing
-    tail = tail if ringing is None else checks.within(ringing, "ringing", InvalidMotion, 0.0, 1e15, "s")
+    tail = tail if ringing is None else checks.between(ringing, "ringing", InvalidMotion, 0.0, 1e15, "s")
     step = _MAX_ANGLE / rate
     if not (end + tail) / step <= 1e6:
         raise InvalidMotion(
@@ -437,7 +437,7 @@ def _resolve_azimuths(first_motion: Processable, second_motion: Processable, rec
         recorded = [(motion.description.origin or Origin()).azimuth for motion in (first_motion, second_motion)]
         if None in recorded:
             raise InvalidMotion(
-                f"the azimuth of {checks.shown((first_motion, second_motion)[recorded.index(None)].name)} is not known"
+                f"the azimuth of {checks.short_repr((first_motion, second_motion)[recorded.index(None)].name)} is not known"
                 ": give {}=(first, second), the directions of both components in degrees clockwise from north",
                 "recorded",
             )

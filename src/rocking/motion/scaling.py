@@ -73,7 +73,7 @@ class Measure:
     damping: float = DAMPING
 
     def __post_init__(self) -> None:
-        checks.one_of(self.name, "measure", InvalidOption, get_args(MeasureName))
+        checks.choice(self.name, "measure", InvalidOption, get_args(MeasureName))
         damping = check_damping(self.damping, InvalidOption)
         object.__setattr__(self, "damping", damping)
         if self.name == "sa":
@@ -88,7 +88,7 @@ class Measure:
     def parse(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
         """Return a measure, or the measure with an accepted name."""
         name = measure.name if isinstance(measure, Measure) else measure
-        checks.one_of(name, "measure", InvalidOption, among)
+        checks.choice(name, "measure", InvalidOption, among)
         if isinstance(measure, Measure):
             return measure
         if measure == "sa":

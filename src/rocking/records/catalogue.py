@@ -130,7 +130,7 @@ def suggest_records(name: str, otherwise: str, prefix: str = "") -> str:
     completions = [record for record in records if len(name) > 2 and record.startswith(name)]
     if completions:
         return f"did you mean {prefix}{' or '.join(completions)}?"
-    return checks.meant(name, {record: f"{prefix}{record}" for record in records}, otherwise)
+    return checks.suggest(name, {record: f"{prefix}{record}" for record in records}, otherwise)
 
 
 def load(name: str) -> Motion:

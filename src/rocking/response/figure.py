@@ -94,7 +94,7 @@ def histories(
     The frame ends at twice the slenderness (or balance). A separate panel shows the longest chattering sequence: the
     interval to the next impact against the time to rest, both logarithmic. In `ax` only the rotation is drawn.
     """
-    checks.one_of(units, "rotation_units", InvalidOption, get_args(RotationUnits))
+    checks.choice(units, "rotation_units", InvalidOption, get_args(RotationUnits))
     shown = shown_span(response, window)
     time, coordinate = drawing_times(response, *shown), response.block.coordinate
     is_rotation = coordinate.unit == "rad"

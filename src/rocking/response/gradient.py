@@ -151,7 +151,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     """
     if not isinstance(response, Response):
         raise InvalidOption("{} must be a response, as `rocking.simulate` returns it", "response", value=response)
-    checks.one_of(of, "of", InvalidOption, get_args(Quantity))
+    checks.choice(of, "of", InvalidOption, get_args(Quantity))
     if of == "peak":
         target = _peak(response, at)
     elif of in ("rotation", "velocity"):
@@ -217,7 +217,7 @@ def _state(response: Response, of: Quantity, at: float | None) -> _Target:
     """Return the target for the rotation or velocity at a time."""
     if at is None:
         raise InvalidOption(f"a {of} needs the time, {{}}, at which it is asked for, s", "at")
-    time = checks.within(at, "at", InvalidOption, 0.0, response.duration, "s")
+    time = checks.between(at, "at", InvalidOption, 0.0, response.duration, "s")
     trail, history = response.solution.trail, response._history
     found = history.states(time)
     row = int(np.searchsorted(trail.nodes["time"], time, side="right")) - 1
@@ -235,7 +235,7 @@ def _time(response: Response, of: Quantity, at: float | None) -> _Target:
     trail, rows = response.solution.trail, response.events if of == "event" else response.impacts
     if not len(rows):
         raise InvalidOption(f"the response has no {of}; ask for another quantity, {{}}", "of", value=of)
-    k = checks.whole(at, "at", InvalidOption, -len(rows), len(rows) - 1)
+    k = checks.integer(at, "at", InvalidOption, -len(rows), len(rows) - 1)
     nodes = trail.nodes
     row = int((steps_to_events(nodes, overturns=response.overturned) if of == "event" else steps_to_impacts(nodes))[k])
     if row > 0 and nodes["side"][row + 1] < 0 and nodes["time"][row + 1] == nodes["time"][row]:

@@ -187,8 +187,8 @@ class Perturbed(Result):
 
 def checked_factors(relative: float, count: int) -> list[float]:
     """Return the factors of `factors_near`, or raise `InvalidOption` if an argument is out of range."""
-    step = checks.within(relative, "relative", InvalidOption, 1e-12, 0.1)
-    if checks.whole(count, "count", InvalidOption, 3, 1001) % 2 == 0:
+    step = checks.between(relative, "relative", InvalidOption, 1e-12, 0.1)
+    if checks.integer(count, "count", InvalidOption, 3, 1001) % 2 == 0:
         odd = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
         raise InvalidOption(odd, "count", value=count)
     if step * (count - 2) >= 1.0:
@@ -205,7 +205,7 @@ def factors_near(relative: float, count: int) -> list[float]:
 
 def steps_within(precision: float) -> tuple[float, int]:
     """Return the relative step and number (eleven) of factors within a precision, for `Response.perturbed`."""
-    most = checks.within(precision, "precision", InvalidOption, 1e-6, 0.1)
+    most = checks.between(precision, "precision", InvalidOption, 1e-6, 0.1)
     return most / (_WITHIN_PRECISION - 2), _WITHIN_PRECISION
 
 

@@ -213,7 +213,7 @@ class Response(Simulated):
         return even_times(self.duration, self._default_dt)
 
     def _columns(self, table: str, dt: float | None = None) -> list[Column]:
-        checks.one_of(table, "table", InvalidOption, self.TABLES)
+        checks.choice(table, "table", InvalidOption, self.TABLES)
         if table == "histories":
             return self._histories(dt)
         if dt is not None:

@@ -154,7 +154,7 @@ class Product:
     duration: float | None
 
     def __post_init__(self) -> None:
-        checks.one_of(self.polarity, "polarity", InvalidOption, list(SIGNS))
+        checks.choice(self.polarity, "polarity", InvalidOption, list(SIGNS))
         settings_of(self.bodies, self.model, self.chattering, self.duration, record=False)  # raises before the work
         for motion in self.motions:
             check_components(self.bodies, motion)
@@ -338,10 +338,10 @@ def simulate_many(
     [[True, False, True, False]]
     """
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
-    names = (*VARIABLES, *(TIMES if checks.flag(times, "times", InvalidOption) else ()))
+    names = (*VARIABLES, *(TIMES if checks.boolean(times, "times", InvalidOption) else ()))
     setup = setup_of(product)
     found = outcomes_of(product, setup, names)
-    if checks.flag(robust, "robust", InvalidOption):
+    if checks.boolean(robust, "robust", InvalidOption):
         near = [factor for factor in factors_near(RELATIVE, COUNT) if factor != 1.0]
         again = [outcomes_of(product, setup, ["overturned"], factor) for factor in near]
         found["overturned_share"] = np.mean([each["overturned"].astype(bool) for each in (found, *again)], axis=0)

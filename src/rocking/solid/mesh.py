@@ -78,7 +78,7 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
             else:
                 raise InvalidBlock(
                     "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, "
-                    f"not {checks.shown(mesh)}",
+                    f"not {checks.short_repr(mesh)}",
                     "mesh",
                     value=mesh,
                 )
@@ -156,14 +156,14 @@ def _place_part(name: str, mesh: Any, transform: Any) -> MeshPart:
 def parse_length_unit(unit: object) -> float:
     """Return the length of the unit of a mesh, m, from its name or a number."""
     if isinstance(unit, str):
-        return LENGTH_UNITS[checks.one_of(unit, "unit", InvalidBlock, [*LENGTH_UNITS])]
+        return LENGTH_UNITS[checks.choice(unit, "unit", InvalidBlock, [*LENGTH_UNITS])]
     return checks.positive(unit, "unit", InvalidBlock, "m")
 
 
 def compute_upright_rotation(up: object) -> Floats:
     """Return the smallest rotation, shape (3, 3), of an axis of a mesh to z."""
     if isinstance(up, str):
-        axis = checks.one_of(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
+        axis = checks.choice(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
         u = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
     else:
         u = checks.numbers(up, "up", InvalidBlock)  # type: ignore[arg-type]
@@ -273,9 +273,9 @@ def _resolve_densities(
     parts_text = f"its parts are {', '.join(known)}"
     unknown, missing = [name for name in density if name not in known], [name for name in names if name not in density]
     if unknown:
-        hint = checks.meant(str(unknown[0]), known, parts_text)
+        hint = checks.suggest(str(unknown[0]), known, parts_text)
         raise InvalidBlock(
-            f"{{}} has a part {checks.shown(unknown[0])}, which the mesh does not have; {hint}", "density"
+            f"{{}} has a part {checks.short_repr(unknown[0])}, which the mesh does not have; {hint}", "density"
         )
     if missing:
         raise InvalidBlock(f"{{}} is missing for {', '.join(missing)}; {parts_text}", "density")

@@ -146,7 +146,7 @@ def _check_tables(tables: Tables) -> None:
             kind, wanted = _TYPES.get(key, (object, ""))
             is_right = isinstance(value, list if isinstance(kind, list) else kind)
             if not is_right or (isinstance(kind, list) and not all(isinstance(one, kind[0]) for one in value)):
-                sentence = f"{{}} must be {wanted}, not {checks.shown(value)}"
+                sentence = f"{{}} must be {wanted}, not {checks.short_repr(value)}"
                 raise tables.create_error(table, key, sentence, key, value=value)
     for needed in ("blocks", "motions"):
         if needed not in tables.tables:
@@ -230,7 +230,7 @@ def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
         raise tables.create_error("blocks", "csv", f"{file} holds no blocks: a heading and a row for each are needed")
     headings, known = rows[0][1], [name + end for name in BLOCK for end in ("", *_SIDES)]
     for name in headings:
-        meant = "" if name in known else checks.meant(name, known, "")
+        meant = "" if name in known else checks.suggest(name, known, "")
         if meant or name in _HELD or (name in known and headings.count(name) > 1):
             fault = meant or ("it goes under [blocks]" if name in _HELD else "it is there twice")
             raise tables.create_error("blocks", "csv", f"column {name} of {file} cannot be read; {fault}")

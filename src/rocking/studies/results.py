@@ -167,7 +167,7 @@ def critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     """Compute `Study.critical_scales` of a complete study."""
     import xarray as xr
 
-    checks.one_of(outcome, "outcome", InvalidOption, get_args(StudyOutcome))
+    checks.choice(outcome, "outcome", InvalidOption, get_args(StudyOutcome))
     product, levels = store.product, store.product.scales.values
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
@@ -336,7 +336,7 @@ def checked_fractiles(fractiles: Sequence[float]) -> Floats:
 
 def _checked_states(limit_states: Mapping[str, float] | None, confidence: float) -> Mapping[str, float]:
     """Return limits by limit state. Check the arguments of curves before outcomes are read."""
-    checks.share(confidence, "confidence", InvalidOption)
+    checks.fraction(confidence, "confidence", InvalidOption)
     limits = checked_limit_states(limit_states)
     for name, limit in limits.items():
         checked_limit(limit, name)

@@ -218,7 +218,7 @@ class Study:
             If another version created the study whose units are to be computed again.
         """
         store, faults = self._store, dict[Key, str]()
-        if checks.whole(recompute, "recompute", InvalidOption, 0) or repair:
+        if checks.integer(recompute, "recompute", InvalidOption, 0) or repair:
             store.check_program()
         done = sorted(store.done())
         drawn = {*np.random.default_rng(seed).permutation(len(done))[:recompute].tolist()}
@@ -512,7 +512,7 @@ def _workers(executor: Any) -> Iterator[tuple[Callable[[Work], Future[bytes]], C
     foreign = executor.get_executor(pure=False) if client is executor else executor
     if not isinstance(foreign, Executor):
         kinds = "a concurrent.futures.Executor or a client of dask.distributed"
-        raise InvalidOption(f"{{}} must be {kinds}; got {checks.shown(executor)}", "executor", value=executor)
+        raise InvalidOption(f"{{}} must be {kinds}; got {checks.short_repr(executor)}", "executor", value=executor)
 
     def submit(work: Work) -> Future[bytes]:
         try:

@@ -91,7 +91,7 @@ def name_of(key: Key) -> str:
 def unit_of(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
     """Return the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
     if unit_blocks is not None:
-        width = checks.whole(unit_blocks, "unit_blocks", InvalidOption, minimum=_GROUP)
+        width = checks.integer(unit_blocks, "unit_blocks", InvalidOption, minimum=_GROUP)
         if width % _GROUP:
             raise InvalidOption(f"{{}} must be a multiple of {_GROUP}, not {width}", "unit_blocks", value=unit_blocks)
         return 1, 1, 1, width
