@@ -16,7 +16,7 @@ from pages import markdown, write
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.maps import chattering_episodes, chattering_map
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples/paper"))
 
@@ -162,11 +162,11 @@ def verdict_on(found, certified):
     false, missed = rests[~overlap.any(axis=1), 0], proven[~overlap.any(axis=0), 0]
     faults = []
     if false.size:
-        faults.append(f"{counted(false.size, 'false rest')}, the first at {false[0]:.6f} s")
+        faults.append(f"{format_count(false.size, 'false rest')}, the first at {false[0]:.6f} s")
     if missed.size:
-        faults.append(f"{counted(missed.size, 'rest')} missed, the first at {missed[0]:.6f} s")
+        faults.append(f"{format_count(missed.size, 'rest')} missed, the first at {missed[0]:.6f} s")
     if rests_by_rounding:
-        faults.append(f"{counted(rests_by_rounding, 'rest')} only as time no longer advanced")
+        faults.append(f"{format_count(rests_by_rounding, 'rest')} only as time no longer advanced")
     return "; ".join(faults) or "every rest found, no other"
 
 

@@ -16,7 +16,7 @@ from rocking.analysis.survey import folder_names, survey
 from rocking.cli.study import FORMATS
 from rocking.core import tables
 from rocking.core.result import DatasetResult
-from rocking.core.tables import whole_file, write_figure
+from rocking.core.tables import atomic_file, write_figure
 
 resource = pytest.importorskip("resource")
 
@@ -116,7 +116,7 @@ def test_a_write_that_fails_in_the_middle_leaves_what_was_there(tmp_path, monkey
     monkeypatch.setattr(os, "fsync", fails)
     with (
         pytest.raises(rocking.OutputError, match="No space left on device; nothing of it was kept"),
-        whole_file(file) as beside,
+        atomic_file(file) as beside,
     ):
         beside.write_text("new")
     assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
@@ -128,21 +128,21 @@ def test_a_link_is_kept_and_a_file_keeps_its_rights_and_a_device_is_written_to(t
     real.write_text("old")
     real.chmod(0o640)
     link.symlink_to(real)
-    with whole_file(link) as beside:
+    with atomic_file(link) as beside:
         beside.write_text("new")
     assert link.is_symlink()
     assert real.read_text() == "new"
     assert real.stat().st_mode & 0o777 == 0o640
-    with whole_file("/dev/null") as beside:
+    with atomic_file("/dev/null") as beside:
         assert beside == Path("/dev/null")
     umask = os.umask(0o022)
     try:
-        with whole_file(tmp_path / "fresh.csv") as beside:
+        with atomic_file(tmp_path / "fresh.csv") as beside:
             beside.write_text("new")
     finally:
         os.umask(umask)
     assert (tmp_path / "fresh.csv").stat().st_mode & 0o777 == 0o644
-    with pytest.raises(rocking.OutputError, match="there is no folder"), whole_file(tmp_path / "none" / "a.csv"):
+    with pytest.raises(rocking.OutputError, match="there is no folder"), atomic_file(tmp_path / "none" / "a.csv"):
         pass
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
-from rocking.core.tables import named
+from rocking.core.tables import add_unit
 from rocking.explorer.simulated import describe_outcome
 from rocking.response.summary import known_ratio, time_text
 from rocking.rules import Check
@@ -48,7 +48,7 @@ def test_a_summary_is_its_rows(shaken):
     )  # to its known digits
     facts = {row.name: row for row in shaken.facts(0.5)}
     assert facts["peak_rotation"] == ("peak_rotation", shaken.peak_rotation, "rad", "")
-    assert [*shaken.to_dict(0.5)] == [named(row.name, row.unit) for row in shaken.facts(0.5)]
+    assert [*shaken.to_dict(0.5)] == [add_unit(row.name, row.unit) for row in shaken.facts(0.5)]
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from rocking.calibration.outcomes import overturned_under
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)
@@ -94,7 +94,7 @@ def test_a_rose_leaves_out_what_was_given_up():
     assert fell.tolist() == [False, False, True]
     for shares in (found.data.overturned_share.values.ravel(), found.data.anywhere.values):
         np.testing.assert_array_equal(shares, [0.0, np.nan, 1.0])
-    assert f"{counted(missing.sum(), 'simulation')} given up after too many steps" in found.summary()
+    assert f"{format_count(missing.sum(), 'simulation')} given up after too many steps" in found.summary()
 
 
 @pytest.mark.thorough

@@ -22,7 +22,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
-from rocking.core.tables import counted, range_text
+from rocking.core.tables import format_count, format_range
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -68,8 +68,8 @@ class Rating:
 
     def __repr__(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"
-        demand, capacity, ratio = map(range_text, (self.demand, self.capacity, self.ratio))
-        count = counted(len(self.demand), "block")
+        demand, capacity, ratio = map(format_range, (self.demand, self.capacity, self.ratio))
+        count = format_count(len(self.demand), "block")
         return f"<Rating: {self.rule}, {count}; demand {demand}{unit}, capacity {capacity}{unit}, ratio {ratio}>"
 
     @property

@@ -19,7 +19,7 @@ from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
-from rocking.core.tables import within
+from rocking.core.tables import format_within
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import Measure, check_intensities
@@ -279,7 +279,9 @@ def in_units(intensity: float, measure: Measure) -> str:
 def interval_text(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
     """Format an interval, with bounds in place of finite ends beyond them."""
     text = f"{{:.{digits}g}}".format
-    return " to ".join("infinity" if math.isinf(end) else within(end, bounds if end else (0, 0), text) for end in ends)
+    return " to ".join(
+        "infinity" if math.isinf(end) else format_within(end, bounds if end else (0, 0), text) for end in ends
+    )
 
 
 def median_text(curve: FragilityCurve, scale: float) -> str:

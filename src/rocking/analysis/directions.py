@@ -16,7 +16,7 @@ from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, variable
-from rocking.core.tables import as_written, counted, text_table
+from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.schemes import ChatteringScheme
 from rocking.engine.tasks import missing_text
 from rocking.errors import InvalidBlock, InvalidOption
@@ -177,7 +177,7 @@ class ResponseRose(DatasetResult):
 
     def _headline(self) -> str:
         data = self.data
-        over = f"{counted(data.sizes['pair'], 'pair')}, {counted(data.sizes['azimuth'], 'azimuth')}"
+        over = f"{format_count(data.sizes['pair'], 'pair')}, {format_count(data.sizes['azimuth'], 'azimuth')}"
         return f"{data.description}, {data.model} model: share overturned, {over}"
 
     def _levels(self) -> list[str]:
@@ -196,7 +196,7 @@ class ResponseRose(DatasetResult):
             most = data.azimuth.values[share == share.max()]
             where = f"{most[0]:g} deg" if len(most) == 1 else f"{len(most)} azimuths"
             rows.append([name, share.min(), share.max(), where, float(data.anywhere[k])])
-        table = text_table(["level", "least share", "largest share", "at", "at any azimuth"], rows)
+        table = format_table(["level", "least share", "largest share", "at", "at any azimuth"], rows)
         missing = missing_text(np.isnan(data.peak_over_slenderness.values))
         return f"{self._headline()}\n\n{table}" + f"\nnote: {missing}" * bool(missing)
 
@@ -230,7 +230,7 @@ class ResponseRose(DatasetResult):
             azimuth=around[order],
             shares=np.concatenate([shares, shares[:, new]], axis=1)[:, order],
             labels=[names[k] for k in chosen],
-            title=title or as_written(self._headline()),
+            title=title or escape_dollars(self._headline()),
             ax=ax,
             figsize=figsize,
         )

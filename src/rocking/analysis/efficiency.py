@@ -26,7 +26,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult, variable
-from rocking.core.tables import as_written, counted, text_table
+from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.problem import bodies_of, slenderness_of
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
@@ -179,9 +179,9 @@ class MeasureComparison(DatasetResult):
         ]
         head = f"{data.blocks}, {data.model} model: intensities at which {data.sample} overturn"
         columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if several else [])]
-        text = [head, "", text_table([*columns, "over the best"], rows)]
+        text = [head, "", format_table([*columns, "over the best"], rows)]
         if missing := int(np.sum(np.isnan(data.intensity.values[0]))):
-            pairs = counted(missing, "pair")
+            pairs = format_count(missing, "pair")
             text.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
         return "\n".join(text + ([f"note: {MIRROR_NOTE}"] if data.sides_differ else []))
 
@@ -206,7 +206,7 @@ class MeasureComparison(DatasetResult):
             dispersion=table.dispersion.to_numpy(),
             low=table.dispersion_low.to_numpy(),
             high=table.dispersion_high.to_numpy(),
-            title=title or as_written(f"{data.blocks}, {data.model} model, {data.sample}"),
+            title=title or escape_dollars(f"{data.blocks}, {data.model} model, {data.sample}"),
             ax=ax,
             figsize=figsize,
         )

@@ -48,7 +48,7 @@ from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.progress import spell
 from rocking.core.result import Result
-from rocking.core.tables import Column, as_written, counted, text_table, write_text
+from rocking.core.tables import Column, escape_dollars, format_count, format_table, write_text
 from rocking.engine.problem import bodies_of, slenderness_of
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup, missing_text
@@ -139,7 +139,7 @@ class Fragility(Result):
             for curve in self.curves
         ]
         between = f"{100 * self.curves[0].confidence:g} % between"
-        table = text_table(["limit state", "exceeded", "median", between, "dispersion", between, "p of fit"], rows)
+        table = format_table(["limit state", "exceeded", "median", between, "dispersion", between, "p of fit"], rows)
         notes = [f"note: {sentence}" for sentence in self.notes]
         return "\n".join([f"{self.description}; intensity: {self.measure.label}", "", table, *notes])
 
@@ -172,7 +172,7 @@ class Fragility(Result):
 
     @property
     def _too_few(self) -> str:
-        count = counted(self.curves[0].clusters, self.source)
+        count = format_count(self.curves[0].clusters, self.source)
         return f"{count} cannot tell how far {self.source}s differ; give 3 or more"
 
     def to_dict(self) -> dict[str, Any]:
@@ -319,7 +319,7 @@ class Fragility(Result):
             band_label=band_text,
             probability_label=f"probability of {'' if states == ['overturning'] else 'exceeding '}"
             + (states[0] if len(states) == 1 else "the limit state"),
-            title=title or as_written(self.description),
+            title=title or escape_dollars(self.description),
             ax=ax,
             figsize=figsize,
         )
@@ -434,7 +434,7 @@ def fragility(
     scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
     factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
     setup = Setup(many, model, chattering_scheme(chattering))
-    kind = "cloud" if levels is None else counted(len(intensity), "stripe")
+    kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
     text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
     return Fragility(
         curves=tuple(curves),

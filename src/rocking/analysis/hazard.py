@@ -17,7 +17,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Result
-from rocking.core.tables import csv_rows, text_table
+from rocking.core.tables import format_table, read_csv_rows
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import IntensityName, Measure, check_intensities
 
@@ -173,7 +173,7 @@ class HazardCurve(Result):
 
     def summary(self) -> str:
         rows = [[self.measure.scale * x, rate, 1.0 / rate] for x, rate in zip(self.intensity, self.rate, strict=True)]
-        return text_table([self.measure.label, "annual rate", "return period (years)"], rows)
+        return format_table([self.measure.label, "annual rate", "return period (years)"], rows)
 
     def _headline(self) -> str:
         low, high = shown_range(self)
@@ -224,7 +224,7 @@ def heading_of(cell: str) -> str:
 
 def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:
     """Read intensities (SI), annual rates and measure from a table of two columns with comments (#)."""
-    (_, header), *rows = csv_rows("\n".join("" if line.lstrip().startswith("#") else line for line in lines)) or [
+    (_, header), *rows = read_csv_rows("\n".join("" if line.lstrip().startswith("#") else line for line in lines)) or [
         (1, [])
     ]
     heading = [heading_of(cell) for cell in header]

@@ -28,7 +28,7 @@ from rocking.core.arrays import Floats, Integers
 from rocking.core.bisection import bisect
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
-from rocking.core.tables import as_written, counted, named, text_table
+from rocking.core.tables import add_unit, escape_dollars, format_count, format_table
 from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thresholds_of
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, missing_text, simulate_each
@@ -220,8 +220,8 @@ class IncrementalDynamicAnalysis(DatasetResult):
             for m, label in enumerate(labels_of(data, what, with_history=False))
             for b in range(data.sizes["block"])
         ]
-        blocks = data.blocks if not many else counted(data.sizes["block"], "block")
-        table = text_table([what, *(["block"] if many else []), "overturns"], rows)
+        blocks = data.blocks if not many else format_count(data.sizes["block"], "block")
+        table = format_table([what, *(["block"] if many else []), "overturns"], rows)
         head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
         notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
         notes.append(f"note: {data.undecided}")
@@ -237,17 +237,17 @@ class IncrementalDynamicAnalysis(DatasetResult):
             "model": data.model,
             "measure": data.level.long_name,
             **{name: data.level.attrs[name] for name in ("period", "damping") if name in data.level.attrs},
-            named("level", units): data.level.values,
-            named("lowest_uplift", units): data.lowest_uplift,
+            add_unit("level", units): data.level.values,
+            add_unit("lowest_uplift", units): data.lowest_uplift,
             "undecided": data.undecided,
             "motions": [
                 {
                     "name": str(data.motion.values[m]),
                     **({"vertical": str(data.vertical.values[m])} if "vertical" in data.coords else {}),
                     "block": b,
-                    named("overturning_level", units): float(lowest[m, b]),
+                    add_unit("overturning_level", units): float(lowest[m, b]),
                     "overturns": [
-                        {named("from", units): low, named("to", units): high}
+                        {add_unit("from", units): low, add_unit("to", units): high}
                         for low, high in self.bands(block=b, motion=m)
                     ],
                     "peak_over_alpha": peaks[m, b],
@@ -276,7 +276,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         return ida_figure(
             motions=motions,
             level_label=data.level.label,
-            title=title or as_written(f"{what}, {data.model} model"),
+            title=title or escape_dollars(f"{what}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )
@@ -352,7 +352,7 @@ class _Levels:
 
     def summary(self, lowest_uplift: float) -> str:
         """Describe the levels, and whether all of them are below the level (SI) at which a motion lifts a block."""
-        text = f"looked at: {counted(len(self.at), 'level')}, {self.range}"
+        text = f"looked at: {format_count(len(self.at), 'level')}, {self.range}"
         if len(self.at) > 1:
             steps, ratios = np.diff(self.at), self.at[1:] / self.at[:-1]
             apart = f"up to {steps.max():.5g}{self.unit}"

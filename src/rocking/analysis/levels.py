@@ -16,7 +16,7 @@ from rocking.core import bisection, checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.engine.problem import bodies_of
 from rocking.engine.tasks import Setup, Task, missing_text, simulate_tasks
 from rocking.errors import InvalidOption, Message
@@ -96,7 +96,7 @@ def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Describe a block by its sizes or parameters, several by their number."""
     only = single_block(blocks)
     if only is None:
-        return counted(len(bodies_of(blocks)), "block")
+        return format_count(len(bodies_of(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
         return only.description
     return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
@@ -161,8 +161,8 @@ def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
 
 def motions_in_words(clusters: Integers, labels: object) -> str:
     """Return the number of motions and, if they have labels, of clusters."""
-    text = counted(len(clusters), "motion")
-    return text if labels is None else f"{text} in {counted(len(np.unique(clusters)), 'cluster')}"
+    text = format_count(len(clusters), "motion")
+    return text if labels is None else f"{text} in {format_count(len(np.unique(clusters)), 'cluster')}"
 
 
 def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
@@ -306,7 +306,7 @@ def undecided_text(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, 
     )
     found = simulate_tasks(setup, tasks)
     changed = {task.key for task, outcomes in found if outcomes["overturned"][0] != was[task.key[0]]}
-    sample = counted(len(drawn), "outcome")
+    sample = format_count(len(drawn), "outcome")
     return f"undecided within {percent(near[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
 
 

@@ -18,8 +18,8 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.core.tables import as_written, cell, named, records_of, text_table
+from rocking.core.result import DatasetResult, format_some_rows, variable
+from rocking.core.tables import add_unit, columns_to_records, escape_dollars, format_cell, format_table
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
 from rocking.errors import InvalidMotion, InvalidOption
@@ -200,7 +200,7 @@ def overturning_map(
         "program": f"rocking {VERSION}",
         "model": model,
         "block": block.description,
-        named("alpha", "rad"): [side.alpha for side in block.sides],
+        add_unit("alpha", "rad"): [side.alpha for side in block.sides],
         "restitution": [side.restitution for side in block.sides],
         "pulse": f"{unit.name}: {unit.description.text}",
         "pulse_name": unit.name,
@@ -289,8 +289,8 @@ class OverturningMap(DatasetResult):
         return "\n\n".join(
             [
                 f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model",
-                text_table(["outcome", "share of the map"], shares),
-                table_of_some(["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"], rows),
+                format_table(["outcome", "share of the map"], shares),
+                format_some_rows(["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"], rows),
                 *([f"note: {missing}"] if (missing := missing_text(self.data.mode.values == Mode.UNFINISHED)) else []),
             ]
         )
@@ -299,7 +299,7 @@ class OverturningMap(DatasetResult):
         """Describe the lowest amplitude of the grid's range that overturns at a frequency."""
         lowest, amplitudes = float(self.data.overturning_amplitude[k]), self.data.amplitude.values
         if not math.isnan(lowest):
-            return cell(lowest)
+            return format_cell(lowest)
         is_open_below = _overturns(self.data.mode.values[0, k])
         return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
@@ -307,7 +307,7 @@ class OverturningMap(DatasetResult):
         return {
             "pulse": self.data.pulse,
             "block": self.data.block,
-            **{name: self.data.attrs[name] for name in (named("alpha", "rad"), "restitution")},
+            **{name: self.data.attrs[name] for name in (add_unit("alpha", "rad"), "restitution")},
             "model": self.data.model,
             "rtol": self.data.rtol,
             "modes": {str(mode): mode_name(int(mode)) for mode in np.unique(self.data.mode)},
@@ -315,7 +315,7 @@ class OverturningMap(DatasetResult):
             "amplitude": self.data.amplitude.values,
             "mode": self.data.mode.values,
             "overturning_amplitude": self.data.overturning_amplitude.values,
-            "boundaries": records_of(self._columns("boundaries")),
+            "boundaries": columns_to_records(self._columns("boundaries")),
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -332,7 +332,7 @@ class OverturningMap(DatasetResult):
             names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
             x_label="2πf/p, with the frequency f of the pulse",
             y_label="amplitude over the smallest that lifts the block",
-            title=title or as_written(f"{self.data.pulse_name}, {self._proportions}, {data.model} model"),
+            title=title or escape_dollars(f"{self.data.pulse_name}, {self._proportions}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )
@@ -342,7 +342,7 @@ class OverturningMap(DatasetResult):
         """Describe the block's slenderness and restitution, which usually are equal on both sides."""
         alpha, restitution = (
             ", ".join(dict.fromkeys(f"{value:.5g}" for value in self.data.attrs[name]))
-            for name in (named("alpha", "rad"), "restitution")
+            for name in (add_unit("alpha", "rad"), "restitution")
         )
         return f"alpha = {alpha} rad, restitution = {restitution}"
 

@@ -23,7 +23,7 @@ from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import Result
-from rocking.core.tables import as_written, counted, known_digits, text_table, within
+from rocking.core.tables import escape_dollars, format_count, format_digits, format_table, format_within
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 
@@ -72,7 +72,7 @@ class Rate:
     bounds: tuple[float, float] = (0.0, math.inf)
 
     def __repr__(self) -> str:
-        rate, between = known_digits(self.annual_rate, self.interval, self.bounds)
+        rate, between = format_digits(self.annual_rate, self.interval, self.bounds)
         return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
 
     def in_words(self) -> str:
@@ -101,7 +101,7 @@ class Rate:
 
     def _period_digits(self) -> tuple[str, str]:
         low, high = self.bounds
-        return known_digits(self.return_period, self.return_interval, (_period(high), _period(low)))
+        return format_digits(self.return_period, self.return_interval, (_period(high), _period(low)))
 
 
 def _period(rate: float) -> float:
@@ -158,20 +158,20 @@ class Risk(Result):
             rows.append(
                 [
                     one.limit_state,
-                    *known_digits(one.annual_rate, one.interval, one.bounds),
+                    *format_digits(one.annual_rate, one.interval, one.bounds),
                     *one._period_digits(),
-                    *known_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
+                    *format_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
                 ]
             )
         between = f"{confidence:g} % between"
         header = [
             "limit state", "annual rate", between, "once in (years)", between,
-            f"probability in {counted(years, 'year')}", between,
+            f"probability in {format_count(years, 'year')}", between,
         ]  # fmt: skip
         notes = [note for one in self.rates for note in beyond_notes(one)]
         if any(one.interval[0] == 0.0 or math.isinf(one.interval[1]) for one in self.rates):
             notes.append("intervals are those of the fragility, whose summary says why they have no end")
-        return "\n".join([text_table(header, rows), *notes])
+        return "\n".join([format_table(header, rows), *notes])
 
     def to_dict(self, years: float = 50.0) -> dict[str, Any]:
         """Return rates, probabilities in a time (years) and the hazard curve by name, in named or SI units."""
@@ -209,7 +209,7 @@ class Risk(Result):
                 for one, curve in zip(self.rates, self.curves, strict=True)
             ],
             intensity_label=self.hazard.measure.label,
-            title=title or as_written(self.description),
+            title=title or escape_dollars(self.description),
             ax=ax,
             figsize=figsize,
         )
@@ -373,7 +373,7 @@ class Survival(Result):
         measure, share = self.measure, f"{100.0 * self.confidence:g} %"
         header = [measure.label, "probability", "at most a year", "at most once in (years)"]
         columns: list[list[Any]] = [
-            [within(x, self._known, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
+            [format_within(x, self._known, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
             [*_CHANCES],
             [f"{rate:.2g}" for rate in self.largest_rate],
             [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
@@ -384,17 +384,17 @@ class Survival(Result):
             rates = self.hazard.rate_of(self.intensity)
             known = np.where(rates < lowest, 0.0, np.minimum(rates, highest))
             columns += [
-                [within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
+                [format_within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
                 [f"{chance:.2g}" for chance in np.exp(-self.years * known * _CHANCES)],
             ]
         return "\n".join(
             [
-                f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; intensity: {measure.label}",
+                f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
                 f"most likely never {self._never}: one such motion would have exceeded the limit with {share}",
                 f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
                 f"exceeded with {share}" + (", if each met another of the blocks" if self.several_blocks else ""),
                 "",
-                text_table(header, [*map(list, zip(*columns, strict=True))]),
+                format_table(header, [*map(list, zip(*columns, strict=True))]),
                 *([] if self.rate is None else ["", self._verdict(self.rate), *beyond_notes(self.rate)]),
             ]
         )
@@ -414,7 +414,7 @@ class Survival(Result):
         """Describe the probability of the survival under the hazard curve."""
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
-        chance, between = known_digits(self.probability, self.interval, bounds)
+        chance, between = format_digits(self.probability, self.interval, bounds)
         said, likely = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})", self.probability
         if self.several_blocks:
             said = (
@@ -425,7 +425,7 @@ class Survival(Result):
             likely = self.mean_probability
             said = f"{likely:.2g} in the mean and {said}"
         name = "" if self.hazard is None else self.hazard.name
-        text = f"under the hazard curve {name!r} the probability of {counted(self.years, 'year')} without it is {said}"
+        text = f"under the hazard curve {name!r} the probability of {format_count(self.years, 'year')} without it is {said}"
         least = f"{1.0 - self.confidence:.3g}"
         if likely >= 1.0 - self.confidence:
             return f"{text}, so they do not contradict each other"
@@ -473,17 +473,17 @@ class Survival(Result):
         return survival_figure(
             intensity=self.measure.scale * at,
             largest=self.curve.largest_rate(at, self.years, self.confidence),
-            largest_label=f"at most, with {counted(self.years, 'year')} without {self.curve.limit_state} "
+            largest_label=f"at most, with {format_count(self.years, 'year')} without {self.curve.limit_state} "
             f"({100.0 * self.confidence:g} %)",
             hazard=None if self.hazard is None else hazard_line(self.hazard, at),
             intensity_label=self.measure.label,
-            title=title or as_written(self.description),
+            title=title or escape_dollars(self.description),
             ax=ax,
             figsize=figsize,
         )
 
     def _headline(self) -> str:
-        return f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; most likely never {self._never}"
+        return f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; most likely never {self._never}"
 
 
 def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:

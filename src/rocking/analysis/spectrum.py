@@ -17,8 +17,8 @@ from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.core.tables import as_written, named
+from rocking.core.result import DatasetResult, format_some_rows, variable
+from rocking.core.tables import add_unit, escape_dollars
 from rocking.engine.problem import bodies_of
 from rocking.engine.schemes import ChatteringScheme
 from rocking.engine.tasks import missing_text
@@ -224,7 +224,7 @@ class RockingSpectrum(DatasetResult):
                 ]
                 for j in range(self.data.sizes["p"])
             ]
-            parts.append(f"{title}\n{table_of_some(header, rows)}")
+            parts.append(f"{title}\n{format_some_rows(header, rows)}")
         missing = missing_text(np.isnan(self.data.peak_over_alpha.values))
         return "\n\n".join(parts + [f"note: {missing}"] * bool(missing))
 
@@ -237,7 +237,7 @@ class RockingSpectrum(DatasetResult):
             **({"blocks": data.sizes["block"], "weights": data.weight.values} if self._of_ensemble else {}),
             "model": data.model,
             "chattering": data.chattering,
-            **{named(name, data[name].units): data[name].values for name in _AXES if name in data.coords},
+            **{add_unit(name, data[name].units): data[name].values for name in _AXES if name in data.coords},
             "axes": axes,
             "fractile_over_alpha": data.fractile_over_alpha.transpose("fractile", *axes).values,
             "overturned_share": data.overturned_share.values,
@@ -279,7 +279,7 @@ class RockingSpectrum(DatasetResult):
             fractiles=self.data.fractile.values.tolist(),
             motions=labels_of(self.data),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
-            title=title or as_written(", ".join(shown)),
+            title=title or escape_dollars(", ".join(shown)),
             ax=ax,
             figsize=figsize,
         )

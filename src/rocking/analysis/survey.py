@@ -14,7 +14,7 @@ from rocking.block.body import Body
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.progress import Progress
 from rocking.core.result import Result
-from rocking.core.tables import Column, columns_with_skipped, counted, decimal, named, text_table
+from rocking.core.tables import Column, add_unit, format_count, format_table, records_to_columns, round_decimal
 from rocking.engine.problem import one_body
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -27,14 +27,14 @@ from rocking.simulation.simulate import simulate
 #: Columns of the printed table. Files contain all columns.
 _SHOWN: Final = {
     "record": "record",
-    named("pga", "g"): "PGA, g",
+    add_unit("pga", "g"): "PGA, g",
     "peak_over_{}": "peak/{}",
     "impacts_resolved": "resolved impacts",
     "rests": "rests",
     "verdict": "verdict",
 }
 
-_SLIDING: Final = named("sliding_time", "s")
+_SLIDING: Final = add_unit("sliding_time", "s")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,19 +56,19 @@ class BlockUnderRecords(Result):
         return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
 
     def _columns(self, table: str) -> list[Column]:
-        return columns_with_skipped(self.rows(), self.skipped)
+        return records_to_columns(self.rows(), self.skipped)
 
     def _labels(self) -> list[dict[str, Any]]:
         """First columns of each row: record, motion, block."""
         columns = body_coordinates(self.block.alone())
-        numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
+        numbers = {add_unit(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
         labels = record_columns(self.records, [motion_of(response) for response in self.responses])
         return [{**label, "block": self.block.description, **numbers} for label in labels]
 
     def _headline(self) -> str:
         """Summarise the number of records that overturn the block."""
         overturned = sum(one.overturned and one.perturbed().is_decided for one in self.responses)
-        return f"{self.block.description}: {counted(len(self.records), 'record')}, overturned by {overturned}"
+        return f"{self.block.description}: {format_count(len(self.records), 'record')}, overturned by {overturned}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,7 +106,7 @@ class Survey(BlockUnderRecords):
             shown |= {_SLIDING: f"with friction {self.friction:g} slides at, s"}
         if any(row["processing"] for row in rows):
             shown = shown | {"processing": "done to the record"}
-        table = text_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
+        table = format_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
         return f"{self._headline()}\n\n{table}"
 
     def _headline(self) -> str:
@@ -115,14 +115,14 @@ class Survey(BlockUnderRecords):
             for response in self.responses
         )
         known = f", undecided under {undecided}" if undecided else ""
-        unread = f"; {counted(len(self.skipped), 'record')} skipped" if self.skipped else ""
+        unread = f"; {format_count(len(self.skipped), 'record')} skipped" if self.skipped else ""
         return super()._headline() + known + unread
 
     def to_dict(self) -> dict[str, Any]:
         numbers = self.block.alone().parameters().items()
         block = {
             "description": self.block.description,
-            **{named(name, unit): values[0].tolist() for name, (values, unit) in numbers},
+            **{add_unit(name, unit): values[0].tolist() for name, (values, unit) in numbers},
         }
         friction = {} if self.friction is None else {"friction": self.friction}
         return {"block": block, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
@@ -159,8 +159,8 @@ class Check(BlockUnderRecords):
         return [
             {
                 **label,
-                named("pga", "g"): decimal(motion_of(response).pga / STANDARD_GRAVITY),
-                named("pgv", "m/s"): motion_of(response).pgv,
+                add_unit("pga", "g"): round_decimal(motion_of(response).pga / STANDARD_GRAVITY),
+                add_unit("pgv", "m/s"): motion_of(response).pgv,
                 **ratios,
                 "simulated": margin,
                 "lowest_factor": 1.0 / margin,
@@ -176,14 +176,14 @@ class Check(BlockUnderRecords):
 
     def summary(self) -> str:
         rules = [*self.ratios[0]]
-        shown = {"record": "record", named("pga", "g"): "PGA, g", named("pgv", "m/s"): "PGV, m/s"}
+        shown = {"record": "record", add_unit("pga", "g"): "PGA, g", add_unit("pgv", "m/s"): "PGV, m/s"}
         shown |= {rule: title_of(rule) for rule in rules}
         shown |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
         known = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
         rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
         # Rules of thumb are accurate to three digits at most.
         cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in shown] for row in rows]
-        table = text_table(list(shown.values()), cells)
+        table = format_table(list(shown.values()), cells)
         return "\n".join(
             [
                 str(self.block),
@@ -329,9 +329,9 @@ def _row(response: Response, precision: float) -> dict[str, Any]:
     motion = motion_of(response)
     near, further = response.perturbed(), response.perturbed(*steps_within(precision))
     return {
-        named("duration", "s"): motion.duration,
-        named("pga", "g"): decimal(motion.pga / STANDARD_GRAVITY),
-        named("pgv", "m/s"): motion.pgv,
+        add_unit("duration", "s"): motion.duration,
+        add_unit("pga", "g"): round_decimal(motion.pga / STANDARD_GRAVITY),
+        add_unit("pgv", "m/s"): motion.pgv,
         "processing": "; ".join(motion.history),
         "verdict": in_brief(response, precision),
         "overturned": response.overturned,
@@ -343,13 +343,13 @@ def _row(response: Response, precision: float) -> dict[str, Any]:
         "stopped": response.stopped,
         "leans": response.leans,
         "ambiguous": response.ambiguous,
-        named("overturn_time", "s"): response.overturn_time,
+        add_unit("overturn_time", "s"): response.overturn_time,
         f"peak_over_{response.block.coordinate.limit}": response.peak_over_slenderness,
-        named("peak_rotation", "rad"): response.peak_rotation,
-        named("residual_rotation", "rad"): response.residual_rotation,
-        named("peak_time", "s"): response.peak_time,
+        add_unit("peak_rotation", "rad"): response.peak_rotation,
+        add_unit("residual_rotation", "rad"): response.residual_rotation,
+        add_unit("peak_time", "s"): response.peak_time,
         "impacts_resolved": len(response.impacts),
         "rests": int((response.events["kind"] == "rest").sum()),
-        named("time_at_rest", "s"): response.time_at_rest,
+        add_unit("time_at_rest", "s"): response.time_at_rest,
         "required_friction": math.nan if response.block.contact is None else response.required_friction,
     }

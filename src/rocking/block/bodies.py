@@ -18,7 +18,7 @@ from rocking.block.single import Block, one_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
-from rocking.core.tables import range_text
+from rocking.core.tables import format_range
 from rocking.errors import InvalidBlock
 from rocking.kernels import state
 
@@ -298,7 +298,7 @@ class Blocks:
     def __repr__(self) -> str:
         if not len(self):
             return "<Blocks: none>"
-        p, alpha, e = (range_text(values) for values in (self.p, self.alpha, self.restitution))
+        p, alpha, e = (format_range(values) for values in (self.p, self.alpha, self.restitution))
         held = ", restrained" if self.terms else ""
         return f"<Blocks: {len(self)}; p {p} rad/s, alpha {alpha} rad, restitution {e}{held}>"
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rocking.calibration.search import AGREEMENT, RUNS, Search, unpacked
 from rocking.calibration.space import HIGHEST, Space, unit_of
 from rocking.core.arrays import Flags, Floats
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.errors import InvalidOption
 
 #: An interval ends at a bound if more than this share of the posterior (the share beyond one end) is within the
@@ -136,13 +136,13 @@ class Diagnostics:
             held = "the estimates weigh what both found; double the candidates, or narrow the bounds to what you know"
             notes.append(f"independent runs disagree (R-hat) on {', '.join(apart)}: {held}")
         if self.effective < 20.0:
-            few = f"only {counted(round(self.effective), 'candidate')} can tell what a typical population does"
+            few = f"only {format_count(round(self.effective), 'candidate')} can tell what a typical population does"
             notes.append(f"{few}: double the candidates, or narrow the bounds to what you know")
         return tuple(notes)
 
     def __str__(self) -> str:
         search = (
-            f"{counted(self.candidates, 'candidate')}, {self.effective:.0f} effective for a typical population; {RUNS} "
+            f"{format_count(self.candidates, 'candidate')}, {self.effective:.0f} effective for a typical population; {RUNS} "
             f"independent runs, R-hat at most {max(self.agreement.values()):.2f}"
         )
         return "\n".join([search, *(f"note: {sentence}" for sentence in self.notes)])

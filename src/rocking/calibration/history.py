@@ -25,7 +25,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.result import Result
-from rocking.core.tables import as_written, counted, text_table
+from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response, drawing_times
@@ -116,7 +116,7 @@ class HistoryCalibration(Result):
             [name, one.value, float(f"{one.deviation:.2g}"), unit_of(name), "at its bound" if one.at_bound else ""]
             for name, one in self.estimates.items()
         ]
-        table = text_table(["parameter", "value", "std. error", "unit", ""], rows)
+        table = format_table(["parameter", "value", "std. error", "unit", ""], rows)
         return f"{table}\n\n{self._misfit_text()}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -140,7 +140,7 @@ class HistoryCalibration(Result):
             residual=self.residuals,
             fitted_time=between,
             fitted=self.response.rotation(between),
-            title=title or as_written(self._estimates_text()),
+            title=title or escape_dollars(self._estimates_text()),
             ax=ax,
             figsize=figsize,
         )
@@ -153,7 +153,7 @@ class HistoryCalibration(Result):
         return f"{self._estimates_text()}; {self._misfit_text()}"
 
     def _misfit_text(self) -> str:
-        return f"misfit {self.misfit:.3g} rad (root mean square) over {counted(len(self.residuals), 'sample')}"
+        return f"misfit {self.misfit:.3g} rad (root mean square) over {format_count(len(self.residuals), 'sample')}"
 
 
 def calibrate_history(
@@ -235,7 +235,7 @@ def calibrate_history(
         raise InvalidOption(EVERYTHING_IS_KNOWN)
     if len(at) < 2 * len(unknowns):
         raise InvalidOption(
-            f"{counted(len(at), 'sample')} cannot determine {counted(len(unknowns), 'parameter')}: give more"
+            f"{format_count(len(at), 'sample')} cannot determine {format_count(len(unknowns), 'parameter')}: give more"
         )
     problem = _Problem(at, measured, motion, model, settled, tuple(unknowns))
     rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))

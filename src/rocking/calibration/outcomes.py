@@ -31,7 +31,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
 from rocking.core.result import Result
-from rocking.core.tables import Column, as_written, counted, text_table
+from rocking.core.tables import Column, escape_dollars, format_count, format_table
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, find_distinct_motions, list_motions
@@ -88,7 +88,7 @@ class Validation:
     def __repr__(self) -> str:
         repeats, tests = self.probabilities.shape
         times = "once" if repeats == 1 else f"{repeats} times"
-        return f"<Validation: {counted(tests, 'test')}, each left out {times}: {self.scores}>"
+        return f"<Validation: {format_count(tests, 'test')}, each left out {times}: {self.scores}>"
 
     @property
     def scores(self) -> Scores:
@@ -218,7 +218,7 @@ class Calibration(Result):
 
     def _headline(self) -> str:
         overturned = int(self.observed.sum())
-        return f"{counted(len(self.observed), 'motion')}, {overturned} overturned the specimen; {self.model} model"
+        return f"{format_count(len(self.observed), 'motion')}, {overturned} overturned the specimen; {self.model} model"
 
     def summary(self) -> str:
         rows = [
@@ -226,8 +226,8 @@ class Calibration(Result):
             for name, one in self.estimates.items()
         ]
         alike = 1.0 / float((self.weights**2).sum())
-        table = text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows)
-        ensemble = f"ensemble of {counted(len(self.blocks), 'block')}, equivalent to {alike:.0f} of equal weight"
+        table = format_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows)
+        ensemble = f"ensemble of {format_count(len(self.blocks), 'block')}, equivalent to {alike:.0f} of equal weight"
         return f"{self._headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -259,7 +259,7 @@ class Calibration(Result):
             overturned=self.observed,
             parameters=[self._parameter(name) for name in self._evidence.candidates.space.unknown],
             weights=self.weights,
-            title=title or as_written(self._headline()),
+            title=title or escape_dollars(self._headline()),
             ax=ax,
             figsize=figsize,
         )

@@ -17,7 +17,7 @@ from rocking.calibration.validate import ShakeTest
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.core.tables import counted, csv_rows, named
+from rocking.core.tables import add_unit, format_count, read_csv_rows
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.inputs.pulses import FAMILIES, named_pulse
 from rocking.motion.motion import Motion
@@ -95,7 +95,7 @@ def read_ensemble(path: Path) -> Ensemble:
     """Read the ensemble that `Calibration.to_csv` writes."""
     table = read_table(path)
     columns = [
-        [named(f"{name}_{side}", unit) for side in ("plus", "minus")]
+        [add_unit(f"{name}_{side}", unit) for side in ("plus", "minus")]
         for name, unit in (("p", "rad/s"), ("alpha", "rad"), ("restitution", "1"))
     ]
     missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
@@ -122,7 +122,7 @@ def read_table(path: Path, name: Callable[[str], str] = str) -> _Table:
         raise UnreadableRecord(f"it cannot be read: {error.strerror}", path=str(path)) from None
     except UnicodeDecodeError:
         raise UnreadableRecord("it is no text table; save it as CSV", path=str(path)) from None
-    cells = csv_rows(text)
+    cells = read_csv_rows(text)
     if len(cells) < 2:
         raise UnreadableRecord("it holds no rows below its header", path=str(path))
     (_, header), *rows = cells
@@ -132,7 +132,7 @@ def read_table(path: Path, name: Callable[[str], str] = str) -> _Table:
         raise UnreadableRecord(text, path=str(path), line=1)
     for line, row in rows:
         if len(row) != len(columns):
-            found = f"{counted(len(row), 'cell')} under {counted(len(columns), 'column')}"
+            found = f"{format_count(len(row), 'cell')} under {format_count(len(columns), 'column')}"
             raise UnreadableRecord(f"{found}; correct it", path=str(path), line=line)
     return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
@@ -141,7 +141,7 @@ def _tests_of(table: _Table, **about: Any) -> list[ShakeTest]:
     """Return the tests of a table with these columns."""
     specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
     if len(specimens) > 1:
-        raise table.error(f"the tests are of {counted(len(specimens), 'specimen')}: give each a table of its own")
+        raise table.error(f"the tests are of {format_count(len(specimens), 'specimen')}: give each a table of its own")
     overturned, motions = table.answers("overturned"), _motions_of(table, **about)
     names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
     return [ShakeTest(*each) for each in zip(motions, overturned, names, groups, strict=True)]
@@ -267,7 +267,7 @@ def read_observed(
     else:
         observed |= _under_motions(table, measure, channel=channel, dt=dt, units=units)
     outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(table.rows)))))
-    return observed | {"description": f"{counted(outcomes, 'observed outcome')} in {path.name}"}
+    return observed | {"description": f"{format_count(outcomes, 'observed outcome')} in {path.name}"}
 
 
 def _against_intensity(table: _Table, heading: str, measure: Measure) -> dict[str, Any]:

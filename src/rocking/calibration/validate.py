@@ -19,7 +19,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
 from rocking.core.result import Result
-from rocking.core.tables import Column, as_written, columns_with_skipped, counted, text_table
+from rocking.core.tables import Column, escape_dollars, format_count, format_table, records_to_columns
 from rocking.engine.problem import bodies_of, slenderness_of
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
@@ -199,7 +199,7 @@ class ModelValidation(Result):
             all_or_none = "all tests" if fell else "no test"
             notes.append(f"{all_or_none} overturned the specimen: the base rate is perfect, and no skill is known")
         if self.brier.clusters < 10:
-            few = counted(self.brier.clusters, "cluster")
+            few = format_count(self.brier.clusters, "cluster")
             notes.append(f"the tests belong to {few} only: standard errors are rough")
         if math.isinf(self.log_loss.value):
             notes.append("the log loss is infinite, as a certainty failed: give what is not known of the specimen")
@@ -208,7 +208,7 @@ class ModelValidation(Result):
     def _headline(self) -> str:
         fell = sum(test.overturned for test in self.tests)
         by = f", {self.model} model" if self.model else ""
-        return f"{self.description}{by}: {counted(len(self.tests), 'test')}, {fell} overturned"
+        return f"{self.description}{by}: {format_count(len(self.tests), 'test')}, {fell} overturned"
 
     def summary(self) -> str:
         scores = [
@@ -219,7 +219,7 @@ class ModelValidation(Result):
         parts = [
             self._headline(),
             "",
-            text_table(["score", "mean", "+-", "skill", "+-"], scores),
+            format_table(["score", "mean", "+-", "skill", "+-"], scores),
             "",
             f"reliability: {doubt}as if the predictions were right (p = {self.reliability_chance:.2g})",
         ]
@@ -229,7 +229,7 @@ class ModelValidation(Result):
         return asdict(self) | {"notes": [*self.notes]}
 
     def _columns(self, table: str) -> list[Column]:
-        return columns_with_skipped([asdict(test) for test in self.tests], {})
+        return records_to_columns([asdict(test) for test in self.tests], {})
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import reliability_figure
@@ -237,7 +237,7 @@ class ModelValidation(Result):
         columns = ("predicted", "observed", "band_lower", "band_upper")
         return reliability_figure(
             **{name: np.array([getattr(row, name) for row in self.reliability]) for name in columns},
-            title=title or as_written(self._headline()),
+            title=title or escape_dollars(self._headline()),
             ax=ax,
             figsize=figsize,
         )
@@ -338,7 +338,7 @@ def validate(
         if isinstance(blocks, Calibration):
             if weights is not None:
                 raise InvalidOption("a calibration has {} of its own: leave them out", "weights")
-            description, how = f"calibration, {counted(len(blocks.blocks), 'block')}", model or blocks.model
+            description, how = f"calibration, {format_count(len(blocks.blocks), 'block')}", model or blocks.model
             bodies: Bodies = blocks.blocks
             shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
             outlier_probability = blocks.outlier_probability if outlier_probability is None else outlier_probability
@@ -375,7 +375,7 @@ def _left_out(source: Validation, count: int, weights: object, outlier_probabili
     known = source.probabilities.shape[1]
     if known != count:
         raise InvalidOption(
-            f"the predictions are of {counted(known, 'test')}, and {counted(count, 'test')} are given: "
+            f"the predictions are of {format_count(known, 'test')}, and {format_count(count, 'test')} are given: "
             "{} must be those of the calibration, in their order",
             "tests",
         )

@@ -28,7 +28,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.bisection import bisect
 from rocking.core.progress import Progress
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
 from rocking.engine.schemes import critical_amplitudes_by
 from rocking.engine.tasks import require_finished
@@ -187,7 +187,7 @@ class ChatteringSequence:
 
     def __repr__(self) -> str:
         end = f"complete, at rest at p t = {self.time:.9g}" if self.complete else "incomplete"
-        return f"<ChatteringSequence: {counted(len(self.impacts), 'impact')} resolved; {end}>"
+        return f"<ChatteringSequence: {format_count(len(self.impacts), 'impact')} resolved; {end}>"
 
 
 def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) -> ChatteringSequence:

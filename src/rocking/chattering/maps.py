@@ -20,7 +20,7 @@ from rocking.core.arrays import Integers, clear_rounding
 from rocking.core.constants import VERSION
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, Result
-from rocking.core.tables import as_written, rows_of, text_table
+from rocking.core.tables import array_to_rows, escape_dollars, format_table
 from rocking.core.threads import map_in_threads
 from rocking.engine.tasks import OUTCOME, complete_chattering
 from rocking.errors import InvalidOption
@@ -222,7 +222,7 @@ class ChatteringMap(DatasetResult):
         head = f"end of the first rocking, over {first} and {second}"
         overturned, later = (100.0 * float(each.mean()) for each in (self.data.overturned, self._later()))
         fate = f"overturns in the end: {overturned:.1f} %" + (f", {later:.1f} % after a first rest" if later else "")
-        return f"{head}\n\n{text_table(['outcome', 'share of the map'], rows)}\n\n{fate}"
+        return f"{head}\n\n{format_table(['outcome', 'share of the map'], rows)}\n\n{fate}"
 
     def _later(self) -> NDArray[np.bool_]:
         """Whether a block overturns after its first rocking has ended otherwise."""
@@ -257,7 +257,7 @@ class ChatteringMap(DatasetResult):
             later=self._later(),
             x_label=written.get(str(second), str(second)),
             y_label=written.get(str(first), str(first)),
-            title=title or as_written(f"end of the first rocking under {self.data.attrs['case']}"),
+            title=title or escape_dollars(f"end of the first rocking under {self.data.attrs['case']}"),
             ax=ax,
             figsize=figsize,
         )
@@ -387,11 +387,11 @@ class ChatteringEpisodes(Result):
             if math.isnan(start)
             else f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"
         )
-        return f"{text_table(header, rows)}\n{about}"
+        return f"{format_table(header, rows)}\n{about}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
-            "episodes": rows_of(self.episodes),
+            "episodes": array_to_rows(self.episodes),
             "shaking_s": self.shaking,
             "at_rest_s": self.at_rest,
             "share_at_rest": self.share_at_rest,

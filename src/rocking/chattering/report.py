@@ -19,8 +19,8 @@ from rocking.chattering.expansions import (
     first_interval,
 )
 from rocking.core import checks
-from rocking.core.result import Result, table_of_some
-from rocking.core.tables import Column, counted
+from rocking.core.result import Result, format_some_rows
+from rocking.core.tables import Column, format_count
 from rocking.errors import InvalidOption, OutsideFit
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class ChatteringReport(Result):
     def summary(self) -> str:
         result = self.values
         times, resolved = result["chattering_time"], result["resolved"]
-        impacts = "" if resolved is None else f", {counted(resolved, 'impact')}"
+        impacts = "" if resolved is None else f", {format_count(resolved, 'impact')}"
         worth = "" if result["complete"] else ", worthless: it takes chattering for complete"
         lines = [
             ("chattering", self._verdict()),
@@ -100,7 +100,7 @@ class ChatteringReport(Result):
             ]
             for c in self.to_dataframe("cycles").to_dict("records")
         ]  # fmt: skip
-        return table_of_some(header, rows)
+        return format_some_rows(header, rows)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.orbits import intervals_figure
@@ -138,7 +138,7 @@ class ChatteringReport(Result):
     def _bracket(self, bracket: dict[str, Any]) -> str:
         if math.isnan(bracket["upper"]):
             return "none"
-        return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {counted(bracket['impacts'], 'impact')}"
+        return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {format_count(bracket['impacts'], 'impact')}"
 
     def _pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
         if math.isnan(values["exact"]):

@@ -28,7 +28,7 @@ from rocking.cli.options import (
 )
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.core.constants import Model
-from rocking.core.tables import counted, text_table
+from rocking.core.tables import format_count, format_table
 from rocking.errors import InvalidOption
 from rocking.inputs.quantities import read_bounds, read_number, read_tilt
 from rocking.motion.motion import Motion
@@ -149,10 +149,10 @@ def _of_outcomes(
     if folds:
         scores = found.cross_validate(groups=[test.group for test in tests], folds=folds).scores
         numbers["cross_validated"] = asdict(scores)
-        parts.append(f"left-out motions: {scores} ({counted(folds, 'fold')})")
+        parts.append(f"left-out motions: {scores} ({format_count(folds, 'fold')})")
     if predicted:
         rows = [(name, float(chance)) for name, chance in predicted.items()]
-        parts.append("\n" + text_table(["motion", "probability"], rows))
+        parts.append("\n" + format_table(["motion", "probability"], rows))
     return numbers, "\n".join(parts)
 
 

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from rocking.block import Block
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.core.progress import note
-from rocking.core.tables import text_table, write_csv
+from rocking.core.tables import format_table, write_csv
 from rocking.errors import InvalidOption
 from rocking.inputs.notes import block_notes
 from rocking.inputs.quantities import read_densities, read_length, read_number, read_sides, read_values
@@ -81,7 +81,7 @@ def mesh(
         found: dict[str, Any] = {"solid": solid.to_dict(), **rose.to_dict(), "blocks": blocks}
         text = [solid.summary(), rose.summary()]
         if blocks:
-            text.append(text_table([*blocks[0]], [[*row.values()] for row in blocks]))
+            text.append(format_table([*blocks[0]], [[*row.values()] for row in blocks]))
         if folder is not None:
             write_tables(folder, rose)
             rose.to_netcdf(folder / "rose.nc")

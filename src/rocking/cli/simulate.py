@@ -27,7 +27,7 @@ from rocking.cli.options import (
 )
 from rocking.cli.output import OUTPUT, OutputOptions, PrintOptions, left_out, print_result, subfolder, write_results
 from rocking.core.progress import note
-from rocking.core.tables import text_table, to_json
+from rocking.core.tables import format_table, to_json
 from rocking.errors import InvalidOption, UnreadableRecord
 from rocking.inputs.notes import reading_notes
 from rocking.inputs.pulses import FAMILIES, PulseFamily
@@ -209,7 +209,7 @@ def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
         print(to_json({"pulses": [one | {"units": of_one} for one, of_one in zip(known, units, strict=True)]}))
         return
     rows = [(one.name, _listed(one, dict.fromkeys(one.needed)), _listed(one, one.optional)) for one in families]
-    print(text_table(["pulse", "needs", "takes"], rows))
+    print(format_table(["pulse", "needs", "takes"], rows))
     print("\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:")
     print("rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1")
 

@@ -23,7 +23,7 @@ from rocking.cli.output import (
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.result import Result
-from rocking.core.tables import counted, write_text
+from rocking.core.tables import format_count, write_text
 from rocking.core.threads import set_options
 from rocking.errors import InvalidOption, OutputError, StudyError, Unfitted
 from rocking.inputs.quantities import read_values
@@ -110,7 +110,7 @@ def run(
     for unit, why in [*report.failed.items()][:_SHOWN]:
         note(f"{unit} failed: {why}")
     if report.failed:
-        raise StudyError(f"{counted(len(report.failed), 'unit')} failed; run the study again to try again")
+        raise StudyError(f"{format_count(len(report.failed), 'unit')} failed; run the study again to try again")
     if report.stopped:
         sys.exit(128 + signal.SIGTERM)
 
@@ -152,9 +152,9 @@ def verify(
     for fault in faults:
         print(fault)
     if faults and not repair:
-        raise StudyError(f"{counted(len(faults), 'fault')} found; {{}} computes damaged units again", "repair")
-    state, repaired = found.status, f"; {counted(len(faults), 'fault')} repaired" if faults else ""
-    print(f"{state.done} of {counted(state.units, 'unit')} done and sound{repaired}")
+        raise StudyError(f"{format_count(len(faults), 'fault')} found; {{}} computes damaged units again", "repair")
+    state, repaired = found.status, f"; {format_count(len(faults), 'fault')} repaired" if faults else ""
+    print(f"{state.done} of {format_count(state.units, 'unit')} done and sound{repaired}")
 
 
 @study.command

@@ -15,12 +15,12 @@ from rocking.core import checks
 from rocking.core.arrays import select_evenly
 from rocking.core.tables import (
     Column,
-    columns_of,
-    frame_of,
-    named,
-    plain,
-    text_table,
+    add_unit,
+    columns_to_frame,
+    dataset_to_columns,
+    format_table,
     to_json,
+    to_plain,
     write_csv,
     write_excel,
     write_netcdf,
@@ -69,14 +69,14 @@ class Row(NamedTuple):
         return f"{self.value}{'' if self.unit == '1' else f' {self.unit}'}{self.note}"
 
 
-def text_of(rows: Iterable[Row], width: int) -> str:
+def format_rows(rows: Iterable[Row], width: int) -> str:
     """Return rows as lines: names in a column of this width, then value, unit and note."""
     return "\n".join(f"{row.name:<{width}}{row.text}" for row in rows)
 
 
-def dictionary_of(rows: Iterable[Row]) -> dict[str, Any]:
+def rows_to_dict(rows: Iterable[Row]) -> dict[str, Any]:
     """Return rows as plain values by name with unit, with None for numbers that are not finite."""
-    return {named(row.name, row.unit): plain(row.value) for row in rows}
+    return {add_unit(row.name, row.unit): to_plain(row.value) for row in rows}
 
 
 class Result(ABC):
@@ -120,7 +120,7 @@ class Result(ABC):
         names = [*self.TABLES]
         if not names:
             raise InvalidOption(f"a {type(self).__name__} has no tables; use to_dict or to_json")
-        return frame_of(self._columns(checks.choice(table or names[0], "table", InvalidOption, names)))
+        return columns_to_frame(self._columns(checks.choice(table or names[0], "table", InvalidOption, names)))
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
         """Write a table of `to_dataframe` to a CSV file, with "inf" for infinity, like `to_json`."""
@@ -233,7 +233,7 @@ class DatasetResult(Result):
         return data
 
     def _columns(self, table: str) -> list[Column]:
-        return columns_of(self._table(table))
+        return dataset_to_columns(self._table(table))
 
     def _table(self, name: str) -> xr.Dataset:
         return self.data[[*self.TABLES[name]]]
@@ -256,8 +256,8 @@ def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: 
     return dims, values, {name: text for name, text in (("units", unit), ("long_name", meaning)) if text}
 
 
-def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+def format_some_rows(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """Return a table of at most a dozen rows, evenly from first to last, with a remark if there are more."""
     indices = select_evenly(len(rows), _MAX_ROWS)
-    table = text_table(header, [rows[k] for k in indices])
+    table = format_table(header, [rows[k] for k in indices])
     return table if len(indices) == len(rows) else f"{table}\n({len(indices)} of {len(rows)} rows)"

@@ -62,10 +62,10 @@ class Column(NamedTuple):
     @property
     def key(self) -> str:
         """Name with the unit."""
-        return named(self.name, self.unit)
+        return add_unit(self.name, self.unit)
 
 
-def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+def format_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """Format columns at least two spaces apart: numbers, to five digits, on the right, texts on the left."""
     from rich.console import Console
     from rich.table import Table
@@ -76,14 +76,14 @@ def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
         numeric = all(isinstance(row[k], (int, float, np.number)) for row in rows)
         table.add_column(Text(name), justify="right" if numeric else "left", no_wrap=True)
     for row in rows:
-        table.add_row(*(Text(cell(entry)) for entry in row))
+        table.add_row(*(Text(format_cell(entry)) for entry in row))
     console = Console(file=io.StringIO(), width=_WIDTH, color_system=None, legacy_windows=False)
     with console.capture() as captured:
         console.print(table)
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
-def cell(entry: Any) -> str:
+def format_cell(entry: Any) -> str:
     """Format an entry of a table: numbers to five digits, infinity and NaN as words."""
     if isinstance(entry, (bool, np.bool_)):
         return "yes" if entry else "no"
@@ -92,7 +92,7 @@ def cell(entry: Any) -> str:
     return str(entry)
 
 
-def counted(number: float, noun: str) -> str:
+def format_count(number: float, noun: str) -> str:
     """Return a number and its noun, such as 1 polarity, 3 polarities or 0.5 years."""
     if number == 1:
         return f"1 {noun}"
@@ -100,14 +100,14 @@ def counted(number: float, noun: str) -> str:
     return f"{text} {noun[:-1]}ies" if noun.endswith("y") else f"{text} {noun}s"
 
 
-def within(value: float, bounds: tuple[float, float], text: Callable[[float], str]) -> str:
+def format_within(value: float, bounds: tuple[float, float], text: Callable[[float], str]) -> str:
     """Format a number or, if it is out of bounds, the bound after < or >."""
     low, high = bounds
     sign = "< " if value < low else "> " if value > high else ""
     return sign + text(min(max(value, low), high))
 
 
-def known_digits(
+def format_digits(
     value: float, interval: tuple[float, float], bounds: tuple[float, float] = (0.0, math.inf)
 ) -> tuple[str, str]:
     """Format a value and its interval to the digits that the interval supports, at least two, or as bounds."""
@@ -122,52 +122,54 @@ def known_digits(
         digits = int(max(2, math.floor(math.log10(abs(number))) - last_digit + 1))
         return f"{float(f'{number:.{digits - 1}e}'):.{max(digits, 6)}g}"
 
-    return within(value, bounds, text), f"{within(low, bounds, text)} to {within(high, bounds, text)}"
+    return format_within(
+        value, bounds, text
+    ), f"{format_within(low, bounds, text)} to {format_within(high, bounds, text)}"
 
 
-def range_text(values: Floats) -> str:
+def format_range(values: Floats) -> str:
     """Format the lowest and highest of some numbers, or their common value."""
     low, high = float(np.min(values)), float(np.max(values))
     return f"{low:.5g}" if low == high else f"from {low:.5g} to {high:.5g}"
 
 
-def named(quantity: str, unit: str) -> str:
+def add_unit(quantity: str, unit: str) -> str:
     """Return the name of a column or field with its unit, for all files that the package writes."""
     return quantity if unit == "1" else f"{quantity}_{unit.replace('/', '_').replace('^', '')}"
 
 
-def as_written(text: str) -> str:
+def escape_dollars(text: str) -> str:
     """Escape a text for a figure, so that a dollar sign in a name does not begin a formula."""
     return text.replace("$", r"\$")
 
 
-def decimal(value: float) -> float:
+def round_decimal(value: float) -> float:
     """Return a number without the rounding in its last digit, for display."""
     rounded = float(f"{value:.12g}")
     return rounded if abs(rounded - value) <= _ROUNDING * abs(value) else value
 
 
-def frame_of(columns: Iterable[Column]) -> pd.DataFrame:
+def columns_to_frame(columns: Iterable[Column]) -> pd.DataFrame:
     """Return columns as a data frame."""
     import pandas as pd
 
     return pd.DataFrame({column.key: column.values for column in columns})
 
 
-def records_of(columns: Sequence[Column]) -> list[dict[str, Any]]:
+def columns_to_records(columns: Sequence[Column]) -> list[dict[str, Any]]:
     """Return the rows of columns as mappings of plain values."""
     names, values = [column.key for column in columns], [np.asarray(column.values).tolist() for column in columns]
     return [dict(zip(names, row, strict=True)) for row in zip(*values, strict=True)]
 
 
-def text_of_columns(columns: Sequence[Column]) -> str:
+def format_columns(columns: Sequence[Column]) -> str:
     """Format the columns that have a label as a table."""
     labelled = [column for column in columns if column.label]
     rows = zip(*(column.values for column in labelled), strict=True)
-    return text_table([column.label for column in labelled], [*rows])
+    return format_table([column.label for column in labelled], [*rows])
 
 
-def columns_of(dataset: xr.Dataset) -> list[Column]:
+def dataset_to_columns(dataset: xr.Dataset) -> list[Column]:
     """Return dimensions, coordinates and variables of a dataset as columns, with a row for each point."""
     # A dimension without labels only numbers the rows.
     rows = [] if len(dataset.dims) == 1 and not dataset.coords else [*dataset.dims]
@@ -176,7 +178,7 @@ def columns_of(dataset: xr.Dataset) -> list[Column]:
     return [Column(str(name), frame[name], dataset[name].attrs.get("units", "1")) for name in names]
 
 
-def columns_with_skipped(rows: Sequence[Mapping[str, Any]], skipped_records: Mapping[str, str]) -> list[Column]:
+def records_to_columns(rows: Sequence[Mapping[str, Any]], skipped_records: Mapping[str, str]) -> list[Column]:
     """Return records as columns, with additional rows for unreadable records and the reason."""
     import pandas as pd
 
@@ -189,14 +191,14 @@ def columns_with_skipped(rows: Sequence[Mapping[str, Any]], skipped_records: Map
     return [Column(name, frame[name]) for name in frame]
 
 
-def csv_rows(text: str) -> list[tuple[int, list[str]]]:
+def read_csv_rows(text: str) -> list[tuple[int, list[str]]]:
     r"""Return line number and cells of each nonempty row of a CSV table.
 
     If semicolons separate the columns of the first row, a comma is the decimal sign and becomes a point.
 
     Examples
     --------
-    >>> csv_rows("p;alpha\n2,5;12,5deg\n")
+    >>> read_csv_rows("p;alpha\n2,5;12,5deg\n")
     [(1, ['p', 'alpha']), (2, ['2.5', '12.5deg'])]
     """
     lines = text.splitlines()
@@ -213,20 +215,20 @@ def _replace_comma(cell: str) -> str:
     return f"{match[1]}.{match[2]}" if match else cell
 
 
-def rows_of(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
+def array_to_rows(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
     """Return the rows of a structured array as mappings."""
     names = table.dtype.names or ()
     return [dict(zip(names, row.tolist(), strict=True)) for row in table]
 
 
-def plain(value: Any) -> Any:
+def to_plain(value: Any) -> Any:
     """Return a value that JSON supports: lists for arrays, null for NaN and infinity."""
     if isinstance(value, Mapping):
-        return {key: plain(entry) for key, entry in value.items()}
+        return {key: to_plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
+        return [to_plain(entry) for entry in value]
     if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
+        return to_plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
@@ -234,11 +236,11 @@ def plain(value: Any) -> Any:
 
 def to_json(result: Mapping[str, Any]) -> str:
     """Return a result as JSON, NaN and infinity as null."""
-    return json.dumps(plain(result), indent=2, allow_nan=False)
+    return json.dumps(to_plain(result), indent=2, allow_nan=False)
 
 
 @contextlib.contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
+def atomic_file(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path that replaces the file on success: complete, on the disk, or not at all.
 
     Devices and pipes are written directly. If writing fails, an `OutputError` contains the reason, and the previous
@@ -278,7 +280,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
     """Write a binary file, completely or not at all."""
-    with whole_file(path) as temporary:
+    with atomic_file(path) as temporary:
         temporary.write_bytes(content)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.core.arrays import Flags, Floats, Integers, select_evenly
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
 from rocking.dynamics.maps import StroboscopicMap, parts_of
 from rocking.dynamics.orbits import multipliers_at, sizes_of
@@ -59,7 +59,7 @@ class Attractor:
         """Description in words."""
         if self.impacts == 0 and np.all(self.states[:, 1] == 0.0):
             return "rest"
-        return f"period {self.period}, {'rest' if self.rests else counted(self.impacts, 'impact')}"
+        return f"period {self.period}, {'rest' if self.rests else format_count(self.impacts, 'impact')}"
 
 
 def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:

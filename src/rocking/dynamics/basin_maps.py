@@ -15,7 +15,7 @@ from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, variable
-from rocking.core.tables import as_written, counted, text_table
+from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.maps import StroboscopicMap, described, scale_of, sensible
 from rocking.engine.schemes import ChatteringScheme
@@ -77,8 +77,8 @@ class Basins(DatasetResult):
             for k in range(data.sizes["attractor"])
         ]
         cells = data.outcome.size
-        head = f"basins of {data.body} under {data.motion}: {cells} cells, {counted(data.most_periods, 'period')}"
-        return f"{head}\n\n{text_table(['attractor', 'share', 'standard error', 'multiplier'], rows)}"
+        head = f"basins of {data.body} under {data.motion}: {cells} cells, {format_count(data.most_periods, 'period')}"
+        return f"{head}\n\n{format_table(['attractor', 'share', 'standard error', 'multiplier'], rows)}"
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
@@ -117,7 +117,7 @@ class Basins(DatasetResult):
             orbits=np.stack([data.orbit_coordinate.values, data.orbit_velocity.values], axis=-1),
             x_label=f"{x.name} at the start of a period ({x.units})",
             y_label=f"{str(v.name).replace('_', ' ')} ({v.units})",
-            title=title or as_written(f"{data.body} under {data.motion}, {data.model} model"),
+            title=title or escape_dollars(f"{data.body} under {data.motion}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )

@@ -16,8 +16,8 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, Result, table_of_some, variable
-from rocking.core.tables import as_written, counted
+from rocking.core.result import DatasetResult, Result, format_some_rows, variable
+from rocking.core.tables import escape_dollars, format_count
 from rocking.core.threads import map_in_threads
 from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.bodies import LinearBody
@@ -84,7 +84,7 @@ class BifurcationDiagram(DatasetResult):
 
     def summary(self) -> str:
         data = self.data
-        head = f"bifurcation diagram over {data.parameter}: {counted(data.sizes['value'], 'value')}, {data.cases}"
+        head = f"bifurcation diagram over {data.parameter}: {format_count(data.sizes['value'], 'value')}, {data.cases}"
         parts = [head]
         for way in data.direction.values.tolist():
             for start in range(data.sizes["start"]):
@@ -96,7 +96,7 @@ class BifurcationDiagram(DatasetResult):
                 period = int(data.period.sel(direction=way).values[0, start])
                 said = f"{'period ' if period >= 0 else ''}{_in_words(period)} throughout"
                 if rows:
-                    said = f"changes of the period\n{table_of_some(['from', 'to', 'before', 'after'], rows)}"
+                    said = f"changes of the period\n{format_some_rows(['from', 'to', 'before', 'after'], rows)}"
                 parts.append(f"{which}: {said}")
         return "\n\n".join(parts)
 
@@ -131,9 +131,9 @@ class BifurcationDiagram(DatasetResult):
             },
             overturned=over,
             not_followed=(data.period.values < 0).all(axis=(0, 2)) & ~over,
-            x_label=as_written(data.parameter.replace("_", " ")),
+            x_label=escape_dollars(data.parameter.replace("_", " ")),
             y_label=f"{data.coordinate.attrs['long_name']} ({data.coordinate.units})",
-            title=title or as_written(data.cases),
+            title=title or escape_dollars(data.cases),
             ax=ax,
             figsize=figsize,
         )
@@ -380,7 +380,7 @@ class LyapunovExponents(Result):
     stretches: Floats
 
     def summary(self) -> str:
-        over = f"over {counted(self.n_periods, 'period')}"
+        over = f"over {format_count(self.n_periods, 'period')}"
         if np.isnan(self.largest):
             return f"no Lyapunov exponents: the body overturns or cannot be followed {over}"
         if np.isneginf(self.largest):

@@ -15,7 +15,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
 from rocking.core.result import Result
-from rocking.core.tables import Column, as_written, cell, counted, named, text_table
+from rocking.core.tables import Column, add_unit, escape_dollars, format_cell, format_count, format_table
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, peak_of, sizes_of
 from rocking.engine.schemes import ChatteringScheme
@@ -138,20 +138,18 @@ class Branch(Result):
         return orbit_at(StroboscopicMap(body, motion, self.model, self.chattering), self.states[index], self.period)
 
     def _headline(self) -> str:
-        impacts = "complete chattering" if math.isinf(self.impacts) else counted(int(self.impacts), "impact")
+        impacts = "complete chattering" if math.isinf(self.impacts) else format_count(int(self.impacts), "impact")
         low, high = float(self.values.min()), float(self.values.max())
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return (
-            f"orbits of {counted(self.period, 'period')} with {impacts}, {self.name} from {low:.6g} to {high:.6g}{unit}"
-        )
+        return f"orbits of {format_count(self.period, 'period')} with {impacts}, {self.name} from {low:.6g} to {high:.6g}{unit}"
 
     def summary(self) -> str:
         stable = self.is_stable
         lines = [self._headline(), f"{len(self)} points, {int(np.sum(stable))} of them stable"]
         if self.bifurcations:
-            header = ["bifurcation", named(self.name, self.unit), "multipliers"]
+            header = ["bifurcation", add_unit(self.name, self.unit), "multipliers"]
             rows = [[each.kind, f"{each.value:.12g}", _written(each.orbit.multipliers)] for each in self.bifurcations]
-            lines += ["", text_table(header, rows)]
+            lines += ["", format_table(header, rows)]
         return "\n".join([*lines, "", f"ends: {self.ends[0]}; {self.ends[1]}"])
 
     def to_dict(self) -> dict[str, Any]:
@@ -173,7 +171,7 @@ class Branch(Result):
 
     def _columns(self, table: str) -> list[Column]:
         if table == "bifurcations":
-            parameter, each = named(self.name, self.unit), self.bifurcations
+            parameter, each = add_unit(self.name, self.unit), self.bifurcations
             return [
                 Column("kind", [one.kind for one in each]),
                 Column(parameter, [one.value for one in each]),
@@ -228,7 +226,7 @@ class Branch(Result):
                 for each in places
             ],
             labels=(f"{self.name}{unit}", f"{what} ({coordinate.unit})"),
-            title=title or as_written(f"{body.description}, {headline.replace('^2', '²')}"),
+            title=title or escape_dollars(f"{body.description}, {headline.replace('^2', '²')}"),
             ax=ax,
             figsize=figsize,
         )
@@ -240,4 +238,4 @@ def _apart(lines: Sequence[NDArray[Any]]) -> Floats:
 
 
 def _written(multipliers: NDArray[np.complex128]) -> str:
-    return ", ".join(cell(float(each.real)) if each.imag == 0.0 else f"{each:.5g}" for each in multipliers)
+    return ", ".join(format_cell(float(each.real)) if each.imag == 0.0 else f"{each:.5g}" for each in multipliers)

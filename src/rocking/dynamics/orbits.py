@@ -14,8 +14,8 @@ from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
-from rocking.core.result import Result, Row, text_of
-from rocking.core.tables import Column, as_written, counted, named, plain
+from rocking.core.result import Result, Row, format_rows
+from rocking.core.tables import Column, add_unit, escape_dollars, format_count, to_plain
 from rocking.dynamics.bodies import LinearBody, in_positions
 from rocking.dynamics.maps import StroboscopicMap, is_mirrored, mean_size, scale_of
 from rocking.engine.schemes import ChatteringScheme
@@ -115,8 +115,8 @@ class PeriodicOrbit(Result):
         elif math.isinf(self.impacts):
             how = "with complete chattering"
         else:
-            how = f"with {counted(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
-        return f"{stable}{' symmetric' if self.symmetric else ''} orbit of {counted(self.period, 'period')} {how}"
+            how = f"with {format_count(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
+        return f"{stable}{' symmetric' if self.symmetric else ''} orbit of {format_count(self.period, 'period')} {how}"
 
     @property
     def _multipliers(self) -> str:
@@ -140,7 +140,7 @@ class PeriodicOrbit(Result):
             Row("velocity", f"{v:.12g}", f"{coordinate.unit}/s"),
             Row("multipliers", self._multipliers),
         ]
-        return text_of(rows, 20)
+        return format_rows(rows, 20)
 
     def to_dict(self) -> dict[str, Any]:
         coordinate = self.body.coordinate
@@ -151,9 +151,9 @@ class PeriodicOrbit(Result):
             "model": self.model,
             "period": self.period,
             "duration_s": self.duration,
-            named(coordinate.name, coordinate.unit): x,
-            named("velocity", f"{coordinate.unit}/s"): v,
-            "impacts": plain(self.impacts),
+            add_unit(coordinate.name, coordinate.unit): x,
+            add_unit("velocity", f"{coordinate.unit}/s"): v,
+            "impacts": to_plain(self.impacts),
             "complete_chattering": math.isinf(self.impacts),
             "rests": self.rests,
             "symmetric": self.symmetric,
@@ -192,7 +192,7 @@ class PeriodicOrbit(Result):
             impact_times=self.response.impacts["time"] / self._map.forcing_period,
             states=self.states,
             labels=(f"{coordinate.name} ({coordinate.unit})", f"velocity ({coordinate.unit}/s)"),
-            title=title or as_written(f"{self.body.description}, {self._kind}"),
+            title=title or escape_dollars(f"{self.body.description}, {self._kind}"),
             ax=ax,
             figsize=figsize,
         )

@@ -15,7 +15,7 @@ from rocking.block.body import Bodies
 from rocking.block.single import ROTATION
 from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import Model
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
 from rocking.engine.problem import ground_of, highest, set_start, settings_of, step_of
 from rocking.engine.schemes import ChatteringScheme
@@ -154,7 +154,7 @@ def require_finished(unfinished: bool) -> None:
 def missing_text(missing: Flags | int) -> str:
     """Return a sentence on the abandoned simulations, whose outcomes are missing; empty if there are none."""
     count = int(np.sum(missing))
-    return f"{counted(count, 'simulation')} given up after too many steps: outcomes missing" * (count > 0)
+    return f"{format_count(count, 'simulation')} given up after too many steps: outcomes missing" * (count > 0)
 
 
 def check_components(bodies: Bodies, motion: Motion | None) -> None:

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.core.tables import plain
+from rocking.core.tables import to_plain
 
 #: Placeholders of the page for texts.
 _PLACEHOLDER: Final = re.compile(r"\{([a-z]+\.[a-z_]+)\}")
@@ -40,7 +40,9 @@ def pack(payload: Payload) -> bytes:
     (0, b'{"a":1,"arrays":')
     """
     lengths = {name: values.size for name, values in payload.arrays.items()}
-    header = json.dumps({**plain(payload.header), "arrays": lengths}, separators=(",", ":"), allow_nan=False).encode()
+    header = json.dumps(
+        {**to_plain(payload.header), "arrays": lengths}, separators=(",", ":"), allow_nan=False
+    ).encode()
     header += b" " * (-(4 + len(header)) % 8)
     arrays = (np.ascontiguousarray(values, "<f8").tobytes() for values in payload.arrays.values())
     return b"".join([struct.pack("<I", len(header)), header, *arrays])

@@ -22,7 +22,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from rocking.core.tables import plain
+from rocking.core.tables import to_plain
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer import assessment, maps, periodic, readings
 from rocking.explorer.catalogue import list_records, read_entries
@@ -244,7 +244,7 @@ class App:
             if isinstance(result, Download):
                 headers = {**_NO_STORE, "content-disposition": f"attachment; filename=rocking-response.{result.form}"}
                 return Response(result.content, media_type=EXPORTS[result.form], headers=headers)
-            return JSONResponse(plain(result), headers=_NO_STORE)
+            return JSONResponse(to_plain(result), headers=_NO_STORE)
 
         return respond
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.tables import decimal
+from rocking.core.tables import round_decimal
 from rocking.errors import InvalidOption, literal
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import ACCELERATION_UNITS, TIME_UNITS, Unit, normalise_spelling
@@ -198,7 +198,7 @@ def read_scaling(
 
 def _round_decimals(numbers: Floats) -> Floats:
     """Round numbers to their usual decimals: 0.3, not 0.30000000000000004."""
-    return np.array([decimal(value) for value in numbers])
+    return np.array([round_decimal(value) for value in numbers])
 
 
 def _split_unit(text: str) -> tuple[float | None, str]:

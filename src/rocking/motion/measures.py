@@ -13,7 +13,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.bisection import bisect
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.core.tables import named
+from rocking.core.tables import add_unit
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 
@@ -186,17 +186,17 @@ class MotionMeasures:
         Spectral accelerations (5 % damping) are added for `periods`, s.
         """
         values = {
-            named("duration", "s"): self.duration,
-            named("pga", "m/s^2"): self.pga,
-            named("pgv", "m/s"): self.pgv,
-            named("pgd", "m"): self.pgd,
-            named("arias_intensity", "m/s"): self.arias_intensity,
-            named("cumulative_absolute_velocity", "m/s"): self.cumulative_absolute_velocity,
-            named("significant_duration_5_75", "s"): self.significant_duration(0.05, 0.75),
-            named("significant_duration_5_95", "s"): self.significant_duration(0.05, 0.95),
+            add_unit("duration", "s"): self.duration,
+            add_unit("pga", "m/s^2"): self.pga,
+            add_unit("pgv", "m/s"): self.pgv,
+            add_unit("pgd", "m"): self.pgd,
+            add_unit("arias_intensity", "m/s"): self.arias_intensity,
+            add_unit("cumulative_absolute_velocity", "m/s"): self.cumulative_absolute_velocity,
+            add_unit("significant_duration_5_75", "s"): self.significant_duration(0.05, 0.75),
+            add_unit("significant_duration_5_95", "s"): self.significant_duration(0.05, 0.95),
         }
         for period in np.ravel(checks.numbers(periods, "periods of a spectral acceleration", InvalidMotion)).tolist():
-            values[named(f"spectral_acceleration_{period:g}s", "m/s^2")] = self.spectral_acceleration(period)
+            values[add_unit(f"spectral_acceleration_{period:g}s", "m/s^2")] = self.spectral_acceleration(period)
         return values
 
 

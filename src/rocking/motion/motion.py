@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.core.tables import as_written
+from rocking.core.tables import escape_dollars
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 from rocking.motion.description import Description, compose_label
@@ -255,7 +255,7 @@ class Motion(Processable):
             time=times,
             acceleration_g=self.acceleration(times) / STANDARD_GRAVITY,
             vertical_g=None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY,
-            title=title or as_written(self.label),
+            title=title or escape_dollars(self.label),
             ax=ax,
             figsize=figsize,
         )

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.core.tables import named
+from rocking.core.tables import add_unit
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
 
@@ -103,7 +103,7 @@ class Measure:
     @property
     def column(self) -> str:
         """Name with units for a table."""
-        return named(self.name, self.units)
+        return add_unit(self.name, self.units)
 
     @property
     def scale(self) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack
 import numpy as np
 
 from rocking.core.arrays import Flags, Floats, select_evenly
-from rocking.core.tables import as_written
+from rocking.core.tables import escape_dollars
 from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, page_for, scale_by_ratio, styles_of
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def fragility_figure(
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
             axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
-            axes.plot(line.intensity, line.probability, linewidth=1.5, label=as_written(line.label), **style)
+            axes.plot(line.intensity, line.probability, linewidth=1.5, label=escape_dollars(line.label), **style)
             # Every limit state has its own marker.
             axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
         is_bounded = any(np.any(line.lower < line.upper) for line in lines)
@@ -108,7 +108,7 @@ def risk_figure(
             _draw_hazard(axes, intensity, hazard)
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
-            shares.plot(intensity, line.share, linewidth=1.5, label=as_written(line.label), **style)
+            shares.plot(intensity, line.share, linewidth=1.5, label=escape_dollars(line.label), **style)
             shares.fill_between(intensity, 0.0, line.share, color=style["color"], alpha=0.12, linewidth=0.0)
         shown = _inside(intensity, hazard.known)
         for line in lines:
@@ -212,7 +212,7 @@ def spectrum_figure(
     with page_for((5.6, 4.8), **place) as page:
         peaks, *shares = panels = page.panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
         for k, (style, curve) in enumerate(zip(styles_of(len(curves)), curves, strict=True)):
-            peaks.plot([], [], linewidth=1.4, label=as_written(curve.label) if k in named else "", **style)
+            peaks.plot([], [], linewidth=1.4, label=escape_dollars(curve.label) if k in named else "", **style)
             if with_singles:
                 singles = np.where(np.isfinite(curve.singles), curve.singles, np.nan)
                 peaks.plot(x, singles.T, color=style["color"], linewidth=0.5, alpha=0.35)
@@ -269,7 +269,7 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
     More than four motions are drawn in one style, with the fractiles of the levels that reach a peak rotation.
     """
     few = len(motions) <= len(CURVES)
-    names = [as_written(motion.label) for motion in motions]
+    names = [escape_dollars(motion.label) for motion in motions]
     if few and len(motions) > 1:
         names = [f"{k}: {name}" for k, name in enumerate(names, start=1)]
     stands = np.concatenate([motion.levels[np.isfinite(motion.peak)] for motion in motions])

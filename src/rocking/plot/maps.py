@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.core.arrays import Floats
-from rocking.core.tables import as_written
+from rocking.core.tables import escape_dollars
 from rocking.errors import InvalidOption
 from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Place, add_labels, cell_edges, page_for, styles_of
 
@@ -216,7 +216,7 @@ def blocks_figure(
                 each.scatter(p[~there], degrees[~there], marker="x", **size, **look)
             add_labels(each, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
-                each.set_title(as_written(name), color=INK)
+                each.set_title(escape_dollars(name), color=INK)
         page.figure.colorbar(marks, ax=page.drawn, label=value_label, shrink=0.9)
     return page.figure
 
@@ -300,7 +300,7 @@ def shares_figure(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **p
         (axes,) = page.panels()
         _look_down(axes, 1.0)
         for share, label, style in zip(shares, labels, styles_of(len(labels)), strict=True):
-            look = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": as_written(label), **style}
+            look = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": escape_dollars(label), **style}
             axes.plot(*_around(azimuth, share), **look)
         add_labels(axes, "share towards west and east", "share towards south and north")
     return page.figure

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.core.tables import decimal, named, text_table
+from rocking.core.tables import add_unit, format_table, round_decimal
 from rocking.errors import InvalidMotion, InvalidOption, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
@@ -198,7 +198,7 @@ class Contents:
         columns = list(self.entries[0])
         # A missing value is the step of unevenly spaced samples.
         rows = [["uneven" if value is None else value for value in entry.values()] for entry in self.entries]
-        return "\n\n".join(filter(None, (self.title, text_table(columns, rows))))
+        return "\n\n".join(filter(None, (self.title, format_table(columns, rows))))
 
     def __repr__(self) -> str:
         names = ", ".join(str(entry["name"]) for entry in self.entries)
@@ -292,8 +292,8 @@ def contents(
 
 def _tabulate_motion(motion: Motion) -> dict[str, Any]:
     return {
-        named("step", "s"): motion.dt,
-        named("duration", "s"): motion.duration,
-        named("pga", "g"): decimal(motion.pga / STANDARD_GRAVITY),
-        named("pgv", "m/s"): motion.pgv,
+        add_unit("step", "s"): motion.dt,
+        add_unit("duration", "s"): motion.duration,
+        add_unit("pga", "g"): round_decimal(motion.pga / STANDARD_GRAVITY),
+        add_unit("pgv", "m/s"): motion.pgv,
     }

@@ -12,7 +12,7 @@ import numpy as np
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.core.tables import as_written
+from rocking.core.tables import escape_dollars
 from rocking.engine.problem import thresholds_of
 from rocking.errors import InvalidOption
 from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Page, Place, add_labels, add_ticks, page_for, write
@@ -42,7 +42,7 @@ _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle
 def titled(response: Simulated) -> str:
     """Return the title of a figure: the body and its motion."""
     shaken = "no motion" if response.motion is None else response.motion.label
-    return as_written(f"{response.block.description} under {shaken}")
+    return escape_dollars(f"{response.block.description} under {shaken}")
 
 
 def active_span(response: Simulated) -> tuple[float, float]:

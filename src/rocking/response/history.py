@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisect, find_middles, halve
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
@@ -46,7 +46,7 @@ class Solution(NamedTuple):
     again: Callable[[float], Any]  # repeats the simulation with the motion and the start multiplied by a factor
 
     def __repr__(self) -> str:
-        return f"<Solution: {counted(len(self.trail.nodes), 'node')}>"
+        return f"<Solution: {format_count(len(self.trail.nodes), 'node')}>"
 
 
 @dataclass(frozen=True, eq=False)

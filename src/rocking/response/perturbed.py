@@ -13,7 +13,7 @@ from rocking.block.body import Coordinate
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.result import Result
-from rocking.core.tables import Column, records_of, text_of_columns
+from rocking.core.tables import Column, columns_to_records, format_columns
 from rocking.errors import InvalidOption
 
 #: Relative step and number of factors in summaries and tables.
@@ -168,11 +168,11 @@ class Perturbed(Result):
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the rows of `to_dataframe` as mappings, with units in the names."""
-        return records_of(self._columns("repeats"))
+        return columns_to_records(self._columns("repeats"))
 
     def summary(self) -> str:
         away = Column("away", [f"{factor - 1.0:+.2g}" for factor in self.factors], label="factor - 1")
-        return f"{self.sentence()}\n\n{text_of_columns([away, *self._columns('repeats')])}"
+        return f"{self.sentence()}\n\n{format_columns([away, *self._columns('repeats')])}"
 
     def to_dict(self) -> dict[str, Any]:
         return {

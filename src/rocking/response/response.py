@@ -12,8 +12,8 @@ import numpy as np
 from rocking.block import RestrainedBlock
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.result import Row, dictionary_of, text_of
-from rocking.core.tables import Column, frame_of, named, records_of, write_csv, write_netcdf
+from rocking.core.result import Row, format_rows, rows_to_dict
+from rocking.core.tables import Column, add_unit, columns_to_frame, columns_to_records, write_csv, write_netcdf
 from rocking.errors import InvalidOption
 from rocking.response import figure, summary
 from rocking.response.figure import RotationUnits
@@ -98,10 +98,11 @@ class Response(Simulated):
         body, motion, limit = self.block, self.motion, self.block.coordinate.limit
         shaken = motion and {
             "name": motion.name,
-            named("duration", "s"): motion.duration,
-            named("pga", "m/s^2"): motion.pga,
+            add_unit("duration", "s"): motion.duration,
+            add_unit("pga", "m/s^2"): motion.pga,
             "history": motion.history,
-            "vertical": motion.vertical and {"name": motion.vertical.name, named("pga", "m/s^2"): motion.vertical.pga},
+            "vertical": motion.vertical
+            and {"name": motion.vertical.name, add_unit("pga", "m/s^2"): motion.vertical.pga},
         }
         rows = [Row("block", {"description": body.description, **self._parameters()}), Row("motion", shaken)]
         rows += self._outcome_rows()
@@ -109,7 +110,7 @@ class Response(Simulated):
             rows.append(Row(f"peak_over_{limit}", self.peak_over_slenderness))
         if isinstance(body, RestrainedBlock):
             rows.append(Row("balance", list(self.balance), body.coordinate.unit))
-            rows.append(Row("tendons", records_of(self._structured("tendons"))))
+            rows.append(Row("tendons", columns_to_records(self._structured("tendons"))))
         rows.append(Row("peak_time", self.peak_time, "s"))
         if body.contact is not None:
             rows.append(Row("required_friction", self.required_friction))
@@ -126,14 +127,14 @@ class Response(Simulated):
             Row("perturbed", near),
             Row("ambiguous", self.ambiguous),
             Row("ambiguities", self.ambiguities),
-            Row("events", records_of(self._structured("events"))),
-            Row("sequences", records_of(self._structured("sequences"))),
+            Row("events", columns_to_records(self._structured("events"))),
+            Row("sequences", columns_to_records(self._structured("sequences"))),
         ]
 
     def _parameters(self) -> dict[str, Any]:
         of_body = self.block.alone().parameters().items()
-        gravity = {named("gravity", "m/s^2"): self.block.gravity}
-        return {named(name, unit): values[0].tolist() for name, (values, unit) in of_body} | gravity
+        gravity = {add_unit("gravity", "m/s^2"): self.block.gravity}
+        return {add_unit(name, unit): values[0].tolist() for name, (values, unit) in of_body} | gravity
 
     def _outcome_rows(self) -> list[Row]:
         name, unit = self.block.coordinate.name, self.block.coordinate.unit
@@ -163,14 +164,14 @@ class Response(Simulated):
         initial state) scaled by 1, 1 +- 1e-6 and 1 +- 3e-6, at most nine decimals and six digits. If the times differ
         by a millisecond, or the peaks in the third digit, their range is reported. See `Response.perturbed`.
         """
-        return text_of(self.summary_rows(friction, precision=precision), _WIDTH)
+        return format_rows(self.summary_rows(friction, precision=precision), _WIDTH)
 
     def to_dict(self, friction: float | None = None, *, precision: float = PRECISION) -> dict[str, Any]:
         """Return the result as plain values, as printed by ``rocking simulate --json``; arguments as of `summary`.
 
         Names contain units. Numbers that are not finite are None.
         """
-        return dictionary_of(self.facts(friction, precision=precision))
+        return rows_to_dict(self.facts(friction, precision=precision))
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
         """Return time histories and events as a dataset. Its ``to_dataframe`` multiplies all dimensions.
@@ -196,7 +197,10 @@ class Response(Simulated):
             "motion": "none" if motion is None else motion.name,
             "vertical_motion": "none" if motion is None or motion.vertical is None else motion.vertical.name,
             "motion_history": "" if motion is None else "; ".join(motion.history),
-            **{named(row.name, row.unit): int(row.value) if isinstance(row.value, bool) else row.value for row in rows},
+            **{
+                add_unit(row.name, row.unit): int(row.value) if isinstance(row.value, bool) else row.value
+                for row in rows
+            },
         }
         return xr.Dataset(variables, {"time": ("time", time.values, {"units": "s"})}, attributes)
 
@@ -253,7 +257,7 @@ class Response(Simulated):
         Histories contain rotation, angular velocity and ground acceleration, indexed by ``time_s``, at steps `dt` as
         of `to_xarray`.
         """
-        frame = frame_of(self._columns(table or "histories", dt))
+        frame = columns_to_frame(self._columns(table or "histories", dt))
         return frame.set_index("time_s") if table in (None, "histories") else frame
 
     def to_netcdf(self, path: str | Path, dt: float | None = None) -> None:
@@ -262,7 +266,7 @@ class Response(Simulated):
 
     def to_csv(self, path: str | Path, table: str | None = None, *, dt: float | None = None) -> None:
         """Write a table of `to_dataframe` as text columns with a header, as `Result.to_csv`."""
-        write_csv(path, frame_of(self._columns(table or "histories", dt)))
+        write_csv(path, columns_to_frame(self._columns(table or "histories", dt)))
 
     def plot(
         self,

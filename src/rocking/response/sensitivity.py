@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
@@ -136,8 +136,8 @@ class Sensitivity:
         event = np.max(np.abs(self.events["motion"]), initial=0.0)
         return (
             f"<Sensitivity: 0.1 % more of the motion changes the peak by {1e-3 * self.peak['motion'][0]:.2g} rad and "
-            f"the times of {counted(len(self.events), 'event')} by up to {1e-3 * event:.2g} s; "
-            f"{counted(len(self.impacts), 'impact')}>"
+            f"the times of {format_count(len(self.events), 'event')} by up to {1e-3 * event:.2g} s; "
+            f"{format_count(len(self.impacts), 'impact')}>"
         )
 
 

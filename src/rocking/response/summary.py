@@ -11,7 +11,7 @@ from rocking.block import Block, RestrainedBlock
 from rocking.block.sides import in_line
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Row
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.engine.problem import thresholds_of
 from rocking.response.perturbed import percent, steps_within
 from rocking.response.simulated import Simulated
@@ -95,7 +95,7 @@ def line(response: Simulated) -> str:
     return (
         f"{response.block.description} under {'no motion' if motion is None else motion.label}: "
         f"{in_words(response, f'{response.overturn_time:.4f} s')}{peak}; "
-        f"{counted(len(response.events), 'event')}, {counted(len(response.impacts), 'impact')} resolved, "
+        f"{format_count(len(response.events), 'event')}, {format_count(len(response.impacts), 'impact')} resolved, "
         f"{response.duration:.5g} s"
     )
 
@@ -216,7 +216,7 @@ def _event_rows(response: Simulated) -> list[Row]:
             rows.append(Row(kind, text, note=side))
     if left := len(response.events) - len(rows):
         differ = "" if len(rows) == _LISTED else f", not the same in all {len(near.repeats)} {near.scaled}"
-        rows.append(Row("...", f"{counted(left, 'more event')}{differ}"))
+        rows.append(Row("...", f"{format_count(left, 'more event')}{differ}"))
     return rows or [Row("uplift", "none")]
 
 
@@ -267,7 +267,7 @@ def _outcome(response: Simulated) -> str:
     elif response.unfinished or response.stopped:
         text += f"; {in_words(response, '')}"
     if response.rests_by_rounding:
-        text += f"; {counted(response.rests_by_rounding, 'rest')} not proven"
+        text += f"; {format_count(response.rests_by_rounding, 'rest')} not proven"
     if response.ambiguous:
         affected = " and ".join(_AFFECTED[name] for name in response.ambiguities)
         text += f"; AMBIGUOUS: one unit in the last place of the input changes {affected}"

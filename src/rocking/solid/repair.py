@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.core.tables import counted
+from rocking.core.tables import format_count
 from rocking.errors import InvalidBlock
 
 if TYPE_CHECKING:
@@ -54,7 +54,9 @@ def merge_corners(name: str, vertices: Floats, faces: Integers) -> Surface:
             path=name,
         )
     removed_count = len(faces) - len(valid)
-    repairs = (f"{counted(removed_count, 'face')} without area, or there twice, left out",) if removed_count else ()
+    repairs = (
+        (f"{format_count(removed_count, 'face')} without area, or there twice, left out",) if removed_count else ()
+    )
     return Surface(vertices[first], valid, repairs)
 
 
@@ -113,7 +115,7 @@ def _describe_repairs(cavities: Floats, is_flipped: Flags) -> Iterator[str]:
         count_text = "1 cavity" if len(cavities) == 1 else f"{len(cavities)} cavities"
         yield f"{count_text} of {cavities.sum():.3g} m^3 taken as hollow"
     if is_flipped.any() and not is_flipped.all():
-        yield f"{counted(int(is_flipped.sum()), 'separate surface')} turned inside out"
+        yield f"{format_count(int(is_flipped.sum()), 'separate surface')} turned inside out"
 
 
 def _list_edges(faces: Integers) -> Integers:
@@ -162,7 +164,7 @@ def fill_holes(surface: Surface) -> Surface:
     patches = np.column_stack([edges, len(vertices) + hole[index.reshape(-1, 2)[:, 0]]])
     area, old_area = _compute_area(all_vertices, patches), _compute_area(vertices, faces)
     share = 100.0 * area / (area + old_area)
-    repair = f"{counted(count, 'hole')} filled, {area:.3g} m^2 or {share:.2g} % of the surface"
+    repair = f"{format_count(count, 'hole')} filled, {area:.3g} m^2 or {share:.2g} % of the surface"
     return Surface(all_vertices, np.vstack([faces, patches]), (*repairs, repair))
 
 
@@ -290,7 +292,7 @@ def describe_overlaps(names: Sequence[str], surfaces: Sequence[Surface]) -> tupl
         f"{f'{first} and {second}' if first != second else f'two pieces of {first}'} overlap in about {common:.2g} m^3"
         for common, first, second in overlaps[:3]
     ]
-    more = f", and {counted(len(overlaps) - 3, 'more pair')}" if len(overlaps) > 3 else ""
+    more = f", and {format_count(len(overlaps) - 3, 'more pair')}" if len(overlaps) > 3 else ""
     return (
         f"{', '.join(texts)}{more}, which is counted twice: make one surface of the two, cut one out of the other, or, "
         "if one is a cavity, turn its normals inwards",

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.core.tables import as_written, decimal
+from rocking.core.result import DatasetResult, format_some_rows, variable
+from rocking.core.tables import escape_dollars, round_decimal
 from rocking.errors import InvalidOption
 from rocking.solid import support as polygons
 
@@ -74,7 +74,7 @@ class Rose(DatasetResult):
             [
                 self._headline(),
                 "",
-                table_of_some([*titles.values()], rows),
+                format_some_rows([*titles.values()], rows),
                 "",
                 "planar rocking leaves out turning about the vertical and rolling over corners: over all azimuths "
                 f"products of inertia are up to {largest['coupling']:.2g} of the moment, pivots lie up to "
@@ -110,7 +110,7 @@ class Rose(DatasetResult):
             p=data.p.values,
             support=np.column_stack([data.east.values, data.north.values]) / data.height_of_mass,
             weakest=(data.weakest_azimuth, data.weakest_acceleration),
-            title=title or as_written(self._headline()),
+            title=title or escape_dollars(self._headline()),
             ax=ax,
             figsize=figsize,
         )
@@ -123,7 +123,7 @@ def check_azimuths(azimuths: ArrayLike | None) -> Floats:
     angles = np.atleast_1d(checks.numbers(azimuths, "azimuths", InvalidOption))
     if angles.ndim != 1 or not angles.size or not np.all(np.isfinite(angles)):
         raise InvalidOption("{} must be one finite number or more, degrees clockwise from north", "azimuths")
-    return np.unique([decimal(value) % 360.0 for value in np.mod(angles, 360.0).tolist()])
+    return np.unique([round_decimal(value) % 360.0 for value in np.mod(angles, 360.0).tolist()])
 
 
 def compute_rose(

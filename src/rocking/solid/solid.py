@@ -15,8 +15,8 @@ from rocking.block.sides import checked_gravity, checked_mass
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.core.result import Result, Row, dictionary_of, text_of
-from rocking.core.tables import counted
+from rocking.core.result import Result, Row, format_rows, rows_to_dict
+from rocking.core.tables import format_count
 from rocking.errors import InvalidBlock
 from rocking.solid import support as polygons
 from rocking.solid.mesh import Region, compute_properties
@@ -266,7 +266,7 @@ class Solid(Result):
             Row("centre of mass", f"{self.centre[2]:.5g} m high, at {east:.4g} m east, {north:.4g} m north"),
             Row("radii of gyration", "about axes to the east, to the north and up "
                 + ", ".join(f"{radius:.4g} m" for radius in radii)),
-            Row("support", f"{counted(len(self.support), 'corner')}, {sizes[0]:.4g} m by {sizes[1]:.4g} m, "
+            Row("support", f"{format_count(len(self.support), 'corner')}, {sizes[0]:.4g} m by {sizes[1]:.4g} m, "
                 f"{polygons.compute_area(self.support):.4g} m^2"),
             Row("least resistance", f"towards {self.weakest_azimuth:.4g} deg: lifted at {row['acceleration']:.4g} g, "
                 f"alpha {row['alpha']:.4g} rad, p {row['p']:.4g} rad/s"),
@@ -275,7 +275,7 @@ class Solid(Result):
             *(Row("repaired", sentence) for sentence in self.repairs),
             *(Row("note", sentence) for sentence in self.notes),
         ]  # fmt: skip
-        return f"{self._headline()}\n\n{text_of(rows, 22)}"
+        return f"{self._headline()}\n\n{format_rows(rows, 22)}"
 
     def to_dict(self) -> dict[str, Any]:
         rows = [
@@ -290,9 +290,9 @@ class Solid(Result):
         ]
         return {
             "description": self.description,
-            **dictionary_of(rows),
+            **rows_to_dict(rows),
             "regions": [
-                dictionary_of([Row("name", name), Row("volume", volume, "m^3"), Row("density", density, "kg/m^3")])
+                rows_to_dict([Row("name", name), Row("volume", volume, "m^3"), Row("density", density, "kg/m^3")])
                 for name, volume, density in self.regions
             ],
             "repairs": [*self.repairs],

@@ -14,7 +14,7 @@ from rocking.block import Blocks, Restraint
 from rocking.block.body import Bodies
 from rocking.core import checks
 from rocking.core.progress import note
-from rocking.core.tables import counted, csv_rows
+from rocking.core.tables import format_count, read_csv_rows
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import InvalidMotion, InvalidOption, StudyError, UnreadableRecord
 from rocking.inputs import quantities
@@ -222,7 +222,7 @@ def _pulses(tables: Tables, k: int) -> list[Motion]:
 
 def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
     try:
-        rows = csv_rows(file.read_text("utf-8-sig"))
+        rows = read_csv_rows(file.read_text("utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is no text table in UTF-8; save it as CSV"
         raise tables.create_error("blocks", "csv", f"{file} cannot be read: {why}") from None
@@ -238,7 +238,9 @@ def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
     for line, row in rows[1:]:
         with locate_errors(file, line):
             if len(row) != len(headings):
-                raise StudyError(f"{counted(len(row), 'cell')} under {counted(len(headings), 'column')}; correct it")
+                raise StudyError(
+                    f"{format_count(len(row), 'cell')} under {format_count(len(headings), 'column')}; correct it"
+                )
             cells = dict(zip(headings, row, strict=True))
             texts = {name: ",".join(cells[name + end] for end in _SIDES if name + end in cells) for name in BLOCK}
             given = {name: cells.get(name, text) for name, text in texts.items()}

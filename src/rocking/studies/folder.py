@@ -20,7 +20,7 @@ import rocking.dynamics.bodies  # noqa: F401 -- registers its kinds
 from rocking.block.body import KINDS
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.tables import counted, write_bytes
+from rocking.core.tables import format_count, write_bytes
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import DamagedStudy, OutputError, StudyError
 from rocking.motion.description import Description
@@ -106,7 +106,7 @@ class Store:
             listed = ", ".join(parts[:3]) + (" and more" if len(parts) > 3 else "")
             raise StudyError(
                 f"this holds a study of other inputs ({listed} changed), {len(self.done())} of "
-                f"{counted(len(self.grid), 'unit')} done: create this one elsewhere, or remove that one",
+                f"{format_count(len(self.grid), 'unit')} done: create this one elsewhere, or remove that one",
                 path=str(self.folder),
             )
 

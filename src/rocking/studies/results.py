@@ -35,8 +35,15 @@ from rocking.block.body import Bodies
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, select_evenly, split_range
 from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.core.tables import as_written, columns_of, counted, frame_of, records_of, whole_file
+from rocking.core.result import DatasetResult, format_some_rows, variable
+from rocking.core.tables import (
+    atomic_file,
+    columns_to_frame,
+    columns_to_records,
+    dataset_to_columns,
+    escape_dollars,
+    format_count,
+)
 from rocking.engine.problem import slenderness_of
 from rocking.engine.tasks import OUTCOME, missing_text
 from rocking.errors import InvalidOption, StudyError, Unfitted, install
@@ -130,10 +137,10 @@ def write_table(kind: str, path: str | Path, dataset: xr.Dataset, step: int) -> 
 
         def frames() -> Iterator[pd.DataFrame]:
             for part in split_range(count, step):
-                yield frame_of(columns_of(table.isel({along: part}).load()))
+                yield columns_to_frame(dataset_to_columns(table.isel({along: part}).load()))
                 bar.advance(part.stop - part.start)
 
-        with whole_file(path) as beside:
+        with atomic_file(path) as beside:
             (_write_csv if kind == "csv" else _write_parquet)(frames(), beside)
 
 
@@ -268,8 +275,8 @@ class BlockTable(DatasetResult):
 
     def summary(self) -> str:
         columns = [one for one in self._columns("blocks") if one.name != "fault"]  # too long for a table
-        rows = records_of(columns)
-        table = table_of_some([column.key for column in columns], [[*row.values()] for row in rows])
+        rows = columns_to_records(columns)
+        table = format_some_rows([column.key for column in columns], [[*row.values()] for row in rows])
         return f"{self.data.description}\n\n{table}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -308,7 +315,7 @@ class BlockTable(DatasetResult):
             panels={names[k]: shown[k] for k in select_evenly(len(names), 4)},
             value_label=label,
             missing_label=missing,
-            title=title or as_written(self.data.description),
+            title=title or escape_dollars(self.data.description),
             ax=ax,
             figsize=figsize,
         )
@@ -360,7 +367,9 @@ def study_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
             bar.advance(blocks.stop - blocks.start)
     words = "peak rotation over the slenderness, infinite where that share overturns"
     left_out = missing_text(missing)
-    text = f"fractiles of peak rotation over slenderness, {counted(len(product.motions), 'motion')}, {product.model} "
+    text = (
+        f"fractiles of peak rotation over slenderness, {format_count(len(product.motions), 'motion')}, {product.model} "
+    )
     return BlockTable(
         xr.Dataset(
             {
@@ -406,7 +415,7 @@ def pooled_fragility(
         fitted_curve(name, (x[found], count[found], trials[found]), groups[found], confidence, measure, limits[name])
         for name, count in counts.items()
     ]
-    text = f"{pooled(bodies, weights)}, {motions_in_words(together, clusters)}, {counted(scales, 'scale')}"
+    text = f"{pooled(bodies, weights)}, {motions_in_words(together, clusters)}, {format_count(scales, 'scale')}"
     return Fragility(
         tuple(curves),
         measure,
@@ -476,8 +485,8 @@ def block_fragilities(
                         values[i, j] = number
                     bar.advance()
     dims, without, left_out = ("limit_state", "block"), np.count_nonzero(faults != ""), missing_text(missing)
-    text = f"fragility of {counted(len(bodies), 'block')}; intensity: {measure.quantity}"
-    text += f"; {counted(int(without), 'curve')} cannot be fitted (fault says why)" if without else ""
+    text = f"fragility of {format_count(len(bodies), 'block')}; intensity: {measure.quantity}"
+    text += f"; {format_count(int(without), 'curve')} cannot be fitted (fault says why)" if without else ""
     about = {"confidence": confidence, "model": product.model, "measure": measure.name, **measure.options()}
     return BlockTable(
         xr.Dataset(

@@ -29,7 +29,7 @@ from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
-from rocking.core.tables import counted, write_netcdf
+from rocking.core.tables import format_count, write_netcdf
 from rocking.core.threads import count_cores, thread_count
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption, RockingError, StudyError
@@ -74,8 +74,8 @@ class Status:
 
     def __str__(self) -> str:
         share = int(1000 * self.done / self.units) / 10  # rounded down, so that 100 % means all
-        done = f"{self.done} of {counted(self.units, 'unit')} done ({share:.1f} %)"
-        return f"{done}, {counted(self.simulations, 'simulation')} in all"
+        done = f"{self.done} of {format_count(self.units, 'unit')} done ({share:.1f} %)"
+        return f"{done}, {format_count(self.simulations, 'simulation')} in all"
 
 
 @dataclass(frozen=True)
@@ -102,10 +102,10 @@ class RunReport:
 
     def __str__(self) -> str:
         rate = self.simulations / self.seconds if self.seconds > 0.0 else 0.0
-        done = f"{counted(self.units, 'unit')}, {counted(self.simulations, 'simulation')}"
+        done = f"{format_count(self.units, 'unit')}, {format_count(self.simulations, 'simulation')}"
         text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
         if self.failed:
-            text += f"; {counted(len(self.failed), 'unit')} failed, the first: {next(iter(self.failed.values()))}"
+            text += f"; {format_count(len(self.failed), 'unit')} failed, the first: {next(iter(self.failed.values()))}"
         return text + ("; stopped, go on with another run" if self.stopped else "")
 
 
@@ -350,7 +350,7 @@ class Study:
 
     def __repr__(self) -> str:
         names = ("motion", "scale", "polarity", "block")
-        sizes = " x ".join(map(counted, self._store.grid.shape, names))
+        sizes = " x ".join(map(format_count, self._store.grid.shape, names))
         return f"<Study: {sizes}; {self.status}>"
 
 
@@ -471,7 +471,7 @@ def _run(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
                     except Exception as error:
                         why, kind = " ".join(str(error).split()), type(error).__name__
                         failed[name_of(key)] = why if isinstance(error, RockingError) else f"{kind}: {why}".rstrip(": ")
-                        bar.note(f"{counted(len(failed), 'unit')} failed")
+                        bar.note(f"{format_count(len(failed), 'unit')} failed")
                         continue
                     put(store.file_of(key), data)
                     units, simulations = units + 1, simulations + grid.simulations(key)
