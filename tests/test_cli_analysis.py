@@ -25,7 +25,7 @@ def test_spectrum_json_is_the_spectrum(run):
     result = json.loads(out)
     motions = [rocking.records.load(name) for name in (RECORD, OTHER)]
     dataset = rocking_spectrum(
-        rocking.Blocks.grid(alpha=[0.1, 0.2], p=quantities.read_values("1:4:5:log", "--p")), motions
+        rocking.Blocks.grid(alpha=[0.1, 0.2], p=quantities.read_array("1:4:5:log", "--p")), motions
     )
     assert result["motions"] == [RECORD, OTHER]
     assert result["axes"] == ["alpha", "p"]

@@ -582,7 +582,7 @@ def test_files_are_known_by_their_content_and_so_many_at_most():
         uploads.add_file("x", str(k).encode())
     with pytest.raises(UnreadableRecord, match="x: it cannot be kept: 120 files and 256 MiB are kept at most"):
         uploads.add_file("x", b"another")
-    assert uploads.add_file("c.txt", b"1 2 3") in uploads.kept() and len(uploads.kept()) == MAX_FILES
+    assert uploads.add_file("c.txt", b"1 2 3") in uploads.list_records() and len(uploads.list_records()) == MAX_FILES
     with pytest.raises(UnreadableRecord, match="may be 16 MiB large"):
         uploads.add_file("big", bytes(MAX_FILE_SIZE + 1))
 
@@ -918,7 +918,7 @@ def test_points_of_a_study_have_its_gravity_and_keep_each_motion_once(tmp_path):
     for scale, level in enumerate((1.0, 2.0, 3.0)):
         for polarity in (0, 1):
             at = {"x": "p", "y": "scale", "at_x": "3", "at_y": str(level), "polarity_index": str(polarity)}
-            texts = view.texts_at(at | {"fix_alpha": "0.2"}, uploads)
+            texts = view.point_to_texts(at | {"fix_alpha": "0.2"}, uploads)
             response = read_case(texts, uploads).simulate()
             chosen = np.flatnonzero((results.p == 3.0).values & (results.alpha == 0.2).values)[0]
             picked = results.isel(scale=scale, polarity=polarity, block=chosen, motion=0)
@@ -943,7 +943,7 @@ def test_levels_of_a_study_are_an_axis_in_increasing_order(tmp_path):
 def test_a_point_beside_a_study_is_refused(study, axis, at):
     if axis == "motion" or at in ("inf", "nan"):
         with pytest.raises(InvalidOption, match="at_x must be a") as caught:
-            study.texts_at({"x": axis, "y": "alpha", "at_x": at, "at_y": "0.2"}, UploadStore())
+            study.point_to_texts({"x": axis, "y": "alpha", "at_x": at, "at_y": "0.2"}, UploadStore())
         assert caught.value.argument == "at_x"
 
 
@@ -952,7 +952,7 @@ def test_a_point_of_a_study_has_the_polarity_that_is_chosen(study, motion):
     at = {"x": "p", "y": "alpha", "at_x": "3.5", "at_y": "0.2", "scale_index": "1", "motion_index": str(motion)}
     uploads = UploadStore()
     one, reversed_one = (
-        read_case(study.texts_at({**at, "polarity_index": str(k)}, uploads), uploads).motion for k in (0, 1)
+        read_case(study.point_to_texts({**at, "polarity_index": str(k)}, uploads), uploads).motion for k in (0, 1)
     )
     assert np.array_equal(reversed_one.coefficients, -one.coefficients)
     base = study.study.product.motions[motion]
@@ -992,7 +992,7 @@ def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
     expected = results.peak_rotation.isel(scale=2).transpose("block", "motion", ...).values.reshape(3, 2)
     assert np.array_equal(over_motions.arrays["values"].reshape(3, 2), expected)
     uploads = UploadStore()
-    texts = view.texts_at({"x": "block", "y": "motion", "at_x": "1", "at_y": "2", "scale_index": "2"}, uploads)
+    texts = view.point_to_texts({"x": "block", "y": "motion", "at_x": "1", "at_y": "2", "scale_index": "2"}, uploads)
     response = read_case(texts, uploads).simulate()
     assert response.peak_rotation == pytest.approx(over_motions.arrays["values"][1], rel=1e-12)
 

@@ -35,7 +35,7 @@ class Shown:
         if "from" in given:
             self.start, self.end = float(given["from"]), float(given["to"])
             self.window = explorer.window(self.texts, (self.start, self.end)).header["window"]
-            times = explorer.simulate(self.texts).resolved(self.start, self.end).impacts["time"]
+            times = explorer.simulate(self.texts).select_response(self.start, self.end).impacts["time"]
             self.impacts = times[(times > self.start) & (times < self.end)]
         if given.get("view") == "compare":
             other = {name[6:]: text for name, text in given.items() if name.startswith("other.")}

@@ -75,7 +75,7 @@ def test_the_page_reads_every_unit_as_the_program_does():
         kind = "acceleration" if parameter.name == "sa" else parameter.kind
         if kind == "text":
             continue
-        read = getattr(quantities, kind)
+        read = getattr(quantities, f"read_{kind}")
         suffix = described["suffix"] or ("" if parameter.unit != "Hz" else "Hz")
         for spelling, factor in described["units"].items():
             expected = read(f"0.7{spelling}", "x") / read(f"1{suffix}", "x")

@@ -172,7 +172,9 @@ def swept(sweep):
         shares.append(part.share)
         strides.append(part.stride)
         if part.stride == 1:
-            found |= {(part.direction, index): each for index, each in zip(part.indices, part.found, strict=True)}
+            found |= {
+                (part.direction, index): each for index, each in zip(part.indices, part.steady_states, strict=True)
+            }
     assert np.all(np.diff(shares) > 0.0) and shares[-1] == 1.0
     assert strides[0] == 8 and np.all(np.diff(strides) <= 0)
     return found

@@ -127,8 +127,8 @@ def test_a_block_that_overturns_has_no_largest_rotation_in_any_table(tmp_path):
 
 @pytest.mark.thorough
 def test_numbers_are_written_as_people_write_them(run, undrawn, tmp_path):
-    assert quantities.read_values("0.1:1:10", "--levels").tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
-    assert quantities.read_values("0.001:1000:7:log", "--p").tolist() == [0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0]
+    assert quantities.read_array("0.1:1:10", "--levels").tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
+    assert quantities.read_array("0.001:1000:7:log", "--p").tolist() == [0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0]
     names = ["el-centro-meloland-270", "el-centro-meloland-360"]
     for command, several in (("simulate", names), ("check", names[:1])):
         out = tmp_path / command

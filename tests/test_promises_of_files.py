@@ -11,7 +11,7 @@ from promises.promise import Found
 import rocking
 from rocking.calibration.tables import read_tests
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
-from rocking.inputs.quantities import read_values
+from rocking.inputs.quantities import read_array
 from rocking.studies import read_study
 
 
@@ -72,7 +72,7 @@ def test_a_name_that_no_file_can_have_is_refused_in_a_sentence(tmp_path):
 @pytest.mark.parametrize("text", ["1:1e999:5", "-1e308:1e308:3", "1:1e999:5:log"])
 def test_a_range_without_finite_ends_is_refused(text):
     with pytest.raises(InvalidOption, match=r"finite ends|positive ends"):
-        read_values(text, "p")
+        read_array(text, "p")
 
 
 def test_a_rate_of_an_endless_intensity_is_refused_without_a_warning(tmp_path):

@@ -52,7 +52,9 @@ WRITTEN = {
 def test_every_unit_of_a_quantity_is_so_much_in_si_units(kind):
     assert set(WRITTEN[kind]) == set(quantities.UNITS[kind])
     for spelling, factor in WRITTEN[kind].items():
-        assert getattr(quantities, kind)(f"2.5 {spelling}", "x") == pytest.approx(2.5 * factor, rel=1e-15), spelling
+        assert getattr(quantities, f"read_{kind}")(f"2.5 {spelling}", "x") == pytest.approx(2.5 * factor, rel=1e-15), (
+            spelling
+        )
 
 
 def test_every_spelling_of_accelerations_and_times_in_records_is_so_much_in_si_units():

@@ -38,7 +38,7 @@ from rocking.core.result import DatasetResult
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.inputs.bodies import create_block, note_likely_mistakes
 from rocking.inputs.declared import SHAPES
-from rocking.inputs.quantities import read_angle, read_length, read_tilt, read_values
+from rocking.inputs.quantities import read_angle, read_array, read_length, read_tilt
 
 #: Descriptions of a block for which the slenderness alone suffices.
 _SLENDER: Final = tuple(
@@ -94,19 +94,19 @@ def spectrum(
         )
     with output.folder() as folder:
         axes: dict[str, Any] = {
-            "p": None if p is None else read_values(p, "p"),
-            "size": None if size is None else read_values(size, "size", read_length),
+            "p": None if p is None else read_array(p, "p"),
+            "size": None if size is None else read_array(size, "size", read_length),
         }
         how = model.chosen()
         if alpha is not None:
-            restitutions = None if restitution is None else read_values(restitution, "restitution")
-            blocks = Blocks.grid(alpha=read_values(alpha, "alpha", read_tilt), restitution=restitutions, **axes)
+            restitutions = None if restitution is None else read_array(restitution, "restitution")
+            blocks = Blocks.grid(alpha=read_array(alpha, "alpha", read_tilt), restitution=restitutions, **axes)
             axes = {}
         elif ensemble is not None:
             given = ensemble_of(ensemble, model)
             blocks = given.pop("blocks")
             how |= given
-        shares = read_values(fractiles, "fractiles").tolist()
+        shares = read_array(fractiles, "fractiles").tolist()
         read = motion.read_all(names)
         found = rocking_spectrum(blocks, [*read.motions.values()], **axes, fractiles=shares, **how)
         _deliver(found, "spectrum", read, folder=folder, as_json=output.as_json, against=against)
@@ -161,8 +161,8 @@ def map(
         found = overturning_map(
             _slender(block),
             pulse,
-            amplitudes=read_values(amplitudes, "amplitudes"),
-            frequencies=read_values(frequencies, "frequencies"),
+            amplitudes=read_array(amplitudes, "amplitudes"),
+            frequencies=read_array(frequencies, "frequencies"),
             model=model.model,
             rtol=rtol,
             **{name: value for name, value in given.items() if value is not None},
@@ -231,7 +231,7 @@ def measures(
         read = motion.read_all(names)
         found = compare_measures(
             motions=[*read.motions.values()],
-            periods=read_values(periods, "periods"),
+            periods=read_array(periods, "periods"),
             damping=damping,
             clusters=labels_of(clusters),
             **bodies,

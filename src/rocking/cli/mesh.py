@@ -14,7 +14,7 @@ from rocking.core.progress import note
 from rocking.core.tables import format_table, write_csv
 from rocking.errors import InvalidOption
 from rocking.inputs.notes import block_notes
-from rocking.inputs.quantities import read_densities, read_length, read_number, read_sides, read_values
+from rocking.inputs.quantities import read_array, read_densities, read_length, read_number, read_sides
 from rocking.solid.solid import Solid
 
 _Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
@@ -76,7 +76,7 @@ def mesh(
         )
         rose = solid.rose()
         e = None if restitution is None else read_sides(restitution, "restitution")
-        azimuths = [] if azimuth is None else read_values(azimuth, "azimuth").tolist()
+        azimuths = [] if azimuth is None else read_array(azimuth, "azimuth").tolist()
         blocks = [_row(at, solid.block(at, restitution=e)) for at in azimuths]
         found: dict[str, Any] = {"solid": solid.to_dict(), **rose.to_dict(), "blocks": blocks}
         text = [solid.summary(), rose.summary()]

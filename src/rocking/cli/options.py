@@ -20,7 +20,7 @@ from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes, vertical_notes
 from rocking.inputs.pulses import named_pulse
-from rocking.inputs.quantities import Quantity, read_acceleration, read_number, read_scaling, read_values, read_velocity
+from rocking.inputs.quantities import Quantity, read_acceleration, read_array, read_number, read_scaling, read_velocity
 from rocking.inputs.texts import write_option_name
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
@@ -365,7 +365,7 @@ class MeasureOptions(IntensityOptions):
             "sa": positive_acceleration,
             "pgv": read_velocity,
         }
-        levels = None if self.levels is None else read_values(self.levels, "levels", readers.get(self.measure, _ratio))
+        levels = None if self.levels is None else read_array(self.levels, "levels", readers.get(self.measure, _ratio))
         return {"measure": self.wanted, "levels": levels}
 
 

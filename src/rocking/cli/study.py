@@ -26,7 +26,7 @@ from rocking.core.result import Result
 from rocking.core.tables import format_count, write_text
 from rocking.core.threads import set_options
 from rocking.errors import InvalidOption, OutputError, StudyError, Unfitted
-from rocking.inputs.quantities import read_values
+from rocking.inputs.quantities import read_array
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.results import StudyOutcome, checked_fractiles
 from rocking.studies.study import Study, study_of
@@ -213,7 +213,7 @@ def report(
         Fractions of the motions that stay below the fractiles of the spectrum.
     """
     how, states = measure.wanted, parse_limit_states(limit_states)
-    shares = checked_fractiles(read_values(fractiles, "fractiles").tolist())
+    shares = checked_fractiles(read_array(fractiles, "fractiles").tolist())
     checks.fraction(confidence, "confidence", InvalidOption)
     found, made = Study(folder), dict[str, Result]()
     fit = found.fragility if together else found.block_fragilities

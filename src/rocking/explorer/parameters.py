@@ -33,7 +33,7 @@ PARAMETERS: Final = {name: declared_input for name, declared_input in INPUTS.ite
 _MAX_TEXT_LENGTH: Final = 300
 
 
-def _declare(group: str, numbers: str, **texts: str) -> dict[str, Input]:
+def _declare_texts(group: str, numbers: str, **texts: str) -> dict[str, Input]:
     """Declare names of an address in order: numbers, except for some texts with their defaults."""
     return {
         name: Input(
@@ -47,7 +47,7 @@ def _declare(group: str, numbers: str, **texts: str) -> dict[str, Input]:
 
 
 #: Texts for a map of a case or of a study.
-MAP: Final = _declare(
+MAP: Final = _declare_texts(
     "map",
     "x x_from x_to y y_from y_to points quantity motion_index polarity_index scale_index "
     "fix_p fix_alpha fix_restitution fix_block",
@@ -55,7 +55,7 @@ MAP: Final = _declare(
 )  # fmt: skip
 
 #: Texts for a sweep under periodic motion.
-SWEEP: Final = _declare("sweep", "sweep sweep_from sweep_to sweep_points", sweep="a")
+SWEEP: Final = _declare_texts("sweep", "sweep sweep_from sweep_to sweep_points", sweep="a")
 
 #: Text for the time of a reading.
 READING: Final = index_by_name(Input("at", "reading", "duration", "", "s"))

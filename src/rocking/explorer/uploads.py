@@ -249,7 +249,7 @@ class UploadStore:
             "reason": identification.reason,
             "missing": missing,
             "channels": [
-                {**_list_metadata(channel), **_describe_motion(_read_channel(upload, channel), missing)}
+                {**_list_metadata(channel), **_describe_channel(_read_channel(upload, channel), missing)}
                 for channel in channels
             ],
         }
@@ -273,7 +273,7 @@ def _read_channel(upload: Upload, channel: Channel) -> Motion:
     return channel.motion()
 
 
-def _describe_motion(motion: Motion, missing: list[str]) -> dict[str, Any]:
+def _describe_channel(motion: Motion, missing: list[str]) -> dict[str, Any]:
     """Return likely mistakes in a channel and its measures, or the effect of each choice of missing metadata."""
     if not missing:
         return {"notes": list(motion_notes(motion)), "choices": {}, "measures": compute_measures(motion)}

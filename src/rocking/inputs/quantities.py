@@ -137,12 +137,12 @@ def _read_one_or_two(text: str, name: str, quantity: Quantity, expected: str) ->
 def read_axis(value: Any, name: str, quantity: Quantity = read_number) -> Floats:
     """Return the numbers of an entry of a study file: one, a list, or a range."""
     if isinstance(value, str):
-        return read_values(value, name, quantity)
+        return read_array(value, name, quantity)
     entries = value if isinstance(value, list) else [value]
     return np.array([quantity(entry if isinstance(entry, str) else repr(entry), name) for entry in entries])
 
 
-def read_values(text: str, name: str, quantity: Quantity = read_number) -> Floats:
+def read_array(text: str, name: str, quantity: Quantity = read_number) -> Floats:
     """Return numbers from "1,2,5" or from "START:STOP:COUNT", with ":log" at the end for equal ratios."""
     parts = text.split(":")
     if len(parts) == 1:
