@@ -51,7 +51,8 @@ def main():
             each = seconds_per_call(lambda parameters=parameters: chattering.chattering_time(*parameters)) / LARGE
         print(f"{name}: {1e9 * each:.0f} ns, {1e-6 / each:.2f} million per second and core")
         print(
-            f"  on {count_cores()} cores (wall) {1e-6 * LARGE / wall:.2f} million per second, {incomplete:.0%} incomplete"
+            f"  on {count_cores()} cores (wall) {1e-6 * LARGE / wall:.2f} million per second, "
+            f"{incomplete:.0%} incomplete"
         )
     single = seconds_per_call(lambda: [chattering.chattering_time(*CASE) for _ in range(1000)]) / 1000
     critical = seconds_per_call(lambda: chattering.critical_amplitude(np.linspace(0.4, 10.0, 200), 0.92)) / 200

@@ -235,7 +235,7 @@ def compare(body, motion, schemes, *, model="linear", position=0.0) -> tuple[Any
                 response = integrate(body, motion, name, float(step), duration, model=model, position=position)
             else:
                 response = marched(scheme)
-        except rocking.InvalidOption:
+        except rocking.errors.InvalidOption:
             continue  # the asymptotic time is for blocks under sines
         found.append(judged(str(scheme), response, certified, time.thread_time() - before))
     return certified, found

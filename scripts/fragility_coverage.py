@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtri
 
-from rocking import InvalidOption, fit_fragility
+from rocking import fit_fragility
+from rocking.errors import InvalidOption
 
 TABLE = Path(__file__).resolve().parents[1] / "docs" / "_tables" / "fragility-coverage.txt"
 DATA_SETS = 500

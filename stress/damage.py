@@ -29,7 +29,7 @@ def seen(folder: Path, name: str, reference: xr.Dataset) -> str:
     try:
         study = rocking.Study(folder)
         faults = study.verify()
-    except rocking.StudyError as error:
+    except rocking.errors.StudyError as error:
         assert "damaged" in str(error)
         return "reported when the study is opened"
     if faults:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Blocks, InvalidBlock, InvalidMotion
+from rocking import Block, Blocks
 from rocking.analysis.survey import survey
+from rocking.errors import InvalidBlock, InvalidMotion
 from rocking.inputs.pulses import named_pulse
 
 BLOCK = Block(width=0.24, height=1.1)

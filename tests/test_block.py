@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rocking import Block, Blocks, InvalidBlock
+from rocking import Block, Blocks
+from rocking.errors import InvalidBlock
 
 sizes = st.floats(0.01, 20.0)
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 
 import rocking
-from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, dynamics, simulate, simulate_many
+from rocking import Motion, dynamics, simulate, simulate_many
 from rocking.block.body import Bodies, Body
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 
 G = 9.81
 

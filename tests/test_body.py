@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 from oracles.rigid_body import Piece, sides_of
 
-from rocking import Block, Blocks, InvalidBlock
+from rocking import Block, Blocks
+from rocking.errors import InvalidBlock
 
 NAMES = ("p", "alpha", "restitution")
 lengths = st.floats(0.05, 5.0)

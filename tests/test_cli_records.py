@@ -160,7 +160,7 @@ def test_a_pulse_has_the_vertical_component_that_is_given(run):
 
 def test_each_record_counts_once(folder):
     assert len(expand_record_names([str(folder), str(folder / "*.AT2")])) == 3
-    with pytest.raises(rocking.UnreadableRecord, match="matches"):
+    with pytest.raises(rocking.errors.UnreadableRecord, match="matches"):
         expand_record_names([str(folder / "*.xyz")])
 
 
@@ -340,7 +340,7 @@ def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
 
     def report(*_):
         warnings.warn("beyond the fit", OutsideFit, stacklevel=1)
-        raise rocking.InvalidOption("enough")
+        raise rocking.errors.InvalidOption("enough")
 
     monkeypatch.setattr(module, "critical_report", report)
     assert run("critical", 2, 0.9)[2].splitlines() == ["rocking: note: beyond the fit", "rocking: enough"]

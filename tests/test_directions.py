@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, Solid, records, response_rose
+from rocking import Motion, Solid, records, response_rose
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 
 
 @pytest.fixture(scope="module")

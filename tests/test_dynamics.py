@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import rocking
-from rocking import InvalidOption, dynamics, pulses
+from rocking import dynamics, pulses
+from rocking.errors import InvalidOption
 
 G = 9.81
 

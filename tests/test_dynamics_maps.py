@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, InvalidOption, dynamics, pulses
+from rocking import Block, dynamics, pulses
+from rocking.errors import InvalidOption
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
 LEANING = Block.from_parameters(p=(2.0, 2.2), alpha=(0.2, 0.15), restitution=(0.8, 0.85))

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from oracles import closed_orbits
 
-from rocking import Block, InvalidOption, dynamics, pulses
+from rocking import Block, dynamics, pulses
 from rocking.chattering import critical_amplitude
 from rocking.dynamics.maps import distances
+from rocking.errors import InvalidOption
 
 G = 10.0
 TABLE = 5.0  # Hz

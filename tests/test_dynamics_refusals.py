@@ -6,9 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from rocking import Block, InvalidBlock, InvalidMotion, InvalidOption, RockingError, chattering, dynamics, pulses
+from rocking import Block, RockingError, chattering, dynamics, pulses
 from rocking.chattering import chattering_map, chattering_time, families
 from rocking.dynamics import BouncingBall, ImpactOscillator, InvertedPendulum, simulate
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
 BALL = BouncingBall(0.5)

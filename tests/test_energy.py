@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import quad
 
 import rocking
-from rocking import Block, Damper, InvalidOption, RestrainedBlock, Spring, Tendon, simulate
+from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, simulate
+from rocking.errors import InvalidOption
 from rocking.response.figure import boundary_of, course_of
 
 COLUMN = Block(width=0.4, height=2.0, mass=2000.0)

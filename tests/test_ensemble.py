@@ -9,18 +9,9 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import (
-    Block,
-    Blocks,
-    Certified,
-    InvalidBlock,
-    InvalidOption,
-    Measure,
-    VelocityThreshold,
-    simulate,
-    simulate_many,
-)
+from rocking import Block, Blocks, Certified, Measure, VelocityThreshold, simulate, simulate_many
 from rocking.engine import tasks as engine
+from rocking.errors import InvalidBlock, InvalidOption
 
 
 @pytest.fixture(scope="module")

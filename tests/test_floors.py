@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import rocking
-from rocking import InvalidMotion, Motion
+from rocking import Motion
+from rocking.errors import InvalidMotion
 
 SAMPLES = np.random.default_rng(5).normal(size=40)
 GROUNDS = {

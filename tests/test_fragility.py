@@ -10,10 +10,11 @@ from scipy import linalg, stats
 from scipy.optimize import minimize
 
 import rocking
-from rocking import InvalidOption, fit_fragility, fragility
+from rocking import fit_fragility, fragility
 from rocking.analysis.levels import clusters_of, families_of
 from rocking.block import Blocks
 from rocking.core.progress import notes_for
+from rocking.errors import InvalidOption
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSES = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.5, 13)]
@@ -215,7 +216,7 @@ def test_any_outcomes_give_a_rising_curve_or_are_refused():
         exceeded = [level >= strength for level, strength in data]
         try:
             curve = fit_fragility(intensity, exceeded).curves[0]
-        except rocking.InvalidOption as error:
+        except rocking.errors.InvalidOption as error:
             assert "no lognormal can be fitted" in str(error)
             refused.append(data)
             return
@@ -288,7 +289,7 @@ def test_a_cloud_has_every_motion_at_its_own_intensity(alpha):
 
 
 def test_a_limit_of_the_peak_rotation_is_not_negative():
-    with pytest.raises(rocking.InvalidOption, match=r"must be 0 or more, not -0\.5"):
+    with pytest.raises(rocking.errors.InvalidOption, match=r"must be 0 or more, not -0\.5"):
         fragility(BLOCK, PULSES, levels=[2.5, 3.5], limit_states={"half": -0.5})
 
 
@@ -376,7 +377,7 @@ def test_the_figure_shows_curves_bands_and_shares():
     ],
 )
 def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity, exceeded, sentence):
-    with pytest.raises(rocking.InvalidOption, match=f"'overturning': .*{sentence}"):
+    with pytest.raises(rocking.errors.InvalidOption, match=f"'overturning': .*{sentence}"):
         fit_fragility(intensity, exceeded)
 
 
@@ -399,7 +400,7 @@ def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity
 )
 def test_data_that_cannot_be_fitted_are_refused(changes, word):
     arguments = {"intensity": [1.0, 2.0, 3.0], "exceeded": [1, 0, 1]} | changes
-    with pytest.raises(rocking.InvalidOption, match=word):
+    with pytest.raises(rocking.errors.InvalidOption, match=word):
         fit_fragility(arguments.pop("intensity"), arguments.pop("exceeded"), **arguments)
 
 
@@ -418,9 +419,9 @@ def test_studies_that_make_no_fragility_are_refused(changes, word):
 
 
 def test_a_constant_share_contradicts_a_curve_that_rises_and_a_nearly_constant_one_puts_its_median_out_of_reach():
-    with pytest.raises(rocking.InvalidOption, match="contradict a curve that rises"):
+    with pytest.raises(rocking.errors.InvalidOption, match="contradict a curve that rises"):
         fit_fragility([1.0, 2.0, 3.0], [2, 2, 2], trials=4)
-    with pytest.raises(rocking.InvalidOption, match="above all intensities by a factor of more than 1000"):
+    with pytest.raises(rocking.errors.InvalidOption, match="above all intensities by a factor of more than 1000"):
         fit_fragility([1.0, 2.0, 3.0], [20, 20, 21], trials=100)
 
 
@@ -595,7 +596,7 @@ def test_motions_that_are_scaled_to_one_level_are_at_one_intensity(level):
     block = rocking.Block.from_parameters(p=3.0, alpha=0.25, restitution=0.9)
     motions = [rocking.records.load(name).scaled_to(level) for name in rocking.records.names()]
     assert len({motion.pga for motion in motions}) > 1
-    with pytest.raises(rocking.Unfitted, match="all outcomes are at one intensity"):
+    with pytest.raises(rocking.errors.Unfitted, match="all outcomes are at one intensity"):
         fragility(block, motions)
 
 

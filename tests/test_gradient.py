@@ -8,6 +8,7 @@ from oracles.cases import GRAVITY
 
 import rocking
 from rocking import Block, Motion
+from rocking.analysis import CriticalScale
 from rocking.core.arrays import Floats
 
 P, ALPHA, RESTITUTION = (2.0, 2.6), (0.15, 0.12), (0.9, 0.7)
@@ -125,11 +126,11 @@ def test_a_start_on_the_ground_has_no_derivative_to_both_sides() -> None:
 
 def test_what_cannot_be_differentiated_is_refused_in_a_sentence() -> None:
     pulse = rocking.simulate(BLOCK, rocking.pulses.one_sine(2.0, 1.0))
-    with pytest.raises(rocking.InvalidOption, match="not linear between samples"):
+    with pytest.raises(rocking.errors.InvalidOption, match="not linear between samples"):
         _ = rocking.gradient(pulse).samples
-    with pytest.raises(rocking.InvalidOption, match="no vertical component"):
+    with pytest.raises(rocking.errors.InvalidOption, match="no vertical component"):
         _ = rocking.gradient(pulse).vertical_samples
-    with pytest.raises(rocking.InvalidOption, match="must be a response"):
+    with pytest.raises(rocking.errors.InvalidOption, match="must be a response"):
         rocking.gradient(BLOCK)
 
 
@@ -141,7 +142,7 @@ def test_a_critical_scale_changes_as_differences_of_critical_scales_say(model: s
     given = {"samples": 2.0 * rough / np.max(np.abs(rough)), "p": np.array(P), "alpha": np.array(ALPHA)}
     given["restitution"] = np.array(RESTITUTION)
 
-    def critical(changed: dict[str, Floats], low: float = 1.4, high: float = 1.6) -> rocking.CriticalScale:
+    def critical(changed: dict[str, Floats], low: float = 1.4, high: float = 1.6) -> CriticalScale:
         block = Block.from_parameters(**{name: tuple(changed[name]) for name in ("p", "alpha", "restitution")})
         return rocking.critical_scale(block, Motion.from_samples(changed["samples"], 0.1), (low, high), model=model)
 
@@ -163,7 +164,7 @@ def test_a_critical_scale_changes_as_differences_of_critical_scales_say(model: s
 def test_a_critical_scale_changes_with_the_start_and_the_vertical_component() -> None:
     upright = np.array([0.0, 2.0, -3.0, 1.0, 0.0])
 
-    def critical(rotation: float, lift: float = 0.0, low: float = 0.2, high: float = 6.0) -> rocking.CriticalScale:
+    def critical(rotation: float, lift: float = 0.0, low: float = 0.2, high: float = 6.0) -> CriticalScale:
         vertical = Motion.from_samples(upright + lift * np.eye(5)[2], 0.3)
         record = Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3).with_vertical(vertical)
         return rocking.critical_scale(BLOCK, record, (low, high), initial_rotation=rotation, initial_velocity=0.01)
@@ -178,11 +179,11 @@ def test_a_critical_scale_changes_with_the_start_and_the_vertical_component() ->
 
 def test_scales_that_bracket_no_overturning_are_refused() -> None:
     record = Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    with pytest.raises(rocking.InvalidOption, match=r"does not overturn at the scale high = 0.2"):
+    with pytest.raises(rocking.errors.InvalidOption, match=r"does not overturn at the scale high = 0.2"):
         rocking.critical_scale(BLOCK, record, (0.1, 0.2))
-    with pytest.raises(rocking.InvalidOption, match=r"overturns at the scale low = 8"):
+    with pytest.raises(rocking.errors.InvalidOption, match=r"overturns at the scale low = 8"):
         rocking.critical_scale(BLOCK, record, (8.0, 9.0))
-    with pytest.raises(rocking.InvalidOption, match="no motion to scale"):
+    with pytest.raises(rocking.errors.InvalidOption, match="no motion to scale"):
         rocking.critical_scale(BLOCK, None, (8.0, 9.0))
 
 
@@ -208,7 +209,7 @@ def test_scales_in_the_wrong_order_are_refused_where_a_stronger_motion_lets_the_
     pulse = rocking.pulses.one_sine(1.0, 5.0 / np.pi)
     assert rocking.simulate(block, pulse * 8.0).overturned
     assert not rocking.simulate(block, pulse * 14.0).overturned
-    with pytest.raises(rocking.InvalidOption, match="low = 14 must be below high = 8"):
+    with pytest.raises(rocking.errors.InvalidOption, match="low = 14 must be below high = 8"):
         rocking.critical_scale(block, pulse, (14.0, 8.0))
 
 

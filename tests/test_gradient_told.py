@@ -12,7 +12,8 @@ from oracles.problem import Problem
 from test_gradient import ALPHA, BLOCK, MODELS, RESTITUTION, P, samples_of, slope
 
 import rocking
-from rocking import Block, InvalidOption, Motion, RestrainedBlock, Tendon, VelocityThreshold, dynamics, gradient
+from rocking import Block, Motion, RestrainedBlock, Tendon, VelocityThreshold, dynamics, gradient
+from rocking.errors import InvalidOption
 
 RECORD = Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
 

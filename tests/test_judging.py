@@ -8,8 +8,9 @@ import pytest
 from scipy import stats
 
 import rocking
-from rocking import Block, Blocks, InvalidOption, ShakeTest, UnreadableRecord
+from rocking import Block, Blocks, ShakeTest
 from rocking.calibration import Validation
+from rocking.errors import InvalidOption, UnreadableRecord
 
 STRONG, WEAK = rocking.pulses.one_sine(6.0, 1.0), rocking.pulses.one_sine(1.0, 1.0)
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)

@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import rocking
+from rocking import errors
 from rocking.analysis.survey import folder_names, survey
 from rocking.cli.study import FORMATS
 from rocking.core import tables
@@ -74,7 +75,7 @@ def test_a_full_disk_leaves_no_part_of_a_file_and_keeps_the_old_one(response, an
     for old in (None, b"old"):
         if old is not None:
             path.write_bytes(old)
-        with full_disk(1000), pytest.raises(rocking.OutputError, match=f"{name}: cannot be written"):
+        with full_disk(1000), pytest.raises(errors.OutputError, match=f"{name}: cannot be written"):
             WRITERS[name](response, analysis, path)
         assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == ([] if old is None else [(name, old)])
     WRITERS[name](response, analysis, path)
@@ -92,7 +93,7 @@ def test_an_export_of_a_study_is_whole_or_not_there(tmp_path, suffix):
     study = rocking.create_study(tmp_path / "study", blocks, rocking.pulses.one_sine(4.0, 1.0), levels=[0.4, 1.0])
     study.run()
     target, write = tmp_path / f"results{suffix}", FORMATS[suffix]
-    with full_disk(700), pytest.raises(rocking.OutputError, match="cannot be written"):
+    with full_disk(700), pytest.raises(errors.OutputError, match="cannot be written"):
         write(study, target)
     assert {file.name for file in tmp_path.iterdir()} == {"study"}
     write(study, target)
@@ -101,7 +102,7 @@ def test_an_export_of_a_study_is_whole_or_not_there(tmp_path, suffix):
 
 def test_a_table_of_many_records_is_whole_or_not_there(response, tmp_path):
     found = survey(response.block, {RECORD: response.motion})
-    with full_disk(100), pytest.raises(rocking.OutputError, match="cannot be written"):
+    with full_disk(100), pytest.raises(errors.OutputError, match="cannot be written"):
         found.to_csv(tmp_path / "summary.csv")
     assert not [*tmp_path.iterdir()]
 
@@ -115,7 +116,7 @@ def test_a_write_that_fails_in_the_middle_leaves_what_was_there(tmp_path, monkey
 
     monkeypatch.setattr(os, "fsync", fails)
     with (
-        pytest.raises(rocking.OutputError, match="No space left on device; nothing of it was kept"),
+        pytest.raises(errors.OutputError, match="No space left on device; nothing of it was kept"),
         atomic_file(file) as beside,
     ):
         beside.write_text("new")
@@ -142,7 +143,10 @@ def test_a_link_is_kept_and_a_file_keeps_its_rights_and_a_device_is_written_to(t
     finally:
         os.umask(umask)
     assert (tmp_path / "fresh.csv").stat().st_mode & 0o777 == 0o644
-    with pytest.raises(rocking.OutputError, match="there is no folder"), atomic_file(tmp_path / "none" / "a.csv"):
+    with (
+        pytest.raises(errors.OutputError, match="there is no folder"),
+        atomic_file(tmp_path / "none" / "a.csv"),
+    ):
         pass
 
 

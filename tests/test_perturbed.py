@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Damper, InvalidOption, RestrainedBlock, Spring, Tendon, dynamics, simulate
+from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, dynamics, simulate
+from rocking.errors import InvalidOption
 from rocking.response import factors_near, steps_within
 
 FREE = Block(width=0.24, height=1.1)

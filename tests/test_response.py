@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import (
-    AsymptoticTime,
-    Block,
-    Certified,
-    InvalidOption,
-    simulate,
-)
+from rocking import AsymptoticTime, Block, Certified, simulate
+from rocking.errors import InvalidOption
 
 G = 9.80665
 

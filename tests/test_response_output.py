@@ -10,9 +10,10 @@ import pytest
 import xarray as xr
 
 import rocking
-from rocking import Block, InvalidOption, OutputError, simulate
+from rocking import Block, simulate
 from rocking.analysis.survey import survey
 from rocking.core.tables import add_unit
+from rocking.errors import InvalidOption, OutputError
 from rocking.explorer.simulated import describe_outcome
 from rocking.response.summary import known_ratio, time_text
 from rocking.rules import Check

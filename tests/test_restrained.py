@@ -8,7 +8,8 @@ import pytest
 from oracles.standing import OF_ENSEMBLES, case, drawn
 
 import rocking
-from rocking import Block, Damper, InvalidBlock, Load, RestrainedBlock, Spring, Tendon, Thrust
+from rocking import Block, Damper, Load, RestrainedBlock, Spring, Tendon, Thrust
+from rocking.errors import InvalidBlock
 
 
 def of_restraints(body, j, u):
@@ -150,7 +151,7 @@ def test_restraints_stay_where_they_are_on_the_block_when_a_load_that_follows_mo
 def test_a_body_too_stocky_for_angular_momentum_carries_a_load_with_a_restitution_that_is_given():
     stocky = Block(width=2.5, height=1.6, mass=1e3, restitution=0.5)
     assert [side.restitution for side in RestrainedBlock(stocky, Load(50.0, 1.6), restitution=0.4).sides] == [0.4, 0.4]
-    with pytest.raises(rocking.InvalidBlock, match=r"too stocky to rock that way; .*give restitution"):
+    with pytest.raises(rocking.errors.InvalidBlock, match=r"too stocky to rock that way; .*give restitution"):
         RestrainedBlock(stocky, Load(50.0, 1.6))
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Damper, InvalidBlock, InvalidOption, RestrainedBlock, Tendon, Thrust, dynamics
+from rocking import Block, Damper, RestrainedBlock, Tendon, Thrust, dynamics
+from rocking.errors import InvalidBlock, InvalidOption
 from rocking.simulation.ensemble import body_coordinates
 
 FACADE = RestrainedBlock(Block(width=0.5, height=5.0, mass=6e3), Thrust(8e2, height=4.0), one_sided=True)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from public_names import public_names
 
 import rocking
-from rocking import dynamics
+from rocking import dynamics, errors
 from rocking.calibration.outcomes import overturned_under
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.core.progress import Progress
@@ -215,7 +215,7 @@ def test_a_result_keeps_its_dataset_and_offers_nothing_of_it_as_its_own(results,
                 getattr(found, missing)
         if number < written:
             found.to_netcdf(tmp_path / "result.nc")
-    with pytest.raises(rocking.OutputError, match="cannot be written"):
+    with pytest.raises(errors.OutputError, match="cannot be written"):
         found.to_netcdf(tmp_path / "none" / "result.nc")
 
 
@@ -284,7 +284,7 @@ def test_every_result_is_written_as_tables_whose_columns_have_units(results, tmp
             rows = found.data[[*(found.TABLES[table] or found.data)]].to_dataframe()
             assert len(found.to_dataframe(table)) == len(rows) == len(written[name, table]) - 1
         assert found.to_dataframe().equals(found.to_dataframe(next(iter(found.TABLES))))
-        with pytest.raises(rocking.InvalidOption, match="table must be one of"):
+        with pytest.raises(errors.InvalidOption, match="table must be one of"):
             found.to_dataframe("histories")
     assert {key: lines[0] for key, lines in written.items()} == HEADERS
 
@@ -305,7 +305,7 @@ def test_a_part_of_a_result_is_a_result(spectrum):
     part = spectrum.select(alpha=0.2, p=[1.0, 3.0])
     assert dict(part.data.sizes) == {"motion": 2, "alpha": 1, "restitution": 1, "p": 2, "fractile": 3}
     assert len(part.plot().axes[0].lines) > 0
-    with pytest.raises(rocking.InvalidOption, match="dimensions are"):
+    with pytest.raises(errors.InvalidOption, match="dimensions are"):
         spectrum.select(height=1.0)
 
 
@@ -334,7 +334,7 @@ def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
     header = (tmp_path / "outcomes.csv").read_text().splitlines()[0]
     assert header.startswith("motion,block,polarity,pga_m_s2,peak_rotation_rad,peak_over_alpha,overturned")
     given = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
-    with pytest.raises(rocking.InvalidOption, match="no simulations"):
+    with pytest.raises(errors.InvalidOption, match="no simulations"):
         given.to_csv(tmp_path / "none.csv", "outcomes")
 
 
@@ -372,7 +372,7 @@ def test_a_part_has_no_numbers_of_the_whole(results, of_several):
         ("Basins", "angular_velocity"),
     ):  # fmt: skip
         assert dimension in results[name].data.sizes, name
-        with pytest.raises(rocking.InvalidOption, match=f"of all its values of {dimension} together; compute a part"):
+        with pytest.raises(errors.InvalidOption, match=f"of all its values of {dimension} together; compute a part"):
             results[name].select(**{dimension: results[name].data[dimension].values[0]})
 
 

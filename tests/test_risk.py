@@ -16,11 +16,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rocking
-from rocking import HazardCurve, InvalidOption
+from rocking import HazardCurve
 from rocking.analysis.hazard import log_parts, log_rate_within, log_standing, powers
 from rocking.analysis.probit import Probit
 from rocking.analysis.risk import mean_of_blocks
 from rocking.calibration.tables import read_observed
+from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 
 G = 9.80665

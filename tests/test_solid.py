@@ -15,7 +15,8 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 import rocking
-from rocking import Block, InvalidBlock, InvalidOption, Solid
+from rocking import Block, Solid
+from rocking.errors import InvalidBlock, InvalidOption
 from rocking.solid.mesh import compute_upright_rotation
 from rocking.solid.repair import label_shells
 

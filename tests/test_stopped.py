@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Blocks, simulate, simulate_many
+from rocking import Block, Blocks, errors, simulate, simulate_many
 from rocking.analysis.survey import survey
 
 RECORD = "el-centro-meloland-270"
@@ -92,7 +92,7 @@ def test_a_block_that_still_rocks_when_the_motion_ends_is_stopped_there_and_not_
     study = rocking.create_study(tmp_path, Blocks(p=2.0, alpha=[0.2, 0.4], restitution=0.9), motion, **options)
     with rocking.set_options(threads=1):
         study.run()
-    with pytest.raises(rocking.StudyError, match="their verdicts are not known: make the study without a duration"):
+    with pytest.raises(errors.StudyError, match="their verdicts are not known: make the study without a duration"):
         study.fragility()
 
 

@@ -17,6 +17,7 @@ import xarray as xr
 from studies_seen import RUNS, after_each_unit, digest, store_of
 
 import rocking
+from rocking import errors
 from rocking.studies import folder as folders
 from rocking.studies import units
 from rocking.studies.units import OUTCOMES, UnitGrid, decoded, name_of
@@ -258,7 +259,7 @@ def test_workers_that_are_gone_end_the_run_and_another_one_goes_on(complete, tmp
     study = made(tmp_path)
     with (
         Broken(1) as pool,
-        pytest.raises(rocking.StudyError, match="the workers are gone: a process ended abruptly; what"),
+        pytest.raises(errors.StudyError, match="the workers are gone: a process ended abruptly; what"),
     ):
         study.run(executor=pool)
     assert study.status.done <= 4
@@ -355,7 +356,7 @@ def test_a_damaged_unit_is_named_and_computed_again_on_request(complete, tmp_pat
     sound = path.read_bytes()
     path.write_bytes(sound[:-9] + b"\0" + sound[-8:])
     assert study.results().peak_rotation.isel(motion=0).load().size  # other units can be read
-    with pytest.raises(rocking.StudyError, match=r"unit\.1\.1\.0\.2 is damaged"):
+    with pytest.raises(errors.StudyError, match=r"unit\.1\.1\.0\.2 is damaged"):
         study.results().load()
     (fault,) = study.verify()
     assert "unit.1.1.0.2" in fault
@@ -393,10 +394,10 @@ def test_damage_to_what_describes_a_study_is_seen(tmp_path):
         changed = bytearray(data)
         changed[rng.integers(len(data))] ^= 1 << rng.integers(8)
         (tmp_path / name).write_bytes(changed)
-        with pytest.raises(rocking.StudyError, match="damaged"):
+        with pytest.raises(errors.StudyError, match="damaged"):
             rocking.Study(tmp_path)
     (tmp_path / name).write_bytes(data[:-3])
-    with pytest.raises(rocking.StudyError, match="damaged"):
+    with pytest.raises(errors.StudyError, match="damaged"):
         rocking.Study(tmp_path)
 
 
@@ -417,7 +418,7 @@ def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
     study.run()
     results = study.results()
     (tmp_path / "units" / "unit.0.0.0.0").unlink()
-    with pytest.raises(rocking.StudyError, match=r"unit\.0\.0\.0\.0 is gone"):
+    with pytest.raises(errors.StudyError, match=r"unit\.0\.0\.0\.0 is gone"):
         results.load()
 
 
@@ -434,17 +435,17 @@ def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
 )
 def test_other_inputs_are_refused_by_name(tmp_path, changes, part):
     made(tmp_path)
-    with pytest.raises(rocking.StudyError, match=part):
+    with pytest.raises(errors.StudyError, match=part):
         made(tmp_path, **changes)
 
 
 def test_other_blocks_and_motions_are_refused_by_name(tmp_path):
     made(tmp_path)
-    with pytest.raises(rocking.StudyError, match="blocks/p"):
+    with pytest.raises(errors.StudyError, match="blocks/p"):
         rocking.create_study(tmp_path, BLOCKS.select(slice(0, 1299)), MOTIONS, **OPTIONS)
-    with pytest.raises(rocking.StudyError, match="motions/1 changed"):
+    with pytest.raises(errors.StudyError, match="motions/1 changed"):
         rocking.create_study(tmp_path, BLOCKS, [MOTIONS[0], MOTIONS[1].scaled(1.1), MOTIONS[2]], **OPTIONS)
-    with pytest.raises(rocking.StudyError, match="motions/2 changed"):
+    with pytest.raises(errors.StudyError, match="motions/2 changed"):
         rocking.create_study(tmp_path, BLOCKS, MOTIONS[:2], **OPTIONS)
 
 
@@ -453,7 +454,7 @@ def test_another_version_may_read_a_study_but_not_go_on_with_it(tmp_path, monkey
     monkeypatch.setattr("rocking.studies.folder.program", lambda: "rocking 9.9.9 (kernels 0)")
     assert rocking.Study(tmp_path).results().sizes["block"] == 1300
     for compute in (study.run, lambda: study.verify(recompute=1), lambda: study.verify(repair=True)):
-        with pytest.raises(rocking.StudyError, match=r"9\.9\.9"):
+        with pytest.raises(errors.StudyError, match=r"9\.9\.9"):
             compute()
     assert study.verify() == []
 
@@ -461,7 +462,7 @@ def test_another_version_may_read_a_study_but_not_go_on_with_it(tmp_path, monkey
 @pytest.mark.parametrize("executor", [3, "tcp://127.0.0.1:8786", ProcessPoolExecutor])
 def test_what_is_no_executor_is_refused_before_a_unit(tmp_path, executor):
     study = made(tmp_path)
-    with pytest.raises(rocking.InvalidOption, match=r"^executor must be a concurrent.futures.Executor or a client of"):
+    with pytest.raises(errors.InvalidOption, match=r"^executor must be a concurrent.futures.Executor or a client of"):
         study.run(executor=executor)
     assert study.status.done == 0
 
@@ -496,7 +497,7 @@ def test_a_study_is_exported(tmp_path, reference):
     assert [*table.columns] == COLUMNS
     np.testing.assert_array_equal(table.peak_rotation_rad, reference.peak_rotation.values.ravel())
     assert table.iloc[50][["pga_m_s2", "polarity", "block"]].tolist() == [2.0, "-", 0]
-    with pytest.raises(rocking.OutputError, match="cannot be written"):
+    with pytest.raises(errors.OutputError, match="cannot be written"):
         study.to_csv(tmp_path / "none" / "all.csv")
 
 
@@ -509,7 +510,7 @@ def test_a_study_is_exported_to_parquet_or_says_what_is_missing(complete, tmp_pa
     assert [*found.columns] == COLUMNS
     np.testing.assert_array_equal(found.impacts_resolved, reference.impacts.values.ravel())
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(rocking.InvalidOption, match=r"pip install '\.\[parquet\]' in the source folder"):
+    with pytest.raises(errors.InvalidOption, match=r"pip install '\.\[parquet\]' in the source folder"):
         study.to_parquet(tmp_path / "other.parquet")
 
 
@@ -525,7 +526,7 @@ def test_units_have_names_of_their_own_and_other_files_are_none(tmp_path):
 
 @pytest.mark.parametrize("width", [0, 100, 513, 1.5])
 def test_units_are_whole_groups_of_blocks(tmp_path, width):
-    with pytest.raises(rocking.InvalidOption, match="unit_blocks"):
+    with pytest.raises(errors.InvalidOption, match="unit_blocks"):
         made(tmp_path, unit_blocks=width)
 
 
@@ -539,7 +540,7 @@ def test_a_vertical_component_is_part_of_a_study(tmp_path):
     assert np.array_equal(again.peak_rotation, rocking.simulate_many(BLOCKS, both).peak_rotation)
     assert not np.array_equal(again.peak_rotation, rocking.simulate_many(BLOCKS, MOTIONS[0]).peak_rotation)
     for other in (MOTIONS[0], MOTIONS[0].with_vertical(-MOTIONS[1])):
-        with pytest.raises(rocking.StudyError, match="motions/0"):
+        with pytest.raises(errors.StudyError, match="motions/0"):
             rocking.create_study(tmp_path / "study", BLOCKS, other)
 
 
@@ -547,7 +548,7 @@ def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
     rocking.create_study(tmp_path / "one", BLOCKS, MOTIONS, levels=[0.5, 1.0], unit_blocks=512)
     others = ({"model": "linear"}, {"chattering": "velocity"}, {"measure": "pga"}, {"polarity": "both"})
     for given in (*others, {"levels": [1.0, 2.0]}, {"duration": 3.0}, {"unit_blocks": 512}):
-        with pytest.raises(rocking.errors.InvalidOption, match="has rules of its own: give its folder alone"):
+        with pytest.raises(errors.InvalidOption, match="has rules of its own: give its folder alone"):
             rocking.create_study(tmp_path / "one", **given)
 
 
@@ -558,7 +559,7 @@ def test_bodies_of_another_kind_with_the_same_numbers_are_another_study(tmp_path
     rocking.create_study(tmp_path / "one", block, motion, model="linear", unit_blocks=512).run()
     rocking.create_study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512).run()
     for folder, bodies in (("one", pendulum), ("other", block)):
-        with pytest.raises(rocking.StudyError, match="of other inputs"):
+        with pytest.raises(errors.StudyError, match="of other inputs"):
             rocking.create_study(tmp_path / folder, bodies, motion, model="linear", unit_blocks=512)
     again = rocking.create_study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512)
     assert float(again.results().peak_rotation.max()) == pytest.approx(0.2)
@@ -608,5 +609,5 @@ def test_sums_of_weights_in_another_order_make_no_outcome(tmp_path):
     study.run()
     rng = np.random.default_rng(0)
     for _ in range(10):
-        with pytest.raises(rocking.Unfitted, match="separated"):
+        with pytest.raises(errors.Unfitted, match="separated"):
             study.fragility(weights=rng.uniform(0.1, 1.0, 37))

@@ -143,7 +143,7 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
 
     # The scheduler is killed: one sentence, and no waiting for what will never come.
     study = made(tmp_path / "scheduler")
-    gone = pytest.raises(rocking.StudyError, match="the workers are gone: ")
+    gone = pytest.raises(rocking.errors.StudyError, match="the workers are gone: ")
     with (
         gone,
         connected(cluster.address) as client,
@@ -159,7 +159,7 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
 
 def test_a_worker_with_another_program_is_told_so(tmp_path):
     work = store_of(made(tmp_path)).work((0, 0, 0, 0))
-    with pytest.raises(rocking.StudyError, match=r"has rocking .*, the study needs rocking 9\.9\.9"):
+    with pytest.raises(rocking.errors.StudyError, match=r"has rocking .*, the study needs rocking 9\.9\.9"):
         compute(replace(work, program="rocking 9.9.9 (kernels 0)"))
 
 

@@ -105,10 +105,10 @@ GRID = 'p = "1:6:5"\nalpha = ["10deg", 0.2]\nrestitution = 0.9\n'
 def test_a_table_of_blocks_that_cannot_be_is_refused_with_its_line(tmp_path, file):
     file.write_text(TEXT.replace(GRID, 'csv = "blocks.csv"\n'))
     (tmp_path / "blocks.csv").write_text("width,height,offset\n0.3,1.1,0\n0.3,1.1,0.2\n")
-    with pytest.raises(rocking.StudyError, match=r"blocks\.csv, line 3: offset must be at most"):
+    with pytest.raises(rocking.errors.StudyError, match=r"blocks\.csv, line 3: offset must be at most"):
         read_study(file)
     (tmp_path / "blocks.csv").write_text("p_plus,p_minus,alpha\n2,2,0.2\n2,3,0.2\n")
-    with pytest.raises(rocking.StudyError, match=r"blocks\.csv, line 3: no rigid body has p = 2 and 3"):
+    with pytest.raises(rocking.errors.StudyError, match=r"blocks\.csv, line 3: no rigid body has p = 2 and 3"):
         read_study(file)
 
 
@@ -126,10 +126,10 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
     assert (again.p.tolist(), again.alpha.tolist()) == (blocks.p.tolist(), blocks.alpha.tolist())
     assert again.restitution.tolist() == blocks.restitution.tolist()
     (tmp_path / "blocks.csv").write_bytes("p;alpha;name\n2;0,2;Säule\n".encode("latin-1"))
-    with pytest.raises(rocking.StudyError, match="no text table in UTF-8"):
+    with pytest.raises(rocking.errors.StudyError, match="no text table in UTF-8"):
         read_study(file)
     (tmp_path / "blocks.csv").write_text("p,alpha\n2.0,0.2\nfast,0.2\n")
-    with pytest.raises(rocking.StudyError, match=r"blocks\.csv, line 3: p takes an angular velocity"):
+    with pytest.raises(rocking.errors.StudyError, match=r"blocks\.csv, line 3: p takes an angular velocity"):
         read_study(file)
 
 
@@ -176,7 +176,7 @@ def test_a_mistake_is_a_sentence_with_its_line(file, mistake):
     text = TEXT if old in TEXT else WALLS
     assert old in text
     file.write_text(text.replace(old, f"{new}\n" if old == GRID else new))
-    with pytest.raises((rocking.StudyError, rocking.UnreadableRecord)) as caught:
+    with pytest.raises((rocking.errors.StudyError, rocking.errors.UnreadableRecord)) as caught:
         read_study(file)
     assert sentence in str(caught.value) and "\n" not in str(caught.value)
     assert f"{file}, line {line}: " in str(caught.value)
@@ -185,7 +185,7 @@ def test_a_mistake_is_a_sentence_with_its_line(file, mistake):
 
 def test_a_file_that_is_no_toml_is_refused(file):
     file.write_text(TEXT.replace("[blocks]", "[blocks"))
-    with pytest.raises(rocking.StudyError, match=f"{file}: this is no TOML file"):
+    with pytest.raises(rocking.errors.StudyError, match=f"{file}: this is no TOML file"):
         read_study(file)
 
 
@@ -194,7 +194,7 @@ def test_unreadable_records_are_left_out_only_where_the_file_says_so(file, tmp_p
     (tmp_path / "broken.AT2").write_text("nothing of use\n")
     records = 'records = ["el-centro-meloland-270", "broken.AT2"]'
     file.write_text(TEXT.replace('records = ["el-centro-meloland-270"]', records))
-    with pytest.raises(rocking.UnreadableRecord, match=r"broken\.AT2"):
+    with pytest.raises(rocking.errors.UnreadableRecord, match=r"broken\.AT2"):
         read_study(file)
     file.write_text(file.read_text().replace(records, records + "\nskip_unreadable = true"))
     found = read_study(file)
@@ -336,7 +336,7 @@ def test_units_are_for_those_of_several_records_that_do_not_say_theirs(file, tmp
     assert (silent.duration, says.duration) == pytest.approx((39 * 0.02, 39 * 0.01))
     assert says.pga == pytest.approx(9.80665 * silent.pga)
     file.write_text(several.replace('"silent.txt", ', ""))
-    with pytest.raises(rocking.UnreadableRecord, match=r"leave (units|dt) out"):
+    with pytest.raises(rocking.errors.UnreadableRecord, match=r"leave (units|dt) out"):
         read_study(file)
     vertical = several.replace('"silent.txt", ', "").replace(
         'units = "m/s2"\ndt = 0.02', 'vertical = "silent.txt"\nunits = "g"\ndt = 0.01'
@@ -402,7 +402,7 @@ def test_the_fragility_of_a_study_of_walls_is_that_of_the_function(walls, run, t
 def test_a_table_of_blocks_says_all_of_them_or_is_refused(file, tmp_path, table, sentence):
     (tmp_path / "blocks.csv").write_text(table)
     file.write_text(TEXT.replace(GRID, 'csv = "blocks.csv"\n'))
-    with pytest.raises(rocking.StudyError, match=re.escape(sentence)):
+    with pytest.raises(rocking.errors.StudyError, match=re.escape(sentence)):
         read_study(file)
 
 
@@ -440,7 +440,7 @@ def test_files_are_found_beside_the_studys_own_wherever_it_is_called(file, tmp_p
     assert motions[1].name == "el-centro-meloland-360"
     (folder / "mine.csv").unlink()
     inside.write_text(TEXT.replace("el-centro-meloland-270", "mine.csv"))
-    with pytest.raises(rocking.UnreadableRecord, match=re.escape(str(folder / "mine.csv"))):
+    with pytest.raises(rocking.errors.UnreadableRecord, match=re.escape(str(folder / "mine.csv"))):
         read_study(inside)
 
 

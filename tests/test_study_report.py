@@ -55,7 +55,7 @@ def test_a_study_that_stops_its_simulations_early_gives_no_verdicts(tmp_path):
     short = rocking.create_study(tmp_path / "short", BLOCKS, MOTIONS, levels=LEVELS, measure="pga", duration=0.5)
     short.run()
     for report in (short.block_fragilities, short.spectrum):
-        with pytest.raises(rocking.StudyError, match="without a duration"):
+        with pytest.raises(rocking.errors.StudyError, match="without a duration"):
             report()
 
 
@@ -67,7 +67,7 @@ def test_the_curve_of_each_block_is_that_of_its_simulations(curves, blocks):
         limits = {name: LIMITS[name]}
         try:
             curve = rocking.fragility(BLOCKS[j], MOTIONS, levels=LEVELS, limit_states=limits).curve(name)
-        except rocking.InvalidOption as error:
+        except rocking.errors.InvalidOption as error:
             assert str(one.fault.values) == str(error)
             continue
         fitted += 1
@@ -220,11 +220,11 @@ def test_a_block_that_no_curve_fits_says_why(tmp_path):
 
 def test_wrong_options_of_a_report_are_refused(study, run, tmp_path):
     for curves in (study.block_fragilities, study.fragility):
-        with pytest.raises(rocking.InvalidOption, match="confidence must be a number between 0 and 1, not 2"):
+        with pytest.raises(rocking.errors.InvalidOption, match="confidence must be a number between 0 and 1, not 2"):
             curves(confidence=2)
-        with pytest.raises(rocking.InvalidOption, match="must be 0 or more"):
+        with pytest.raises(rocking.errors.InvalidOption, match="must be 0 or more"):
             curves(limit_states={"half": -0.5})
-    with pytest.raises(rocking.InvalidOption, match="fractiles must hold a share of the motions or more"):
+    with pytest.raises(rocking.errors.InvalidOption, match="fractiles must hold a share of the motions or more"):
         study.spectrum([])
     for options in ("--limit-states foo", "--measure sa", "--fractiles 2", "--confidence 2", "--limit-states half=-1"):
         code, _, err = run("study", "report", study.place, tmp_path / "out", *options.split())
@@ -234,7 +234,7 @@ def test_wrong_options_of_a_report_are_refused(study, run, tmp_path):
 
 def test_a_study_that_is_not_complete_has_no_report(tmp_path):
     study = rocking.create_study(tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
-    with pytest.raises(rocking.StudyError, match="units are missing, 72 of 72"):
+    with pytest.raises(rocking.errors.StudyError, match="units are missing, 72 of 72"):
         study.fragility()
 
 
@@ -268,7 +268,7 @@ def test_the_figures_draw_every_block(study, curves):
     figure = curves.plot()
     for axes in figure.axes[:2]:
         assert sum(len(one.get_offsets()) for one in axes.collections) == 12
-    with pytest.raises(rocking.InvalidOption, match="a figure of their own"):
+    with pytest.raises(rocking.errors.InvalidOption, match="a figure of their own"):
         study.spectrum().plot(ax=figure.axes[0])
     spectrum = study.spectrum().plot()
     marks = sum(len(one.get_offsets()) for axes in spectrum.axes[:4] for one in axes.collections)

@@ -132,7 +132,7 @@ def test_a_treatment_is_made_of_its_name_and_parameter():
         ("time=eq78", "eq76, eq77, exact"),
         ("velocity=x", "one number"),
     ):
-        with pytest.raises(rocking.InvalidOption, match=sentence):
+        with pytest.raises(rocking.errors.InvalidOption, match=sentence):
             chattering_scheme(wrong)
 
 
@@ -188,9 +188,9 @@ def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
         rocking.Blocks([2.0], [0.2], [[0.9, 0.8]]),
         rocking.Blocks([[2.0, 2.0], [2.0, 2.5]], [0.2], [0.9]),
     ):
-        with pytest.raises(rocking.InvalidOption, match="symmetric blocks"):
+        with pytest.raises(rocking.errors.InvalidOption, match="symmetric blocks"):
             scheme.limits(different, sine, "linear")
-    with pytest.raises(rocking.InvalidOption, match="sinusoidal"):
+    with pytest.raises(rocking.errors.InvalidOption, match="sinusoidal"):
         scheme.limits(symmetric, sine.delayed(1.0), "linear")
 
 
@@ -198,5 +198,5 @@ def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
 @pytest.mark.parametrize("scheme", [rocking.Certified, rocking.VelocityThreshold, rocking.IntervalThreshold])
 def test_the_parameter_of_a_scheme_is_a_positive_number(scheme, value):
     assert scheme(np.float32(1.0)) == scheme(1)
-    with pytest.raises(rocking.InvalidOption, match="must be"):
+    with pytest.raises(rocking.errors.InvalidOption, match="must be"):
         scheme(value)

@@ -11,7 +11,8 @@ import pytest
 from oracles.cases import wave
 
 import rocking
-from rocking import InvalidMotion, InvalidOption, Motion
+from rocking import Motion
+from rocking.errors import InvalidMotion, InvalidOption
 from rocking.inputs.notes import vertical_notes
 from rocking.motion.description import Origin
 from rocking.motion.motion import compute_uplift_factors, find_exceedances

@@ -1,9 +1,23 @@
-from . import analysis, calibration, chattering, dynamics, pulses, records, rules, solid, studies
+from . import (
+    analysis,
+    block,
+    calibration,
+    chattering,
+    dynamics,
+    errors,
+    motion,
+    pulses,
+    records,
+    response,
+    rules,
+    solid,
+    studies,
+)
 from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility import Fragility, fit_fragility, fragility
 from .analysis.hazard import HazardCurve
-from .analysis.incremental import CriticalScale, critical_scale, incremental_dynamic_analysis
+from .analysis.incremental import critical_scale, incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
@@ -14,21 +28,18 @@ from .block import (
     Load,
     Restitution,
     RestrainedBlock,
-    RestrainedBlocks,
     Restraint,
-    Side,
     Spring,
     Tendon,
     Thrust,
     impact_restitution,
     one_sided_restitution,
 )
-from .block.body import Bodies, Body, Coordinate
-from .calibration.history import HistoryCalibration, calibrate_history
+from .calibration.history import calibrate_history
 from .calibration.outcomes import Calibration, calibrate
 from .calibration.tables import read_tests
-from .calibration.validate import ModelValidation, ShakeTest, validate
-from .core.result import DatasetResult, Result, Row
+from .calibration.validate import ShakeTest, validate
+from .core.result import Result
 from .core.threads import set_options
 from .engine.schemes import (
     AsymptoticTime,
@@ -38,27 +49,13 @@ from .engine.schemes import (
     IntervalThreshold,
     VelocityThreshold,
 )
-from .errors import (
-    DamagedStudy,
-    InvalidBlock,
-    InvalidMotion,
-    InvalidOption,
-    OutputError,
-    OutsideFit,
-    RockingError,
-    StudyError,
-    UnequalSides,
-    Unfinished,
-    Unfitted,
-    UnreadableRecord,
-)
-from .explorer.launch import Frame, explore
+from .errors import RockingError
+from .explorer.launch import explore
 from .motion import Motion
-from .motion.description import Description, Origin
 from .motion.scaling import Measure
 from .records.formats import read
-from .response import Gradient, Perturbed, Repeat, Response, Sensitivity, gradient
-from .simulation.ensemble import Product, Scales, simulate_many
+from .response import Response, gradient
+from .simulation.ensemble import simulate_many
 from .simulation.simulate import simulate
 from .solid.solid import Solid
 from .studies import Study, create_study
@@ -69,61 +66,32 @@ __all__ = [
     "AsymptoticTime",
     "Block",
     "Blocks",
-    "Bodies",
-    "Body",
     "Calibration",
     "Certified",
     "ChatteringScheme",
-    "Coordinate",
-    "CriticalScale",
-    "DamagedStudy",
     "Damper",
-    "DatasetResult",
-    "Description",
     "Fragility",
-    "Frame",
     "GeometricBypass",
-    "Gradient",
     "HazardCurve",
-    "HistoryCalibration",
     "IntervalThreshold",
-    "InvalidBlock",
-    "InvalidMotion",
-    "InvalidOption",
     "Load",
     "Measure",
-    "ModelValidation",
     "Motion",
-    "Origin",
-    "OutputError",
-    "OutsideFit",
-    "Perturbed",
-    "Product",
-    "Repeat",
     "Response",
     "Restitution",
     "RestrainedBlock",
-    "RestrainedBlocks",
     "Restraint",
     "Result",
     "RockingError",
-    "Row",
-    "Scales",
-    "Sensitivity",
     "ShakeTest",
-    "Side",
     "Solid",
     "Spring",
     "Study",
-    "StudyError",
     "Tendon",
     "Thrust",
-    "UnequalSides",
-    "Unfinished",
-    "Unfitted",
-    "UnreadableRecord",
     "VelocityThreshold",
     "analysis",
+    "block",
     "calibrate",
     "calibrate_history",
     "calibration",
@@ -132,18 +100,21 @@ __all__ = [
     "create_study",
     "critical_scale",
     "dynamics",
+    "errors",
     "explore",
     "fit_fragility",
     "fragility",
     "gradient",
     "impact_restitution",
     "incremental_dynamic_analysis",
+    "motion",
     "one_sided_restitution",
     "overturning_map",
     "pulses",
     "read",
     "read_tests",
     "records",
+    "response",
     "response_rose",
     "rocking_spectrum",
     "rules",

@@ -60,7 +60,7 @@ def body(kind: str, rng: Drawn) -> tuple[RestrainedBlock, Held]:
     while True:
         try:
             return _body(kind, rng)
-        except rocking.InvalidBlock as refused:
+        except rocking.errors.InvalidBlock as refused:
             if "does not stand" not in str(refused):
                 raise
 

@@ -1,7 +1,7 @@
 from .curve import FragilityCurve
 from .directions import ResponseRose
 from .efficiency import MeasureComparison
-from .incremental import IncrementalDynamicAnalysis
+from .incremental import CriticalScale, IncrementalDynamicAnalysis
 from .overturning import Mode, OverturningMap, mode_name
 from .probit import Goodness, Probit
 from .risk import Rate, Risk, Survival
@@ -9,6 +9,7 @@ from .spectrum import RockingSpectrum
 from .survey import Survey
 
 __all__ = [
+    "CriticalScale",
     "FragilityCurve",
     "Goodness",
     "IncrementalDynamicAnalysis",

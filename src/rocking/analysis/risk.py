@@ -425,7 +425,8 @@ class Survival(Result):
             likely = self.mean_probability
             said = f"{likely:.2g} in the mean and {said}"
         name = "" if self.hazard is None else self.hazard.name
-        text = f"under the hazard curve {name!r} the probability of {format_count(self.years, 'year')} without it is {said}"
+        years = format_count(self.years, "year")
+        text = f"under the hazard curve {name!r} the probability of {years} without it is {said}"
         least = f"{1.0 - self.confidence:.3g}"
         if likely >= 1.0 - self.confidence:
             return f"{text}, so they do not contradict each other"

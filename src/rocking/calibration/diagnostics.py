@@ -142,8 +142,8 @@ class Diagnostics:
 
     def __str__(self) -> str:
         search = (
-            f"{format_count(self.candidates, 'candidate')}, {self.effective:.0f} effective for a typical population; {RUNS} "
-            f"independent runs, R-hat at most {max(self.agreement.values()):.2f}"
+            f"{format_count(self.candidates, 'candidate')}, {self.effective:.0f} effective for a typical population; "
+            f"{RUNS} independent runs, R-hat at most {max(self.agreement.values()):.2f}"
         )
         return "\n".join([search, *(f"note: {sentence}" for sentence in self.notes)])
 

@@ -41,7 +41,7 @@ class Law(NamedTuple):
 
 @dataclass(frozen=True)
 class LinearBody(ABC):
-    """Base class of the bodies, which implements the protocol `rocking.Body`."""
+    """Base class of the bodies, which implements the protocol `rocking.block.body.Body`."""
 
     coordinate: ClassVar[Coordinate] = Coordinate("position", "velocity", "acceleration", "m")
     balance: ClassVar[tuple[float, float]] = (math.inf, math.inf)

@@ -141,7 +141,8 @@ class Branch(Result):
         impacts = "complete chattering" if math.isinf(self.impacts) else format_count(int(self.impacts), "impact")
         low, high = float(self.values.min()), float(self.values.max())
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"orbits of {format_count(self.period, 'period')} with {impacts}, {self.name} from {low:.6g} to {high:.6g}{unit}"
+        orbits = f"orbits of {format_count(self.period, 'period')} with {impacts}"
+        return f"{orbits}, {self.name} from {low:.6g} to {high:.6g}{unit}"
 
     def summary(self) -> str:
         stable = self.is_stable

@@ -1,4 +1,4 @@
-from .description import Description
+from .description import Description, Origin
 from .motion import Motion
 
-__all__ = ["Description", "Motion"]
+__all__ = ["Description", "Motion", "Origin"]

@@ -92,8 +92,9 @@ class Processable(MotionMeasures):
         first_azimuth, second_azimuth = _resolve_azimuths(self, other, recorded)
         if delay := compute_start_delay(self.description, other.description, self.dt):
             early, late = (self, other) if delay > 0.0 else (other, self)
+            first, second = checks.short_repr(early.name), checks.short_repr(late.name)
             raise InvalidMotion(
-                f"by their files {checks.short_repr(late.name)} begins {abs(delay):.6g} s after {checks.short_repr(early.name)}: "
+                f"by their files {second} begins {abs(delay):.6g} s after {first}: "
                 f"cut what comes first with processed(trim=({abs(delay):.6g}, {early.duration:.6g})) of the latter"
             )
         target = checks.finite(azimuth, "azimuth", InvalidMotion)
@@ -436,9 +437,10 @@ def _resolve_azimuths(first_motion: Processable, second_motion: Processable, rec
     if recorded is None:
         recorded = [(motion.description.origin or Origin()).azimuth for motion in (first_motion, second_motion)]
         if None in recorded:
+            name = checks.short_repr((first_motion, second_motion)[recorded.index(None)].name)
             raise InvalidMotion(
-                f"the azimuth of {checks.short_repr((first_motion, second_motion)[recorded.index(None)].name)} is not known"
-                ": give {}=(first, second), the directions of both components in degrees clockwise from north",
+                f"the azimuth of {name} is not known: give {{}}=(first, second), "
+                "the directions of both components in degrees clockwise from north",
                 "recorded",
             )
     azimuths = checks.numbers(recorded, "recorded", InvalidMotion)

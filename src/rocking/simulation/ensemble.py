@@ -80,7 +80,7 @@ class Scales:
     See Also
     --------
     rocking.Measure : Measure of a ground motion.
-    rocking.Product : Combination of bodies, motions, scales and polarities.
+    rocking.simulation.ensemble.Product : Combination of bodies, motions, scales and polarities.
     """
 
     measure: Measure | None = None
@@ -141,7 +141,7 @@ class Product:
 
     See Also
     --------
-    rocking.Scales : Levels of the motions.
+    rocking.simulation.ensemble.Scales : Levels of the motions.
     rocking.simulate_many : Simulate all combinations.
     """
 
