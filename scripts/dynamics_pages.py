@@ -172,7 +172,7 @@ def sticking_figure():
         counts = []
         for distance in away:
             strobe = dynamics.stroboscopic_map(*oscillating(0.5, ends[0.5] + distance))
-            counts.append(strobe.followed(strobe([[0.0, 0.0]], 100)[0], 1)[2])
+            counts.append(strobe.advance(strobe([[0.0, 0.0]], 100)[0], 1)[2])
         beyond.plot(away, counts, drawstyle="steps-mid", **CURVES[0])
         beyond.set_xscale("log")
         add_labels(beyond, "frequency beyond the boundary", "impacts in a period")

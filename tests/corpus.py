@@ -736,7 +736,7 @@ def maps_of_a_period() -> Iterator[Item]:
     for kind, (body, motion, (positions, velocities)) in PERIODIC.items():
         strobe = dynamics.stroboscopic_map(body, motion)
         states = np.array([(x, v) for x in positions for v in velocities])
-        yield kind, list(strobe.followed(states, 12))
+        yield kind, list(strobe.advance(states, 12))
         yield "orbit", strobe.orbit(states[1], 5)
 
 
@@ -786,7 +786,7 @@ def basins() -> Iterator[Item]:
 def exponents() -> Iterator[Item]:
     for body, motion, (positions, velocities) in PERIODIC.values():
         found = dynamics.lyapunov_exponents(body, motion, (positions[1], velocities[2]), 40, transient=5)
-        yield "exponents", [found.largest, found.smallest, found.impacts, found.resting, int(found.fate)]
+        yield "exponents", [found.largest, found.smallest, found.impacts, found.resting, int(found.outcome)]
         yield "summary", found.summary()
 
 

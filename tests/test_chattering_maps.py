@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.families import SimulationInput
-from rocking.chattering.maps import Outcome, chattering_episodes, chattering_map
+from rocking.chattering.maps import UpliftOutcome, chattering_episodes, chattering_map
 from rocking.motion.motion import find_exceedances
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)

@@ -47,7 +47,7 @@ def compared(seed, cells, periods=200):
     found = dynamics.basins(body, motion, x, v, periods, model=model)
     strobe = dynamics.stroboscopic_map(body, motion, model=model)
     states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
-    plain, fates, _ = strobe.followed(states, periods)
+    plain, fates, _ = strobe.advance(states, periods)
     names, outcome = found.data.attractor.values, found.data.outcome.values.ravel()
     size = np.array([np.ptp(x), np.ptp(v)])
     judged, wrong, ambiguous = 0, 0, 0
@@ -57,7 +57,7 @@ def compared(seed, cells, periods=200):
             continue
         judged += np.count_nonzero(here)
         if name.startswith("overturns"):
-            off = here & (fates != dynamics.Fate.OVERTURNED)
+            off = here & (fates != dynamics.PeriodOutcome.OVERTURNED)
         else:
             orbit = np.stack([found.data.orbit_coordinate.values[k], found.data.orbit_velocity.values[k]], axis=-1)
             apart = np.nanmin(np.abs((plain[:, None] - orbit) / size).max(axis=2), axis=1, initial=9.0)
@@ -68,7 +68,7 @@ def compared(seed, cells, periods=200):
             off = here & ~(apart < 1e-6 + 0.1 * late)
         wrong += np.count_nonzero(off)
         for state in states[off]:
-            near, near_fates, _ = strobe.followed(state + 1e-9 * size * default_rng(1).normal(size=(40, 2)), periods)
+            near, near_fates, _ = strobe.advance(state + 1e-9 * size * default_rng(1).normal(size=(40, 2)), periods)
             ambiguous += len(set(near_fates.tolist())) > 1 or np.ptp(near, axis=0).max() > 0.01 * size.min()
     return judged, wrong, ambiguous
 
@@ -149,8 +149,8 @@ def test_a_neighbourhood_holds_what_enters_it():
         body, motion, (low, high), model = drawn(seed)
         strobe = dynamics.stroboscopic_map(body, motion, model=model)
         known = KnownAttractors(strobe, np.array([np.ptp(low), np.ptp(high)]))
-        ends, fates, _ = strobe.followed(default_rng(seed).uniform(*np.transpose([low, high]), (20, 2)), 300)
-        known.settle(ends[fates != dynamics.Fate.OVERTURNED])
+        ends, fates, _ = strobe.advance(default_rng(seed).uniform(*np.transpose([low, high]), (20, 2)), 300)
+        known.settle(ends[fates != dynamics.PeriodOutcome.OVERTURNED])
         for trap, owner in zip(known.traps, known.owner, strict=True):
             if trap[0] < 0:
                 continue
@@ -169,7 +169,7 @@ def test_a_neighbourhood_holds_what_enters_it():
 
 def test_an_attractor_that_rests_at_the_start_of_a_period_is_known_after_one():
     ball, table = dynamics.BouncingBall(0.3, gravity=10.0), pulses.sine(11.0, 2.0, cycles=1)
-    found = dynamics.basins(ball, table, np.linspace(0.0, 0.1, 41), np.linspace(0.01, 0.5, 41), periods=5)
+    found = dynamics.basins(ball, table, np.linspace(0.0, 0.1, 41), np.linspace(0.01, 0.5, 41), n_periods=5)
     assert not dynamics.stroboscopic_map(ball, table)([0.05, 0.0]).any()
     taken, counts = np.unique(found.data.periods.values, return_counts=True)
     # The first cells come before the attractor is known, and all others after it.

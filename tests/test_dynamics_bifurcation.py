@@ -121,8 +121,8 @@ def test_what_takes_too_many_steps_is_not_said_to_overturn(transient):
     found = dynamics.bifurcation_diagram(
         lambda level: (lively, pulses.sine(level, 0.5, cycles=1)), [0.1], start, transient=transient, kept=2
     )
-    _, fate, _ = dynamics.stroboscopic_map(lively, pulses.sine(0.1, 0.5, cycles=1)).followed(start)
-    assert fate == dynamics.Fate.UNFINISHED and np.isnan(found.data.coordinate.values).all()
+    _, fate, _ = dynamics.stroboscopic_map(lively, pulses.sine(0.1, 0.5, cycles=1)).advance(start)
+    assert fate == dynamics.PeriodOutcome.UNFINISHED and np.isnan(found.data.coordinate.values).all()
     assert found.data.period.values.tolist() == [[[-2]]]
     assert found.summary().endswith("up: not followed throughout") and "overturned" not in found.summary()
     (figure_legend,) = found.plot().legends

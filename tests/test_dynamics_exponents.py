@@ -63,16 +63,16 @@ def test_where_every_period_holds_a_rest_they_are_minus_infinity():
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.5)
     found = dynamics.lyapunov_exponents(block, pulses.sine(2.1, 1.5, cycles=1), [0.0, 0.0], 100)
     assert found.largest == found.smallest == -math.inf and found.resting == 1.0
-    assert found.fate in (dynamics.Fate.MOVES, dynamics.Fate.RESTS)
+    assert found.outcome in (dynamics.PeriodOutcome.MOVES, dynamics.PeriodOutcome.RESTS)
     assert "comes to rest in 100 %" in found.summary()
     still = dynamics.lyapunov_exponents(block, pulses.sine(1.9, 0.5, cycles=1), [0.01, 0.0], 100)
-    assert still.largest == -math.inf and still.fate == dynamics.Fate.RESTS_FOR_EVER
+    assert still.largest == -math.inf and still.outcome == dynamics.PeriodOutcome.RESTS_FOR_EVER
 
 
 def test_a_body_that_overturns_has_none():
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     found = dynamics.lyapunov_exponents(block, pulses.sine(20.0, 0.5, cycles=1), [0.1, 0.2], 100)
-    assert math.isnan(found.largest) and found.fate == dynamics.Fate.OVERTURNED
+    assert math.isnan(found.largest) and found.outcome == dynamics.PeriodOutcome.OVERTURNED
     assert "overturns" in found.summary() and found.to_dict()["fate"] == "OVERTURNED"
 
 

@@ -66,9 +66,9 @@ def test_the_map_is_a_simulation_of_as_many_periods(name):
                 judged += 1
                 moving += orbit[n, 1] != 0.0
     assert judged > 100 and moving > 20
-    after, fates, _ = strobe.followed(given, 8)
+    after, fates, _ = strobe.advance(given, 8)
     assert np.array_equal(after, orbits[:, -1], equal_nan=True)
-    assert np.all((fates == dynamics.Fate.OVERTURNED) == np.isnan(after[:, 0]))
+    assert np.all((fates == dynamics.PeriodOutcome.OVERTURNED) == np.isnan(after[:, 0]))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -78,9 +78,9 @@ def test_the_derivative_is_that_of_finite_differences_and_zero_after_a_rest(name
     given = starts(body, 60, 2)
     after, change = strobe.derivative(given)
     assert np.array_equal(after, strobe(given), equal_nan=True)
-    differences, counts = np.empty_like(change), [strobe.followed(given)[2]]
+    differences, counts = np.empty_like(change), [strobe.advance(given)[2]]
     for column, step in enumerate(2e-6 * np.eye(2)):
-        found = {k: strobe.followed(given + k * step) for k in (-2, -1, 1, 2)}
+        found = {k: strobe.advance(given + k * step) for k in (-2, -1, 1, 2)}
         difference = 8.0 * (found[1][0] - found[-1][0]) - (found[2][0] - found[-2][0])
         differences[:, :, column] = difference / (12.0 * 2e-6)
         counts += [each[2] for each in found.values()]
@@ -163,8 +163,8 @@ def test_area_shrinks_by_the_square_of_the_restitution_at_each_impact_and_by_dam
     strobe = dynamics.stroboscopic_map(body, motion)
     given = starts(body, 40, 3)
     _, change = strobe.derivative(given)
-    _, fates, impacts = strobe.followed(given)
-    known = (fates == dynamics.Fate.MOVES) & (impacts < 6)
+    _, fates, impacts = strobe.advance(given)
+    known = (fates == dynamics.PeriodOutcome.MOVES) & (impacts < 6)
     drag = math.exp(-2.0 * 0.05 * 2.0 * math.pi * 1.0 / 1.3)
     # Seen at fixed times an impact multiplies areas by e squared times the ratio of energies, which is one.
     assert np.linalg.det(change[known]) == pytest.approx(drag * 0.8 ** (2.0 * impacts[known]), rel=1e-9)
@@ -178,11 +178,11 @@ def test_what_no_body_follows_is_not_a_number_at_once(name):
     motion = pulses.sine(amplitude, frequency, cycles=1)
     strobe = dynamics.stroboscopic_map(body, motion, model=model)
     wrong = [[math.nan, 0.0], [0.0, math.nan], [0.0, math.inf], [0.05, 1e308]]
-    _ = strobe.followed([0.01, 0.1]), strobe.derivative([0.01, 0.1])  # compiled
+    _ = strobe.advance([0.01, 0.1]), strobe.derivative([0.01, 0.1])  # compiled
     before = time.process_time()
-    after, fates, _ = strobe.followed([*wrong, [0.01, 0.1]], 5)
+    after, fates, _ = strobe.advance([*wrong, [0.01, 0.1]], 5)
     assert np.isnan(after[:-1]).all() and np.isfinite(after[-1]).all()
-    assert fates.tolist() == [dynamics.Fate.UNFINISHED] * 4 + [dynamics.Fate.MOVES]
+    assert fates.tolist() == [dynamics.PeriodOutcome.UNFINISHED] * 4 + [dynamics.PeriodOutcome.MOVES]
     assert all(np.isnan(each).all() for each in strobe.derivative(wrong, 3))
     assert time.process_time() - before < 2.0
 
@@ -230,7 +230,7 @@ def test_steps_over_pieces_in_closed_form_are_what_the_march_finds(seed, count):
         strobe, marched = (dynamics.stroboscopic_map(body, motion, model=model) for _ in range(2))
         marched._steps = strobe._steps[:, :0]
         given = starts(body, 20, int(rng.integers(2**31)))
-        (found, fates, impacts), (expected, known, counted) = (each.followed(given) for each in (strobe, marched))
+        (found, fates, impacts), (expected, known, counted) = (each.advance(given) for each in (strobe, marched))
         assert np.array_equal(fates, known) and np.array_equal(impacts, counted)
         _, change = marched.derivative(given)
         # Rounding grows as the derivative says.
@@ -238,7 +238,7 @@ def test_steps_over_pieces_in_closed_form_are_what_the_march_finds(seed, count):
         allowed = allowed * (20.0 + np.nan_to_num(np.abs(change).max(axis=(1, 2)), posinf=1e300))
         error = np.nan_to_num(np.abs(found - expected).max(axis=-1))
         assert np.all(error <= allowed)
-        judged += np.count_nonzero(fates == dynamics.Fate.MOVES)
+        judged += np.count_nonzero(fates == dynamics.PeriodOutcome.MOVES)
         stepped += strobe._steps.shape[1] > 0
     assert judged > 7.5 * count and stepped > 0.5 * count
 

@@ -261,7 +261,7 @@ def test_the_test_of_fit_is_pearsons_over_stripes():
     chance = curve.probability(intensity)
     statistic = np.sum((exceeded - 20 * chance) ** 2 / (20 * chance * (1 - chance)))
     assert curve.goodness.statistic == pytest.approx(statistic, rel=1e-12)
-    assert curve.goodness.freedom == 3
+    assert curve.goodness.degrees_of_freedom == 3
     assert curve.goodness.p_value == pytest.approx(stats.chi2.sf(statistic, 3), rel=1e-9)
 
 
@@ -457,7 +457,7 @@ def test_a_block_of_weight_zero_is_none_of_the_data():
     alone = fragility(a, motions, measure="pga_ratio")
     one, other = both.curves[0], alone.curves[0]
     assert both.range == alone.range
-    assert one.independent and one.goodness.freedom == other.goodness.freedom
+    assert one.independent and one.goodness.degrees_of_freedom == other.goodness.degrees_of_freedom
     assert one.goodness.p_value == pytest.approx(other.goodness.p_value, rel=1e-9)
     assert one.trials.sum() == other.trials.sum() == len(motions)
     assert one.median_interval == pytest.approx(other.median_interval, rel=1e-9)

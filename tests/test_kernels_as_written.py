@@ -199,7 +199,7 @@ def mapped(model: str) -> Numbers:
                 yield from np.ravel(section.orbit([state], 2))
                 yield from np.ravel(section.derivative([state], 1)[1])
     fallen = dynamics.lyapunov_exponents(STATUE, push.scaled(3.0), (0.0, 0.0), 20, transient=0, model=model)
-    yield from (fallen.fate, fallen.period)
+    yield from (fallen.outcome, fallen.forcing_period)
     ball = dynamics.BouncingBall(0.6)
     states = np.stack(np.meshgrid(np.linspace(0.005, 0.4, 12), [-1.0, 0.1, 1.5]), axis=-1).reshape(-1, 2)
     for body in (dynamics.BouncingBall(0.0), dynamics.ImpactOscillator(3.0, 0.0, 0.05, stop=0.02, second_stop=0.5)):

@@ -166,7 +166,7 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
     judged = 0
     for state in ([0.05, 0.0], [0.02, 0.1], [-0.08, 0.05], [0.1, -0.1]):
         _, change = strobe.derivative(state)
-        _, _, impacts = strobe.followed(state)
+        _, _, impacts = strobe.advance(state)
         h = 1e-6
         ends = [
             strobe([[a + s * da, b + s * db]])[0] for a, b in [state] for da, db in ((h, 0), (0, h)) for s in (1, -1)

@@ -226,7 +226,7 @@ def test_a_body_of_another_size_moves_alike_in_another_time(restraint, factor):
     """A larger one is slower: what shakes it as much more slowly turns it as far."""
     body = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0, restitution=0.85), restraint).alone()
     peaks = []
-    for bodies, rate in ((body, 1.0), (body.resized(np.array([factor])), factor)):
+    for bodies, rate in ((body, 1.0), (body.with_p_scaled(np.array([factor])), factor)):
         found = rocking.simulate_many(bodies, [rocking.pulses.one_sine(a, 2.0 * rate) for a in (2.5, 3.5, 9.0)])
         peaks.append([found.peak_rotation.values.ravel(), rate * found.peak_time.values.ravel()])
     np.testing.assert_allclose(peaks[1], peaks[0], rtol=1e-9)

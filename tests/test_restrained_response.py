@@ -350,7 +350,7 @@ def test_a_resized_body_has_the_same_rotations_under_a_motion_as_much_slower(mod
     for level in (0.25, 0.5, 1.0):
         here = rocking.simulate_many(tied, rocking.Motion.from_samples(level * rough, 0.02), model=model)
         slower = rocking.Motion.from_samples(level * rough, 0.02 / factor)
-        there = rocking.simulate_many(tied.resized(np.array([factor])), slower, model=model)
+        there = rocking.simulate_many(tied.with_p_scaled(np.array([factor])), slower, model=model)
         assert there.peak_rotation.item() == pytest.approx(here.peak_rotation.item(), rel=1e-9)
         judged += not here.overturned.item()
     assert judged >= 2

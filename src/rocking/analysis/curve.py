@@ -186,7 +186,7 @@ class FragilityCurve:
             "clusters": self.clusters,
             "log_likelihood": self.log_likelihood,
             "goodness_statistic": self.goodness.statistic,
-            "goodness_freedom": self.goodness.freedom,
+            "goodness_freedom": self.goodness.degrees_of_freedom,
             "goodness_p_value": self.goodness.p_value,
         }
 

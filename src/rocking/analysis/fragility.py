@@ -166,7 +166,7 @@ class Fragility(Result):
                 f"there is no p of fit: the test takes all outcomes for independent, and those of one {self.source} "
                 "belong together"
             )
-        elif self.curves[0].goodness.freedom < 1:
+        elif self.curves[0].goodness.degrees_of_freedom < 1:
             notes.append("there is no p of fit: the test needs three groups of outcomes, of five or so each")
         return tuple(notes)
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Mode(IntEnum):
+class OverturningMode(IntEnum):
     """Outcome of a block under a pulse. Other modes n >= 0 are overturning after n impacts.
 
     Attributes
@@ -62,11 +62,11 @@ class Mode(IntEnum):
 
 
 _NAMES: Final = {
-    Mode.UNFINISHED: "not finished",
-    Mode.OVERTURNS_AFTER_REST: "overturns after a rest",
-    Mode.NO_UPLIFT: "no uplift",
-    Mode.RESTS: "rests before the pulse is over",
-    Mode.ROCKS: "rocks until the pulse is over",
+    OverturningMode.UNFINISHED: "not finished",
+    OverturningMode.OVERTURNS_AFTER_REST: "overturns after a rest",
+    OverturningMode.NO_UPLIFT: "no uplift",
+    OverturningMode.RESTS: "rests before the pulse is over",
+    OverturningMode.ROCKS: "rocks until the pulse is over",
     0: "overturns without impact",
 }
 
@@ -183,13 +183,13 @@ def overturning_map(
     def followed(
         column: Integers, level: Floats, done: Callable[[int], None] = lambda count: None
     ) -> tuple[Integers, Floats]:
-        """Mode and peak rotation of each block, selected by column, at its level."""
+        """OverturningMode and peak rotation of each block, selected by column, at its level."""
         ends = np.empty(column.size, dtype=OUTCOME)
         here = replace(setup, bodies=setup.bodies.select(column))
         for task, outcomes in simulate_each(here, unit, threshold * level):
             ends[task.bodies] = outcomes
             done(len(outcomes))
-        return np.where(ends["unfinished"], Mode.UNFINISHED, modes_of(ends, unit.end)), ends["peak_rotation"]
+        return np.where(ends["unfinished"], OverturningMode.UNFINISHED, modes_of(ends, unit.end)), ends["peak_rotation"]
 
     row, column = (index.ravel() for index in np.indices((levels.size, ratios.size)))
     with Progress("mapping", row.size) as bar:
@@ -210,12 +210,12 @@ def overturning_map(
 
 
 def mode_name(mode: int) -> str:
-    """Return the description of a `Mode` or of a number of impacts before overturning.
+    """Return the description of a `OverturningMode` or of a number of impacts before overturning.
 
     Parameters
     ----------
     mode : int
-        Mode in the results of `overturning_map`.
+        OverturningMode in the results of `overturning_map`.
 
     Returns
     -------
@@ -235,13 +235,15 @@ def mode_name(mode: int) -> str:
 def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
     """Modes of blocks under a motion of given duration (s), from the engine's results."""
     rested = (ends["uplifts"] > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= duration))
-    modes = np.where(ends["uplifts"] == 0, Mode.NO_UPLIFT, np.where(rested, Mode.RESTS, Mode.ROCKS))
-    overturns = np.where(ends["uplifts"] > 1, Mode.OVERTURNS_AFTER_REST, ends["impacts"])
+    modes = np.where(
+        ends["uplifts"] == 0, OverturningMode.NO_UPLIFT, np.where(rested, OverturningMode.RESTS, OverturningMode.ROCKS)
+    )
+    overturns = np.where(ends["uplifts"] > 1, OverturningMode.OVERTURNS_AFTER_REST, ends["impacts"])
     return np.where(ends["overturned"], overturns, modes)
 
 
 def _overturns(modes: Integers) -> Flags:
-    found: Flags = (modes >= 0) | (modes == Mode.OVERTURNS_AFTER_REST)
+    found: Flags = (modes >= 0) | (modes == OverturningMode.OVERTURNS_AFTER_REST)
     return found
 
 
@@ -254,7 +256,7 @@ class OverturningMap(DatasetResult):
     Attributes
     ----------
     data : xarray.Dataset
-        Over (amplitude, frequency): mode (a `Mode`, or the number of impacts before overturning), and peak_rotation
+        Over (amplitude, frequency): mode (a `OverturningMode`, or the number of impacts before overturning), and peak_rotation
         (rad, pi/2 for overturning). Over (frequency): overturning_amplitude, the lowest that overturns, or NaN if none
         or already the first does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and
         above the boundary.
@@ -291,7 +293,11 @@ class OverturningMap(DatasetResult):
                 f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model",
                 format_table(["outcome", "share of the map"], shares),
                 format_some_rows(["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"], rows),
-                *([f"note: {missing}"] if (missing := missing_text(self.data.mode.values == Mode.UNFINISHED)) else []),
+                *(
+                    [f"note: {missing}"]
+                    if (missing := missing_text(self.data.mode.values == OverturningMode.UNFINISHED))
+                    else []
+                ),
             ]
         )
 

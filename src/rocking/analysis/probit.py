@@ -98,15 +98,15 @@ class Goodness:
     ----------
     statistic : float
         Sum over groups of (seen - expected)^2/variance.
-    freedom : int
-        Degrees of freedom: number of groups minus two.
+    degrees_of_freedom : int
+        Degrees of degrees_of_freedom: number of groups minus two.
     p_value : float
         Probability of a larger statistic if the lognormal is right, or NaN for fewer than three groups or dependent
         outcomes.
     """
 
     statistic: float
-    freedom: int
+    degrees_of_freedom: int
     p_value: float
 
 
@@ -240,14 +240,14 @@ def goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
     chance = probabilities(fitted, data.z)[0]
     expected, variance = (np.bincount(group, data.trials * terms) for terms in (chance, chance * (1.0 - chance)))
     seen = np.bincount(group, data.exceeded)
-    freedom = len(seen) - 2
-    if freedom < 1:
-        return Goodness(math.nan, max(freedom, 0), math.nan)
+    degrees_of_freedom = len(seen) - 2
+    if degrees_of_freedom < 1:
+        return Goodness(math.nan, max(degrees_of_freedom, 0), math.nan)
     # If a group's variance vanishes, the fitted probability is 0 or 1, as observed.
     with np.errstate(over="ignore"):
         statistic = float(np.sum((seen - expected) ** 2 / np.maximum(variance, np.finfo(float).tiny)))
-    chance_of_more = float(gammaincc(0.5 * freedom, 0.5 * statistic)) if independent else math.nan
-    return Goodness(statistic, freedom, chance_of_more)
+    chance_of_more = float(gammaincc(0.5 * degrees_of_freedom, 0.5 * statistic)) if independent else math.nan
+    return Goodness(statistic, degrees_of_freedom, chance_of_more)
 
 
 def _overlap(z: Floats) -> float:

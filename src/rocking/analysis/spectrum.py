@@ -135,7 +135,7 @@ def rocking_spectrum(
         rates = checks.positive_numbers(rates_of(p, size, gathered.gravity), "p", InvalidOption)
     count, n = len(rates), len(gathered)
     checks.grid_size({"motions": len(shaken), "blocks": n, "p": count}, InvalidOption)
-    resized = gathered.select(np.repeat(np.arange(n), count)).resized(np.tile(rates / median, n))
+    resized = gathered.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(rates / median, n))
     table = simulate_many(resized, shaken, **options)
     peak, overturned, unfinished = (
         table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED

@@ -342,7 +342,7 @@ class Blocks:
         chosen = {name: values[rows] for name, values in self._arrays().items()}
         return Blocks.__new__(Blocks)._fill(self.gravity, chosen)
 
-    def resized(self, factors: Floats) -> Blocks:
+    def with_p_scaled(self, factors: Floats) -> Blocks:
         """Return blocks of the same shapes with p multiplied by these factors.
 
         Lengths are divided by the square of the factor. Forces of restraints keep their ratio to the weight: for a

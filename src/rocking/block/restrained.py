@@ -97,7 +97,7 @@ class RestrainedBlock(Rocking):
         _check(restraints, own)
         tilt = checks.finite(lean, "lean", InvalidBlock)
         law = restitution if isinstance(restitution, Restitution) else None
-        factors = restitution.largest if isinstance(restitution, Restitution) else restitution
+        factors = restitution.maximum if isinstance(restitution, Restitution) else restitution
         rest = [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_way
         rest += [str(law)] * (law is not None)
         if one_way and restitution is None:

@@ -392,14 +392,14 @@ class Load(Restraint):
 class Restitution:
     """Law by which the restitution of a `RestrainedBlock` varies between two bounds from impact to impact.
 
-    With a slope the restitution decreases linearly with the speed of the impact: max(least, largest - slope speed).
+    With a slope the restitution decreases linearly with the speed of the impact: max(minimum, maximum - slope speed).
     With a seed it is drawn at each impact, uniformly between both bounds, by Philox 2x32 with ten rounds.
 
     Parameters
     ----------
-    largest, least : float or pair
+    maximum, minimum : float or pair
         Bounds of the factor on the angular speed, in (0, 1]. A pair is (on leaving side +, on leaving side -). The
-        largest value replaces the restitution of each `Side`.
+        maximum replaces the restitution of each `Side`.
     slope : float or pair
         Decrease per angular speed before the impact, s/rad, at least 0.
     seed : int, optional
@@ -430,8 +430,8 @@ class Restitution:
     [0.8473, 0.8629, 0.8749]
     """
 
-    largest: float | Sequence[float]
-    least: float | Sequence[float]
+    maximum: float | Sequence[float]
+    minimum: float | Sequence[float]
     slope: float | Sequence[float] | None = None
     seed: int | None = None
 
@@ -447,14 +447,14 @@ class Restitution:
                 "slope",
                 value=self.slope,
             )
-        for low, high in zip(checked_pair(self.least, "least"), checked_pair(self.largest, "largest"), strict=True):
+        for low, high in zip(checked_pair(self.minimum, "minimum"), checked_pair(self.maximum, "maximum"), strict=True):
             if not 0.0 < high <= 1.0:
                 hint = checks.hint_at_percent(high)
-                raise InvalidBlock(f"{{}} must be in (0, 1], not {high:g}{hint}", "largest", value=self.largest)
+                raise InvalidBlock(f"{{}} must be in (0, 1], not {high:g}{hint}", "maximum", value=self.maximum)
             if not 0.0 < low <= high:
                 raise InvalidBlock(
-                    f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}", "least", "largest",
-                    value=self.least,
+                    f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}", "minimum", "maximum",
+                    value=self.minimum,
                 )  # fmt: skip
         if self.seed is not None:
             checks.integer(self.seed, "seed", InvalidBlock, 0, _LARGEST_SEED)
@@ -469,8 +469,8 @@ class Restitution:
 
     def __str__(self) -> str:
         if self.seed is None:
-            return f"restitution falling from {self.largest} by {self.slope} per rad/s to {self.least}"
-        return f"restitution drawn from {self.least} to {self.largest}, seed {self.seed}"
+            return f"restitution falling from {self.maximum} by {self.slope} per rad/s to {self.minimum}"
+        return f"restitution drawn from {self.minimum} to {self.maximum}, seed {self.seed}"
 
 
 def _at(offset: float) -> str:

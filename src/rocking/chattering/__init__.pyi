@@ -14,7 +14,7 @@ from .expansions import (
     first_interval,
     series_coefficients,
 )
-from .maps import ChatteringEpisodes, ChatteringMap, Outcome, chattering_episodes, chattering_map
+from .maps import ChatteringEpisodes, ChatteringMap, UpliftOutcome, chattering_episodes, chattering_map
 from .report import ChatteringReport, CriticalReport, chattering_report, critical_report
 
 __all__ = [
@@ -23,7 +23,7 @@ __all__ = [
     "ChatteringReport",
     "ChatteringSequence",
     "CriticalReport",
-    "Outcome",
+    "UpliftOutcome",
     "asymptotic_table",
     "chattering_episodes",
     "chattering_map",

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Outcome(IntEnum):
-    """Outcome of the first uplift.
+class UpliftOutcome(IntEnum):
+    """UpliftOutcome of the first uplift.
 
     Attributes
     ----------
@@ -93,8 +93,8 @@ class _Point(NamedTuple):
 #: Units and meanings of the variables of a map.
 _ATTRIBUTES: Final[dict[str, dict[str, Any]]] = {
     "outcome": {
-        "flag_values": [outcome.value for outcome in Outcome],
-        "flag_meanings": " ".join(outcome.name.lower() for outcome in Outcome),
+        "flag_values": [outcome.value for outcome in UpliftOutcome],
+        "flag_meanings": " ".join(outcome.name.lower() for outcome in UpliftOutcome),
     },
     **{name: {"units": "s"} for name in ("uplift", "rest", "lower", "upper")},
     "rests": {"units": "1", "long_name": "times the block comes to rest"},
@@ -180,7 +180,7 @@ def chattering_map(
         {first: x, second: y},
         {"program": f"rocking {VERSION}", "case": _in_common(inputs[0], inputs[-1])},
     )
-    return ChatteringMap(dataset.assign(complete=dataset.outcome == Outcome.COMPLETE))
+    return ChatteringMap(dataset.assign(complete=dataset.outcome == UpliftOutcome.COMPLETE))
 
 
 def _is_swapped(family: Family, first: str, second: str) -> bool:
@@ -199,7 +199,7 @@ class ChatteringMap(DatasetResult):
     Attributes
     ----------
     data : xarray.Dataset
-        With the two parameters as dimensions: outcome (see `Outcome`), complete (whether it is COMPLETE), uplift and
+        With the two parameters as dimensions: outcome (see `UpliftOutcome`), complete (whether it is COMPLETE), uplift and
         rest (times of the first uplift and the first rest, s), lower and upper (proven bounds of that rest, s), rests
         (total number), overturned (at any time).
 
@@ -215,7 +215,7 @@ class ChatteringMap(DatasetResult):
     def summary(self) -> str:
         values, counts = np.unique(self.data.outcome, return_counts=True)
         rows = [
-            (Outcome(value).words, f"{100 * count / self.data.outcome.size:.1f} %")
+            (UpliftOutcome(value).words, f"{100 * count / self.data.outcome.size:.1f} %")
             for value, count in zip(values, counts, strict=True)
         ]
         first, second = self.data.outcome.dims
@@ -226,11 +226,11 @@ class ChatteringMap(DatasetResult):
 
     def _later(self) -> NDArray[np.bool_]:
         """Whether a block overturns after its first rocking has ended otherwise."""
-        return np.asarray(self.data.overturned & (self.data.outcome != Outcome.OVERTURNS))
+        return np.asarray(self.data.overturned & (self.data.outcome != UpliftOutcome.OVERTURNS))
 
     def to_dict(self) -> dict[str, Any]:
         columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
-        return {"outcomes": {outcome.value: outcome.words for outcome in Outcome}, **columns}
+        return {"outcomes": {outcome.value: outcome.words for outcome in UpliftOutcome}, **columns}
 
     def plot(
         self,
@@ -253,7 +253,7 @@ class ChatteringMap(DatasetResult):
             x=self.data[second].values,
             y=self.data[first].values,
             outcome=self.data.outcome.values,
-            meanings=[outcome.words for outcome in Outcome],
+            meanings=[outcome.words for outcome in UpliftOutcome],
             later=self._later(),
             x_label=written.get(str(second), str(second)),
             y_label=written.get(str(first), str(first)),
@@ -275,19 +275,19 @@ def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: fl
 
 
 def outcomes_of(ends: NDArray[np.void], last: float | None) -> Integers:
-    """Return the `Outcome` of each block from the results of its certified simulation.
+    """Return the `UpliftOutcome` of each block from the results of its certified simulation.
 
     ``last`` is the last exceedance of the motion from `last_exceedance`. For a block that rests several times UNPROVEN
     means that one of the rests is not proven.
     """
     if last is None:
-        return np.full(len(ends), Outcome.NO_UPLIFT, dtype=np.int64)
+        return np.full(len(ends), UpliftOutcome.NO_UPLIFT, dtype=np.int64)
     rested = ends["rests"] > 0
-    found = np.where(ends["first_rest"] <= last, Outcome.RESTS_LATER, Outcome.RESTS_AT_LAST)
-    found[ends["complete_chattering"]] = Outcome.COMPLETE
-    found[~rested] = Outcome.OVERTURNS
-    found[(ends["rests_by_rounding"] > 0) | (ends["unfinished"] & ~rested)] = Outcome.UNPROVEN
-    found[ends["uplifts"] == 0] = Outcome.NO_UPLIFT
+    found = np.where(ends["first_rest"] <= last, UpliftOutcome.RESTS_LATER, UpliftOutcome.RESTS_AT_LAST)
+    found[ends["complete_chattering"]] = UpliftOutcome.COMPLETE
+    found[~rested] = UpliftOutcome.OVERTURNS
+    found[(ends["rests_by_rounding"] > 0) | (ends["unfinished"] & ~rested)] = UpliftOutcome.UNPROVEN
+    found[ends["uplifts"] == 0] = UpliftOutcome.NO_UPLIFT
     return found.astype(np.int64)
 
 
@@ -309,7 +309,7 @@ def _simulated(given: SimulationInput) -> _Point:
     response = simulate(given.block, given.motion, model=given.model)
     last = last_exceedance(given.motion, given.block.uplift_thresholds(given.model), given.block.gravity)
     if not len(response.events) or last is None:
-        return _Point(Outcome.NO_UPLIFT)
+        return _Point(UpliftOutcome.NO_UPLIFT)
     ends = np.zeros(1, OUTCOME)
     uplift, rests = float(response.events["time"][0]), len(response.sequences)
     ends["uplifts"], ends["rests"], ends["unfinished"] = 1, rests, response.unfinished

@@ -3,7 +3,7 @@ from .bifurcation import BifurcationDiagram, LyapunovExponents, bifurcation_diag
 from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum, Law, LinearBodies, Response, simulate
 from .branches import Bifurcation, Branch
 from .continuation import continue_orbit
-from .maps import Fate, StroboscopicMap, stroboscopic_map
+from .maps import PeriodOutcome, StroboscopicMap, stroboscopic_map
 from .orbits import PeriodicOrbit, periodic_orbits
 
 __all__ = [
@@ -12,7 +12,7 @@ __all__ = [
     "BifurcationDiagram",
     "BouncingBall",
     "Branch",
-    "Fate",
+    "PeriodOutcome",
     "ImpactOscillator",
     "InvertedPendulum",
     "Law",

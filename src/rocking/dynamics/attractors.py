@@ -83,7 +83,7 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
     multipliers = multipliers_at(strobe, change)
     if sizes_of(multipliers).max() >= 1.0:
         return None
-    _, _, impacts = strobe.followed(at, period)
+    _, _, impacts = strobe.advance(at, period)
     return Attractor(strobe.orbit(at, period)[:-1], multipliers, int(impacts), not change.any())
 
 
@@ -125,7 +125,7 @@ def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: 
         if attractor.rests:
             target = strobe._coordinates(np.array([u]), np.array([v]), np.array([side]))[0]
             return bool(not changes.any() and np.abs((after - target) / size).max() < 1e-9)
-        _, _, impacts = strobe.followed(samples, attractor.period)
+        _, _, impacts = strobe.advance(samples, attractor.period)
         norms = np.linalg.norm(shape @ changes @ np.linalg.inv(shape), ord=2, axis=(1, 2))
         return bool(np.all(impacts == attractor.impacts) and np.all(norms <= 0.5 * (1.0 + rate)))
 

@@ -20,7 +20,7 @@ from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.maps import StroboscopicMap, described, scale_of, sensible
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
-from rocking.kernels.periodic import Fate
+from rocking.kernels.periodic import PeriodOutcome
 from rocking.motion.motion import Motion
 
 if TYPE_CHECKING:
@@ -223,9 +223,9 @@ class _Grid:
         _, made = strobe._states(self.states[cells])
         traps, taken = self.known.settled(made, self.periods)
         outcome = np.where(traps >= 0, _FIRST + np.append(self.known.owner, 0)[traps], _UNSETTLED)
-        over = made["ending"] == Fate.OVERTURNED
+        over = made["ending"] == PeriodOutcome.OVERTURNED
         outcome[over] = np.where(made["side"][over] > 0, _TO_MINUS, _TO_PLUS)
-        left = np.flatnonzero((traps < 0) & ~over & (made["ending"] != Fate.UNFINISHED))
+        left = np.flatnonzero((traps < 0) & ~over & (made["ending"] != PeriodOutcome.UNFINISHED))
         later = self.known.settle(strobe._coordinates(made["u"][left], made["v"][left], made["side"][left]))
         outcome[left] = np.where(later >= 0, _FIRST + later, _UNSETTLED)
         self.taken[cells], self.outcome[cells] = taken, outcome

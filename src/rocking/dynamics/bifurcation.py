@@ -21,7 +21,7 @@ from rocking.core.tables import escape_dollars, format_count
 from rocking.core.threads import map_in_threads
 from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.bodies import LinearBody
-from rocking.dynamics.maps import TOGETHER, Fate, Scale, StroboscopicMap, described, scale_of, stroboscopic_map
+from rocking.dynamics.maps import TOGETHER, PeriodOutcome, Scale, StroboscopicMap, described, scale_of, stroboscopic_map
 from rocking.dynamics.orbits import impacts_of
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
@@ -223,9 +223,9 @@ def bifurcation_diagram(
             strobe, last = _map_of(case(float(levels[k])), model, chattering), k - order[w].step
             at = first if afresh or not 0 <= last < levels.size else states[w, last, :, -1]
             at = _in_front(strobe, np.where(np.isnan(at), first, at))
-            states[w, k], fates = states_after(strobe, at, before, count)
+            states[w, k], outcomes = states_after(strobe, at, before, count)
             now, scale = states[w, k, :, -1], scale_of(strobe)
-            period[w, k, fates == Fate.UNFINISHED] = NOT_FOLLOWED
+            period[w, k, outcomes == PeriodOutcome.UNFINISHED] = NOT_FOLLOWED
             for s in np.flatnonzero(~np.isnan(now[:, 0])):
                 n = period[w, k, s] = period_of(states[w, k, s], scale)
                 if n:
@@ -286,17 +286,17 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
 
 
 def states_after(strobe: StroboscopicMap, at: Floats, transient: int, recorded: int) -> tuple[Floats, Integers]:
-    """Return states at the starts of periods after a transient, shape (n, recorded, 2), and the `Fate` of each."""
-    states, now, fates = np.full((len(at), recorded, 2), np.nan), at, np.full(len(at), Fate.MOVES.value)
+    """Return states at the starts of periods after a transient, shape (n, recorded, 2), and the `PeriodOutcome` of each."""
+    states, now, outcomes = np.full((len(at), recorded, 2), np.nan), at, np.full(len(at), PeriodOutcome.MOVES.value)
     if transient:
-        now, fates, _ = strobe.followed(at, transient)
+        now, outcomes, _ = strobe.advance(at, transient)
     moves = ~np.isnan(now[:, 0])
     if moves.any():
         states[moves] = strobe.orbit(now[moves], recorded)[:, 1:]
     lost = moves & np.isnan(states[:, -1, 0])
     if lost.any():
-        fates[lost] = strobe.followed(now[lost], recorded)[1]
-    return states, fates
+        outcomes[lost] = strobe.advance(now[lost], recorded)[1]
+    return states, outcomes
 
 
 def period_of(states: Floats, scale: Scale | None = None) -> int:
@@ -359,7 +359,7 @@ class LyapunovExponents(Result):
         Number of impacts per period.
     resting : float
         Fraction of the known periods in which the body comes to rest or is at rest; NaN if no period is known.
-    fate : Fate
+    outcome : PeriodOutcome
         Final condition of the body.
     stretches : ndarray, shape (n_periods, 2)
         Logarithms of the stretches in each period.
@@ -376,7 +376,7 @@ class LyapunovExponents(Result):
     n_periods: int
     impacts: float
     resting: float
-    fate: Fate
+    outcome: PeriodOutcome
     stretches: Floats
 
     def summary(self) -> str:
@@ -400,7 +400,7 @@ class LyapunovExponents(Result):
             "periods": self.n_periods,
             "impacts_per_period": self.impacts,
             "share_of_periods_with_rest": self.resting,
-            "fate": self.fate.name,
+            "outcome": self.outcome.name,
         }
 
 
@@ -473,10 +473,10 @@ def lyapunov_exponents(
     for start, stop in pairwise(sorted({*range(0, before + count, TOGETHER), before, before + count})):
         here = measure_stretches(*marching, made, frame, logs[start:stop])
         impacts += here if start >= before else 0
-        if made["ending"] not in (Fate.MOVES, Fate.RESTS):
+        if made["ending"] not in (PeriodOutcome.MOVES, PeriodOutcome.RESTS):
             break
-    fate, logs = Fate(int(made["ending"])), logs[before:]
-    if fate == Fate.RESTS_FOR_EVER:
+    outcome, logs = PeriodOutcome(int(made["ending"])), logs[before:]
+    if outcome == PeriodOutcome.RESTS_FOR_EVER:
         logs[np.isnan(logs)] = -np.inf
     rests = np.isneginf(logs[:, 0])
     if strobe._loses_nothing:  # neighbouring states never come to rest, and neither approach nor separate
@@ -500,6 +500,6 @@ def lyapunov_exponents(
         n_periods=count,
         impacts=impacts / count,
         resting=float(np.mean(rests[known])) if known.any() else float("nan"),
-        fate=fate,
+        outcome=outcome,
         stretches=logs,
     )

@@ -23,7 +23,7 @@ from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, build_ground
 from rocking.kernels.periodic import TRAP, PeriodicProblem, build_step_rows, differentiate, iterate
-from rocking.kernels.periodic import Fate as Fate
+from rocking.kernels.periodic import PeriodOutcome as PeriodOutcome
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
@@ -141,7 +141,7 @@ class PeriodicForcing:
     def _known(self, made: state.Records) -> Floats:
         """Return coordinates and velocities of states, NaN where they are unknown."""
         found = self._coordinates(made["u"], made["v"], made["side"])
-        found[np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))] = np.nan
+        found[np.isin(made["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))] = np.nan
         return found
 
     @property
@@ -253,7 +253,7 @@ class StroboscopicMap(PeriodicForcing):
         InvalidOption
             If the states have another shape, or a state is behind a stop.
         """
-        found, _, _ = self.followed(states, n_periods)
+        found, _, _ = self.advance(states, n_periods)
         return found
 
     def orbit(self, states: ArrayLike, n_periods: int) -> Floats:
@@ -267,12 +267,12 @@ class StroboscopicMap(PeriodicForcing):
         whole = np.concatenate([given.reshape(-1, 1, 2), found], axis=1)
         return whole.reshape(*given.shape[:-1], count + 1, 2)
 
-    def followed(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
-        """Return states after a number of periods, the `Fate` of each, and the numbers of resolved impacts."""
+    def advance(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+        """Return states after a number of periods, the `PeriodOutcome` of each, and the numbers of resolved impacts."""
         given, made = self._states(states)
         self._iterate(made, checks.integer(n_periods, "n_periods", InvalidOption, minimum=1))
-        fates, impacts = (np.array(made[name]).reshape(given.shape[:-1]) for name in ("ending", "impacts"))
-        return self._known(made).reshape(given.shape), fates, impacts
+        outcomes, impacts = (np.array(made[name]).reshape(given.shape[:-1]) for name in ("ending", "impacts"))
+        return self._known(made).reshape(given.shape), outcomes, impacts
 
     def derivative(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, Floats]:
         """Return states after a number of periods and their derivatives by the initial states, shape (..., 2, 2).
@@ -288,7 +288,7 @@ class StroboscopicMap(PeriodicForcing):
             signs, before = _signs(made["side"]), made.copy()
             self._iterate(made)
             differentiate(*self._marching(), state.expose_fields(before), change)
-            ended |= np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))
+            ended |= np.isin(made["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))
             total = (signs * _signs(made["side"]))[:, None, None] * change @ total
         found = self._coordinates(made["u"], made["v"], made["side"])
         found[ended] = total[ended] = np.nan

@@ -19,7 +19,7 @@ from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.dynamics.branches import Bifurcation
-from rocking.dynamics.maps import Fate, HalfMap, StroboscopicMap, is_mirrored, scale_of
+from rocking.dynamics.maps import PeriodOutcome, HalfMap, StroboscopicMap, is_mirrored, scale_of
 from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at, peak_of, response_of
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption, RockingError
@@ -276,11 +276,13 @@ def tangent_of(jacobian: Floats, like: Floats) -> Floats:
 
 def kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
     """Return the kind of the response of a body over a number of periods."""
-    _, fate, impacts = strobe.followed(state, period)
+    _, outcome, impacts = strobe.advance(state, period)
     _, change = strobe.derivative(state, period)
-    rests, for_ever = not np.any(change), bool(fate == Fate.RESTS_FOR_EVER and not impacts)
+    rests, for_ever = not np.any(change), bool(outcome == PeriodOutcome.RESTS_FOR_EVER and not impacts)
     number = 0 if rests else int(impacts)
-    return Kind(rests, for_ever, number, bool(fate == Fate.OVERTURNED), bool(fate == Fate.UNFINISHED))
+    return Kind(
+        rests, for_ever, number, bool(outcome == PeriodOutcome.OVERTURNED), bool(outcome == PeriodOutcome.UNFINISHED)
+    )
 
 
 def at_zero(x: Sequence[float], y: Sequence[float]) -> float:

@@ -234,7 +234,7 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
 
 def impacts_of(strobe: StroboscopicMap, state: Floats, period: int, change: Floats) -> float:
     """Count the impacts over a number of periods; infinity with complete chattering."""
-    impacts = float(strobe.followed(state, period)[2])
+    impacts = float(strobe.advance(state, period)[2])
     chatters = impacts > 0.0 and strobe.chattering.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
     return math.inf if chatters and not np.any(change) else impacts
 

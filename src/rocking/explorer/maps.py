@@ -15,7 +15,7 @@ from rocking.analysis.overturning import modes_of
 from rocking.block import Blocks
 from rocking.block.sides import housner_restitution
 from rocking.chattering.duration import critical_amplitude
-from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
+from rocking.chattering.maps import UpliftOutcome, last_exceedance, outcomes_of
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
@@ -238,7 +238,7 @@ def describe_map(grid: MapGrid) -> dict[str, Any]:
         "x": _describe_axis(grid.x),
         "y": _describe_axis(grid.y),
         "quantities": list(QUANTITIES),
-        "outcomes": [outcome.name.lower() for outcome in Outcome],
+        "outcomes": [outcome.name.lower() for outcome in UpliftOutcome],
         "curves": {
             name: [None if math.isnan(v) else v for v in values]
             for name, values in compute_critical_curves(grid).items()

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rocking import pulses
 from rocking.core.arrays import Floats
 from rocking.dynamics.bifurcation import period_of, states_after
-from rocking.dynamics.maps import Fate, StroboscopicMap, scale_of, stroboscopic_map
+from rocking.dynamics.maps import PeriodOutcome, StroboscopicMap, scale_of, stroboscopic_map
 from rocking.dynamics.orbits import multipliers_at
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible
@@ -67,7 +67,7 @@ class SteadyState(NamedTuple):
     states: Floats  # once per period of the sine: of one cycle, or the last ones
     period: int  # of the cycle, in periods of the sine; 0 if none was detected
     has_rest: bool
-    outcome: Fate
+    outcome: PeriodOutcome
     periods: int  # elapsed
     trajectory: tuple[Floats, int]  # first state and number of periods to draw
 
@@ -124,18 +124,23 @@ def settle(strobe: StroboscopicMap, start: ArrayLike, periods: int, stored: int 
     if np.isnan(last_states[-1, 0]):
         orbit = strobe.orbit(initial, periods)
         duration = int(np.argmax(np.isnan(orbit[:, 0])))
-        _, outcome, _ = strobe.followed(orbit[duration - 1])
+        _, outcome, _ = strobe.advance(orbit[duration - 1])
         first_period = max(0, duration - MAX_PERIOD)
         return SteadyState(
-            np.empty((0, 2)), 0, False, Fate(int(outcome)), duration, (orbit[first_period], duration - first_period)
+            np.empty((0, 2)),
+            0,
+            False,
+            PeriodOutcome(int(outcome)),
+            duration,
+            (orbit[first_period], duration - first_period),
         )
     period = period_of(last_states[-STORED_STATES:], scale_of(strobe))
-    _, outcome, _ = strobe.followed(last_states[-1])
+    _, outcome, _ = strobe.advance(last_states[-1])
     has_rest = period > 0 and not np.any(strobe.derivative(last_states[-1], period)[1])
     drawn_periods = period or MAX_PERIOD
     states = last_states[-period:] if period else last_states
     return SteadyState(
-        states, period, has_rest, Fate(int(outcome)), periods, (last_states[-drawn_periods], drawn_periods)
+        states, period, has_rest, PeriodOutcome(int(outcome)), periods, (last_states[-drawn_periods], drawn_periods)
     )
 
 
@@ -192,11 +197,11 @@ def _simulate_periods(case: Case, sine: Sine, start: Floats, periods: int) -> Re
 
 def describe_steady_state(steady_state: SteadyState, response: Response) -> dict[str, Any]:
     """Describe the steady state of a case; the response covers one period of it."""
-    if steady_state.outcome == Fate.OVERTURNED:
+    if steady_state.outcome == PeriodOutcome.OVERTURNED:
         return phrase("orbit.overturns", after=steady_state.periods)
-    if steady_state.outcome == Fate.UNFINISHED:
+    if steady_state.outcome == PeriodOutcome.UNFINISHED:
         return phrase("orbit.given_up", after=steady_state.periods)
-    if steady_state.outcome == Fate.RESTS_FOR_EVER:
+    if steady_state.outcome == PeriodOutcome.RESTS_FOR_EVER:
         return phrase("orbit.still")
     if not steady_state.period:
         return phrase("orbit.no_period", longest=MAX_PERIOD, after=steady_state.periods)
@@ -214,7 +219,7 @@ def _describe_stability(case: Case, sine: Sine, steady_state: SteadyState, strob
     if is_released:
         start = phrase("orbit.from_state", rotation=case.initial_rotation, velocity=case.initial_velocity)
     beginning = phrase("orbit.begins", period=1.0 / sine.frequency, start=start)
-    if not steady_state.period or steady_state.outcome == Fate.RESTS_FOR_EVER:
+    if not steady_state.period or steady_state.outcome == PeriodOutcome.RESTS_FOR_EVER:
         return beginning
     if steady_state.has_rest:
         return phrase("orbit.forgets", begins=beginning)
@@ -346,16 +351,16 @@ def pack_sweep_part(sweep: Sweep, part: SweepPart) -> Payload:
         "indices": part.indices,
         "counts": [len(steady_state.states) for steady_state in part.steady_states],
         "words": [_summarise_steady_state(steady_state) for steady_state in part.steady_states],
-        "overturned": [steady_state.outcome == Fate.OVERTURNED for steady_state in part.steady_states],
+        "overturned": [steady_state.outcome == PeriodOutcome.OVERTURNED for steady_state in part.steady_states],
     }
     return Payload(header, {"states": states.ravel(), "drawn": normalise_states(sweep.case, states)[:, 0]})
 
 
 def _summarise_steady_state(steady_state: SteadyState) -> dict[str, Any]:
-    if steady_state.outcome in (Fate.OVERTURNED, Fate.UNFINISHED):
-        key = "sweep.overturns" if steady_state.outcome == Fate.OVERTURNED else "sweep.given_up"
+    if steady_state.outcome in (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED):
+        key = "sweep.overturns" if steady_state.outcome == PeriodOutcome.OVERTURNED else "sweep.given_up"
         return phrase(key, after=steady_state.periods)
-    if steady_state.outcome == Fate.RESTS_FOR_EVER:
+    if steady_state.outcome == PeriodOutcome.RESTS_FOR_EVER:
         return phrase("sweep.still")
     if not steady_state.period:
         return phrase("sweep.no_period", longest=MAX_PERIOD)

@@ -28,7 +28,7 @@ MAX_ITERATIONS = 100_000
 MAX_STATE = 1e100
 
 
-class Fate(IntEnum):
+class PeriodOutcome(IntEnum):
     """Outcome of a state after some periods or after an impact."""
 
     MOVES = 0
@@ -67,24 +67,26 @@ def iterate(
 ) -> None:
     """Take each state through at most ``periods`` periods, until it enters a trap, overturns or rests forever.
 
-    ``ending`` is then its `Fate`, ``trap_rows[k]`` the row of its trap in ``traps``, shape (n, `TRAP`), or -1, and
+    ``ending`` is then its `PeriodOutcome`, ``trap_rows[k]`` the row of its trap in ``traps``, shape (n, `TRAP`), or -1, and
     ``period_counts[k]`` the number of periods. Row n of ``orbit[k]``, if any, is (u, v, side) after n + 1 periods,
     unchanged after the last known state.
     """
     for k in range(states.shape[0]):
         state = states[k]
-        outcome = Fate.RESTS.value if state.side < 0 else Fate.MOVES.value
+        outcome = PeriodOutcome.RESTS.value if state.side < 0 else PeriodOutcome.MOVES.value
         trap_rows[k] = -1
         period_counts[k] = periods
         for n in range(periods):
             outcome = advance_period(problem, scratch, state)
-            is_known = outcome != Fate.OVERTURNED and outcome != Fate.UNFINISHED
+            is_known = outcome != PeriodOutcome.OVERTURNED and outcome != PeriodOutcome.UNFINISHED
             if is_known:
-                is_at_rest = outcome == Fate.RESTS or outcome == Fate.RESTS_FOR_EVER
+                is_at_rest = outcome == PeriodOutcome.RESTS or outcome == PeriodOutcome.RESTS_FOR_EVER
                 trap_rows[k] = find_trap(traps, state, is_at_rest, problem.block.two_stops)
-                for later in range(n, orbit.shape[1] if outcome == Fate.RESTS_FOR_EVER else min(n + 1, orbit.shape[1])):
+                for later in range(
+                    n, orbit.shape[1] if outcome == PeriodOutcome.RESTS_FOR_EVER else min(n + 1, orbit.shape[1])
+                ):
                     write_state(orbit[k, later], state)
-            if trap_rows[k] >= 0 or outcome == Fate.RESTS_FOR_EVER or not is_known:
+            if trap_rows[k] >= 0 or outcome == PeriodOutcome.RESTS_FOR_EVER or not is_known:
                 period_counts[k] = n + 1
                 break
         state.ending = outcome
@@ -114,7 +116,7 @@ def write_state(row: Floats, state: Record) -> None:
 
 @shared
 def advance_period(problem: PeriodicProblem, scratch: Record, state: Record) -> int:
-    """Advance a state by one period and return its `Fate`."""
+    """Advance a state by one period and return its `PeriodOutcome`."""
     ground, block, settings, table, steps = problem
     pieces = count_pieces(ground)
     state.budget = iteration_budget(state)
@@ -213,28 +215,28 @@ def count_pieces(ground: Ground) -> int:
 
 @inlined
 def shift_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
-    """Move a state back by the period that it has passed, and return its `Fate`."""
+    """Move a state back by the period that it has passed, and return its `PeriodOutcome`."""
     pieces = count_pieces(ground)
     if ending == Ending.OVERTURNED:
-        return Fate.OVERTURNED
+        return PeriodOutcome.OVERTURNED
     if ending == Ending.DONE or (ending == Ending.RUNNING and state.piece >= 2 * pieces):
         # Even the second period does not lift the body; the march may have followed an uplift by the additional pieces.
         if state.u == 0.0 and state.v == 0.0:
             state.side = AT_REST if state.side < 0 or not block.two_stops else -1 - state.side
-            return Fate.RESTS_FOR_EVER
-        return Fate.UNFINISHED
+            return PeriodOutcome.RESTS_FOR_EVER
+        return PeriodOutcome.UNFINISHED
     if ending == Ending.BALANCED:
         state.piece, state.offset = 0, 0.0
-        return Fate.MOVES
+        return PeriodOutcome.MOVES
     if ending != Ending.RUNNING or not (state.u >= 0.0 and abs(state.v) < np.inf):
-        return Fate.UNFINISHED
+        return PeriodOutcome.UNFINISHED
     period = piece_start(ground, pieces)
     state.piece -= pieces
     state.last_uplift_time -= period
     state.last_rest_time -= period
     state.sequence_start -= period
     state.last_impact_time -= period
-    return Fate.RESTS if state.side < 0 or (state.u == 0.0 and state.v == 0.0) else Fate.MOVES
+    return PeriodOutcome.RESTS if state.side < 0 or (state.u == 0.0 and state.v == 0.0) else PeriodOutcome.MOVES
 
 
 # ---- Derivatives of a state after a period by the state before it ----
@@ -246,7 +248,7 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
 
     It is exactly zero if the body has come to rest for any time, or is held at rest at the start. At a stop that does
     not hold the body, it is the derivative for states off the stop. The trail's settings make the march write its
-    table, whose rows are reused. ``states`` are advanced by the period, with ``ending`` their `Fate`.
+    table, whose rows are reused. ``states`` are advanced by the period, with ``ending`` their `PeriodOutcome`.
     """
     for k in range(states.shape[0]):
         differentiate_period(trail, scratch, work, table, states[k], out[k])
@@ -282,9 +284,9 @@ def differentiate_period(
         if state.nodes > 0:
             area += apply_step(trail, scratch, work, table[state.nodes - 1].node, state, M)
     state.ending = shift_back(ground, block, state, ending)
-    if state.ending == Fate.RESTS or state.ending == Fate.RESTS_FOR_EVER:
+    if state.ending == PeriodOutcome.RESTS or state.ending == PeriodOutcome.RESTS_FOR_EVER:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
-    elif state.ending != Fate.MOVES:
+    elif state.ending != PeriodOutcome.MOVES:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = np.nan
     return impacts, area
 
@@ -298,7 +300,7 @@ def measure_stretches(
     A row contains the logarithms of the stretch along a direction that follows the derivatives, and so becomes the one
     that grows fastest, and across it: the diagonal of R where the derivative times Q is Q' R. Both are -inf in a period
     with a rest, after which the direction is arbitrary. Rows end before the period of overturning or permanent rest;
-    ``ending`` is the `Fate`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space. Returns
+    ``ending`` is the `PeriodOutcome`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space. Returns
     the number of impacts.
     """
     M = frame[:2]
@@ -306,7 +308,7 @@ def measure_stretches(
     for n in range(logs.shape[0]):
         new_impacts, area = differentiate_period(trail, scratch, work, table, state, M)
         impacts += new_impacts
-        if state.ending != Fate.MOVES and state.ending != Fate.RESTS:
+        if state.ending != PeriodOutcome.MOVES and state.ending != PeriodOutcome.RESTS:
             break
         c, s = frame[2, 0], frame[2, 1]
         x, y = M[0, 0] * c + M[0, 1] * s, M[1, 0] * c + M[1, 1] * s
