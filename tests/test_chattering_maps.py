@@ -21,7 +21,7 @@ ONE = {"a": [1.0], "b": [1.0]}
 
 def outcome_of(motion, block=BLOCK, model="linear"):
     dataset = chattering_map(lambda a, b: SimulationInput(block, motion, model), ONE)
-    return Outcome(dataset.data.outcome.item())
+    return UpliftOutcome(dataset.data.outcome.item())
 
 
 # The region of complete chattering
@@ -60,12 +60,12 @@ def lobes(*amplitudes):
 @pytest.mark.parametrize(
     ("amplitudes", "outcome"),
     [
-        ((0.9, 0.99), Outcome.NO_UPLIFT),
-        ((1.02, 1.02), Outcome.COMPLETE),
-        ((1.5,), Outcome.COMPLETE),  # nothing comes after a single lobe
-        ((1.1, 1.1), Outcome.RESTS_AT_LAST),
-        ((1.1, 1.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.02), Outcome.RESTS_LATER),
-        ((9.0,), Outcome.OVERTURNS),
+        ((0.9, 0.99), UpliftOutcome.NO_UPLIFT),
+        ((1.02, 1.02), UpliftOutcome.COMPLETE),
+        ((1.5,), UpliftOutcome.COMPLETE),  # nothing comes after a single lobe
+        ((1.1, 1.1), UpliftOutcome.RESTS_AT_LAST),
+        ((1.1, 1.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.02), UpliftOutcome.RESTS_LATER),
+        ((9.0,), UpliftOutcome.OVERTURNS),
     ],
 )
 def test_lobes_have_the_outcome_that_the_next_exceedance_leaves_them(amplitudes, outcome):
@@ -86,10 +86,10 @@ def test_an_uplift_by_hardly_more_than_rounding_is_complete_only_if_proven():
     record = rocking.records.load("ridgecrest-clc-090").processed(trim=(225.0, 245.0))
     dataset = chattering_map(families.record(record, 0.2, 0.92), {"a": [1.0 + 1e-15, 1.0 + 1e-13], "p": [2.0]})
     below, above = dataset.data.outcome.values.ravel()
-    assert below == Outcome.NO_UPLIFT
-    assert above in (Outcome.COMPLETE, Outcome.UNPROVEN)
-    assert bool(dataset.data.complete[1, 0]) == (above == Outcome.COMPLETE)
-    assert bool(np.isfinite(dataset.data.upper[1, 0])) == (above == Outcome.COMPLETE)
+    assert below == UpliftOutcome.NO_UPLIFT
+    assert above in (UpliftOutcome.COMPLETE, UpliftOutcome.UNPROVEN)
+    assert bool(dataset.data.complete[1, 0]) == (above == UpliftOutcome.COMPLETE)
+    assert bool(np.isfinite(dataset.data.upper[1, 0])) == (above == UpliftOutcome.COMPLETE)
 
 
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
@@ -100,15 +100,15 @@ def test_at_the_threshold_nothing_lifts_a_block_whichever_way_its_peak_was_round
     peaks = [pulses(1.0, ratio).motion.pga / min(block.uplift_thresholds(model)) for ratio in omega]
     assert max(peaks) > 1.0
     dataset = chattering_map(pulses, {"a": [1.0, 1.0 + 1e-9], "omega": omega})
-    assert (dataset.data.outcome.values[0] == Outcome.NO_UPLIFT).all()
-    assert (dataset.data.outcome.values[1] == Outcome.COMPLETE).all()
+    assert (dataset.data.outcome.values[0] == UpliftOutcome.NO_UPLIFT).all()
+    assert (dataset.data.outcome.values[1] == UpliftOutcome.COMPLETE).all()
 
 
 def test_a_weight_that_falls_lifts_a_block_whose_motion_does_not_reach_the_threshold():
     motion = lobes(0.9, 0.9)
     falling = rocking.Motion.from_samples([0.0, -0.3 * BLOCK.gravity, -0.3 * BLOCK.gravity, 0.0], motion.duration / 3.0)
-    assert outcome_of(motion) is Outcome.NO_UPLIFT
-    assert outcome_of(motion.with_vertical(falling)) is not Outcome.NO_UPLIFT
+    assert outcome_of(motion) is UpliftOutcome.NO_UPLIFT
+    assert outcome_of(motion.with_vertical(falling)) is not UpliftOutcome.NO_UPLIFT
 
 
 def test_what_overturns_after_its_first_rocking_is_counted_and_hatched():
@@ -118,7 +118,7 @@ def test_what_overturns_after_its_first_rocking_is_counted_and_hatched():
         return families.SimulationInput(rocking.Block.from_parameters(p, 0.15, 0.93), record.scaled_to(pga * 9.80665))
 
     found = chattering_map(case, {"pga": np.linspace(0.3, 0.9, 5), "p": np.linspace(2.0, 6.0, 5)})
-    later = (found.data.overturned & (found.data.outcome != Outcome.OVERTURNS)).values
+    later = (found.data.overturned & (found.data.outcome != UpliftOutcome.OVERTURNS)).values
     assert (
         2 <= later.sum() < found.data.overturned.values.sum() or later.sum() == found.data.overturned.values.sum() >= 2
     )

@@ -2,7 +2,7 @@ from .curve import FragilityCurve
 from .directions import ResponseRose
 from .efficiency import MeasureComparison
 from .incremental import CriticalScale, IncrementalDynamicAnalysis
-from .overturning import OverturningMode, OverturningMap, mode_name
+from .overturning import OverturningMap, OverturningMode, mode_name
 from .probit import Goodness, Probit
 from .risk import Rate, Risk, Survival
 from .spectrum import RockingSpectrum
@@ -14,8 +14,8 @@ __all__ = [
     "Goodness",
     "IncrementalDynamicAnalysis",
     "MeasureComparison",
-    "OverturningMode",
     "OverturningMap",
+    "OverturningMode",
     "Probit",
     "Rate",
     "ResponseRose",

@@ -19,7 +19,7 @@ from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.dynamics.branches import Bifurcation
-from rocking.dynamics.maps import PeriodOutcome, HalfMap, StroboscopicMap, is_mirrored, scale_of
+from rocking.dynamics.maps import HalfMap, PeriodOutcome, StroboscopicMap, is_mirrored, scale_of
 from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at, peak_of, response_of
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption, RockingError
