@@ -34,7 +34,7 @@ for frame in frames:
         "one-sine",
         amplitudes=np.linspace(1.0, 20.0, 77),
         frequencies=2.0 * np.pi * frequencies / frame.p,
-        tolerance=1e-6,
+        rtol=1e-6,
     )
     lowest.append(found.data.overturning_amplitude.values * np.tan(frame.alpha))  # g
 at_one = [float(np.interp(1.0, frequencies, amplitude)) for amplitude in lowest]

@@ -95,7 +95,7 @@ def simulated_verdicts(blocks, motions):
 
 def simulated_capacities(blocks, motions):
     """Lowest PGA, over gravity, that overturns each block under each motion, shape (motion, block)."""
-    found = rocking.incremental_dynamic_analysis(blocks, motions, tolerance=1e-3)
+    found = rocking.incremental_dynamic_analysis(blocks, motions, rtol=1e-3)
     return found.data.overturning_level.transpose("motion", "block").values / blocks.gravity
 
 

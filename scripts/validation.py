@@ -84,7 +84,7 @@ def blocks_tables():
         block = rocking.Block(half_width=radius * math.sin(0.2), half_height=radius * math.cos(0.2))
         map_of = overturning_map(
             block, "one-sine", amplitudes=np.linspace(1.001, 6.0, 51), frequencies=[4.0 * math.pi / block.sides[0].p],
-            tolerance=1e-12,
+            rtol=1e-12,
         )  # fmt: skip
         ours = float(map_of.data.overturning_amplitude[0])
         within = "yes" if abs(ours - theirs) <= OTHERS_ERROR else "no"

@@ -44,7 +44,7 @@ def motions():
 def facade_figure():
     """Draw the lowest peak accelerations that overturn the facade, and those that lift it, against the thrust."""
     shaking, bodies = motions(), [facade(thrust) for thrust in THRUSTS]
-    found = rocking.incremental_dynamic_analysis(bodies, shaking, tolerance=1e-2)
+    found = rocking.incremental_dynamic_analysis(bodies, shaking, rtol=1e-2)
     lowest = found.data.overturning_level.transpose("motion", "block").values / G
     with figure_for(None, (6.2, 3.4), None, "") as figure:
         axes, x = figure.subplots(), 1e-3 * np.array(THRUSTS)
@@ -63,7 +63,7 @@ def tendon_figure():
     pulses = [rocking.pulses.one_sine(1.0, frequency) for frequency in FREQUENCIES]
     bodies = [RestrainedBlock(COLUMN), *list(BODIES.values())[1:]]
     levels = np.geomspace(1.4, 30.0, 60)
-    found = rocking.incremental_dynamic_analysis(bodies, pulses, levels=levels, tolerance=1e-3)
+    found = rocking.incremental_dynamic_analysis(bodies, pulses, levels=levels, rtol=1e-3)
     lowest = found.data.overturning_level.transpose("block", "motion").values / G
     with figure_for(None, (6.2, 3.6), None, "") as figure:
         axes = figure.subplots()

@@ -26,7 +26,7 @@ def digest(folder: str | Path) -> str:
 
 def store_of(study: rocking.Study) -> Store:
     """Outcomes of a study as they lie in its folder."""
-    return Store(study.place)
+    return Store(study.folder)
 
 
 def after_each_unit(monkeypatch: pytest.MonkeyPatch, action: Callable[[], object]) -> None:

@@ -26,7 +26,7 @@ def test_the_period_of_a_ball_doubles_where_its_closed_form_says(e, about):
     assert at == pytest.approx(about, abs=5e-5)
     values = at + np.array([-0.02, -0.002, 0.002, 0.004])
     found = dynamics.bifurcation_diagram(
-        ball_case(e), values, start_of_one_bounce(e, values[0])[0], transient=6000, kept=16
+        ball_case(e), values, start_of_one_bounce(e, values[0])[0], transient=6000, recorded=16
     )
     assert found.data.period.values[0, :, 0].tolist() == [1, 1, 2, 2]
     assert found.data.impacts.values[0, :, 0].tolist() == [1, 1, 2, 2]
@@ -62,8 +62,10 @@ def test_going_up_and_down_keep_what_they_are_on():
 
 def test_kept_states_are_those_of_the_map_after_its_transient():
     values = [1.2, 1.7, 2.5]
-    afresh = dynamics.bifurcation_diagram(ball_case(0.5), values, [0.1, 0.5], direction="afresh", transient=30, kept=7)
-    up = dynamics.bifurcation_diagram(ball_case(0.5), values, [0.1, 0.5], transient=30, kept=7)
+    afresh = dynamics.bifurcation_diagram(
+        ball_case(0.5), values, [0.1, 0.5], direction="afresh", transient=30, recorded=7
+    )
+    up = dynamics.bifurcation_diagram(ball_case(0.5), values, [0.1, 0.5], transient=30, recorded=7)
     state = np.array([0.1, 0.5])
     for k, value in enumerate(values):
         strobe = dynamics.stroboscopic_map(*ball_case(0.5)(value))
@@ -119,7 +121,7 @@ def test_impacts_are_those_of_the_orbit_infinite_where_chattering_is_complete(re
 def test_what_takes_too_many_steps_is_not_said_to_overturn(transient):
     lively, start = dynamics.BouncingBall(1.0, gravity=10.0), [0.0, 1e-5]
     found = dynamics.bifurcation_diagram(
-        lambda level: (lively, pulses.sine(level, 0.5, cycles=1)), [0.1], start, transient=transient, kept=2
+        lambda level: (lively, pulses.sine(level, 0.5, cycles=1)), [0.1], start, transient=transient, recorded=2
     )
     _, fate, _ = dynamics.stroboscopic_map(lively, pulses.sine(0.1, 0.5, cycles=1)).advance(start)
     assert fate == dynamics.PeriodOutcome.UNFINISHED and np.isnan(found.data.coordinate.values).all()

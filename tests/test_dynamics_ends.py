@@ -134,7 +134,7 @@ def test_a_symmetric_orbit_with_a_large_multiplier_is_followed_to_grazing():
 
 def test_no_more_points_than_asked_for():
     start = next(each for each in dynamics.periodic_orbits(*table(1.2), starts=64) if each.is_stable)
-    branch = dynamics.continue_orbit(start, table, 1.2, (1.0, 1.6), most=4)
+    branch = dynamics.continue_orbit(start, table, 1.2, (1.0, 1.6), max_points=4)
     assert len(branch) == 7 and branch.ends == ("too many points", "too many points")
 
 

@@ -213,7 +213,7 @@ def test_orbits_of_an_oscillator_that_hits_once_are_those_of_shaw_and_holmes(sha
         assert complex(orbit.multipliers.prod()) == pytest.approx(exact.determinant, abs=1e-10)
     start = min(once, key=lambda each: abs(each.response.impacts["speed_after"][0] - exact.speed(expected[0])))
     most = 8 if kind == "flip" else 1000  # the flip is near the start
-    branch = dynamics.continue_orbit(start, family, near, (0.8 * value, 1.3 * value), most=most)
+    branch = dynamics.continue_orbit(start, family, near, (0.8 * value, 1.3 * value), max_points=most)
     found = [each.value for each in branch.bifurcations if each.kind == kind]
     assert found == pytest.approx([value], abs=1e-10)
 

@@ -18,7 +18,7 @@ LENGTHS = np.array([0.3, 1.2, 4.8])
 @pytest.fixture(scope="module")
 def rectangles():
     pulses = [rocking.pulses.rectangular(1.0, length) for length in LENGTHS]
-    return compare_measures(SLENDER, pulses, periods=[0.7], model="linear", tolerance=1e-9)
+    return compare_measures(SLENDER, pulses, periods=[0.7], model="linear", rtol=1e-9)
 
 
 def test_dispersions_are_those_of_the_closed_form_of_rectangular_pulses(rectangles):
@@ -58,7 +58,7 @@ def test_a_measure_that_was_scattered_by_hand_gets_its_scatter_back():
             )
         )
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2)
-    found = compare_measures(block, motions, periods=[1.0], tolerance=1e-6)
+    found = compare_measures(block, motions, periods=[1.0], rtol=1e-6)
     expected = float(np.std(np.log(scatter), ddof=1))
     assert float(found.data.dispersion.sel(measure="PGA")) == pytest.approx(expected, rel=0.02)
     assert float(found.data.dispersion.sel(measure="PGV")) < 0.02
@@ -70,7 +70,7 @@ def test_a_measure_in_the_blocks_own_units_serves_blocks_of_all_sizes():
     blocks = [rocking.Block.from_parameters(p=p, alpha=0.1, restitution=0.6) for p in (1.0, 2.0, 4.0)]
     # Each pulse is short for every block, so that its velocity counts.
     pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.005, 0.01, 0.02)]
-    found = compare_measures(blocks, pulses, periods=[1.0], model="linear", tolerance=1e-3)
+    found = compare_measures(blocks, pulses, periods=[1.0], model="linear", rtol=1e-3)
     within, overall = found.data.dispersion.to_series(), found.data.dispersion_of_all.to_series()
     assert within["PGV"] == pytest.approx(within["p PGV / uplift acceleration"], rel=1e-9)
     assert overall["p PGV / uplift acceleration"] < 0.03 < 0.5 < overall["PGV"]
@@ -133,7 +133,7 @@ def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
         return scaled
 
     monkeypatch.setattr(efficiency, "incremental_dynamic_analysis", without_one)
-    found = compare_measures(blocks, motions, periods=[1.0], weights=[3.0, 1.0], tolerance=1e-2)
+    found = compare_measures(blocks, motions, periods=[1.0], weights=[3.0, 1.0], rtol=1e-2)
     for k, values in enumerate(found.data.intensity.values):
         x = np.log(values)
         assert np.isnan(x).tolist() == [[False, False], [False, False], [False, True]]
@@ -160,7 +160,7 @@ def test_spectral_accelerations_of_other_damping_than_5_percent_have_another_nam
     pulses = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8)]
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     for damping, name in ((0.05, "SA(1 s)"), (0.02, "SA(1 s, damping 0.02)"), (0, "SA(1 s, damping 0)")):
-        found = compare_measures(block, pulses, periods=[1.0], damping=damping, tolerance=1e-2)
+        found = compare_measures(block, pulses, periods=[1.0], damping=damping, rtol=1e-2)
         assert found.to_dict()["measures"][2]["measure"] == name
         assert name in found.summary()
         assert found.to_dict()["damping"] == damping
@@ -169,7 +169,7 @@ def test_spectral_accelerations_of_other_damping_than_5_percent_have_another_nam
 @pytest.mark.thorough
 def test_multiples_of_a_motion_count_once(rectangles):
     pulses = [rocking.pulses.rectangular(*one) for one in ((1.0, LENGTHS[0]), *((2.5, length) for length in LENGTHS))]
-    found = compare_measures(SLENDER, pulses, periods=[0.7], model="linear", tolerance=1e-9)
+    found = compare_measures(SLENDER, pulses, periods=[0.7], model="linear", rtol=1e-9)
     for name in ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
         np.testing.assert_allclose(found.data[name].values, rectangles.data[name].values, rtol=1e-7)
     with pytest.raises(rocking.errors.InvalidOption, match="not multiples of one another"):

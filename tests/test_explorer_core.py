@@ -645,7 +645,7 @@ def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
     )
     found = filled(grid)
     expected = rocking.overturning_map(
-        case.block, "one-sine", amplitudes=grid.y.values, frequencies=grid.x.values, model="linear", tolerance=0.4
+        case.block, "one-sine", amplitudes=grid.y.values, frequencies=grid.x.values, model="linear", rtol=0.4
     )
     assert np.array_equal(found["mode"], expected.data.mode.values)
     stays = found["mode"] < 0

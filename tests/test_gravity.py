@@ -85,10 +85,10 @@ ANALYSES = {
     ).data.peak_rotation.values,
     "overturning map": lambda k: rocking.overturning_map(
         rocking.Block.from_parameters(2.0, 0.2, 0.9, gravity=k * G),
-        "sine", cycles=1, amplitudes=[1.5, 3.0, 6.0], frequencies=[1.0, 2.0], tolerance=1e-4,
+        "sine", cycles=1, amplitudes=[1.5, 3.0, 6.0], frequencies=[1.0, 2.0], rtol=1e-4,
     ).data.mode.values,
     "incremental": lambda k: rocking.incremental_dynamic_analysis(
-        blocks_of(k), motion_of(k), measure="pgv_ratio", tolerance=1e-3
+        blocks_of(k), motion_of(k), measure="pgv_ratio", rtol=1e-3
     ).bands(block=1),
     "critical scale": lambda k: rocking.critical_scale(
         rocking.Block.from_parameters(2.0, 0.2, 0.9, gravity=k * G), motion_of(k), low=0.1, high=9.0

@@ -65,7 +65,7 @@ def test_the_ends_of_every_band_are_where_the_verdict_changes(analysis, record):
 
 def test_blocks_keep_their_order_though_each_is_simulated_in_its_own_unit():
     blocks = Blocks(p=2.0, alpha=[0.2, 0.3, 0.1], restitution=0.9)
-    options = {"measure": "pga_ratio", "levels": np.linspace(1.0, 8.0, 8), "tolerance": 1e-3}
+    options = {"measure": "pga_ratio", "levels": np.linspace(1.0, 8.0, 8), "rtol": 1e-3}
     together = incremental_dynamic_analysis(blocks, PULSE, **options).data.overturning_level.values[0]
     alone = [incremental_dynamic_analysis(block, PULSE, **options).data.overturning_level.item() for block in blocks]
     assert len({*alone}) == 3

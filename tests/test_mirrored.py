@@ -51,11 +51,11 @@ def same_answers(one, other, model):
     for number in (*numbers, "duration", "overturned", "tipping_time", "overturn_time"):
         same(getattr(one, number), getattr(other, number), number)
     same(one.balance, other.balance[::-1], "balance")
-    same(one.body.uplift_thresholds(model), other.body.uplift_thresholds(model)[::-1], "thresholds")
+    same(one.block.uplift_thresholds(model), other.block.uplift_thresholds(model)[::-1], "thresholds")
     times = np.linspace(0.0, min(one.duration, other.duration), 41)[:-1] + 1e-4
     for history in ("rotation", "angular_velocity", "angular_acceleration"):
         same(getattr(one, history)(times), -getattr(other, history)(times), history)
-    yields = "yielding" in str(one.body)
+    yields = "yielding" in str(one.block)
     energies = () if yields else ("kinetic_energy", "potential_energy")  # it keeps none
     for history in ("normal_force", "friction_demand", *energies):
         same(getattr(one, history)(times), getattr(other, history)(times), history)

@@ -138,7 +138,7 @@ def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():
     def reversed_sine(amplitude, frequency):
         return -rocking.pulses.one_sine(amplitude, frequency)
 
-    grid = {"amplitudes": np.linspace(0.5, 8.0, 6), "frequencies": [2.0, 4.0], "tolerance": 1e-3}
+    grid = {"amplitudes": np.linspace(0.5, 8.0, 6), "frequencies": [2.0, 4.0], "rtol": 1e-3}
     here, there = overturning_map(sided, "one-sine", **grid), overturning_map(mirrored, reversed_sine, **grid)
     np.testing.assert_array_equal(here.data.mode, there.data.mode)
     np.testing.assert_array_equal(here.data.boundary_amplitude, there.data.boundary_amplitude)
@@ -169,7 +169,7 @@ def test_bisection_finds_a_region_inside_an_interval_of_the_grid():
     def outcome_of(column, level):
         return np.select([level < 1.3, level < 1.6], [0, 1], 2)
 
-    edges = boundaries(levels, np.array([[0], [2]]), outcome_of, tolerance=1e-12)
+    edges = boundaries(levels, np.array([[0], [2]]), outcome_of, rtol=1e-12)
     np.testing.assert_allclose(edges.level, [1.3, 1.6], rtol=1e-12)
     assert edges.below.tolist() == [0, 1]
     assert edges.above.tolist() == [1, 2]
@@ -180,7 +180,7 @@ def test_bisection_finds_a_thin_region_between_two_others():
     def outcome_of(column, level):
         return np.select([level < 1.3, level < 1.3 + 1e-7], [1, -1], 0)
 
-    edges = boundaries(np.array([1.0, 2.0]), np.array([[1], [0]]), outcome_of, tolerance=1e-12)
+    edges = boundaries(np.array([1.0, 2.0]), np.array([[1], [0]]), outcome_of, rtol=1e-12)
     np.testing.assert_allclose(edges.level, [1.3, 1.3 + 1e-7], rtol=1e-12)
     assert edges.above.tolist() == [-1, 0]
 
@@ -191,7 +191,7 @@ def test_bisection_of_endless_regions_ends():
         np.array([1.0, 2.0]),
         np.array([[0], [1]]),
         lambda column, level: rng.integers(2, 1000, len(level)),
-        tolerance=1e-6,
+        rtol=1e-6,
     )
     assert len(edges.level) <= 128
     assert np.all(np.diff(edges.low) > 0.0)
@@ -224,7 +224,7 @@ def test_a_map_that_never_overturns_has_no_overturning_amplitude():
 
 def test_the_figure_names_every_mode_that_it_shows():
     dataset = overturning_map(
-        BLOCK, "one-sine", amplitudes=np.linspace(0.5, 10.0, 20), frequencies=np.linspace(2, 6, 5), tolerance=1e-3
+        BLOCK, "one-sine", amplitudes=np.linspace(0.5, 10.0, 20), frequencies=np.linspace(2, 6, 5), rtol=1e-3
     )
     figure = dataset.plot()
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -280,7 +280,7 @@ def test_a_pulse_with_a_vertical_component_overturns_where_single_simulations_sa
         return PULSE_OF(amplitude, frequency).with_vertical(rocking.pulses.sine(amplitude, 2.0 * frequency, cycles=3))
 
     ratios = np.array([1.5, 3.0])
-    found = overturning_map(BLOCK, pulse, amplitudes=np.linspace(0.8, 6.0, 14), frequencies=ratios, tolerance=1e-6)
+    found = overturning_map(BLOCK, pulse, amplitudes=np.linspace(0.8, 6.0, 14), frequencies=ratios, rtol=1e-6)
     side = BLOCK.sides[0]
     for ratio, level in zip(ratios, found.data.overturning_amplitude.values, strict=True):
         frequency, lifting = ratio * side.p / (2.0 * math.pi), BLOCK.gravity * math.tan(side.alpha)
@@ -302,6 +302,6 @@ def test_a_function_of_samples_at_a_constant_step_is_of_one_shape():
         times = np.arange(0.0, 1.0 / frequency, 0.005)
         return rocking.Motion.from_samples(amplitude * np.sin(2.0 * np.pi * frequency * times), 0.005)
 
-    grid = {"amplitudes": np.linspace(0.5, 6.0, 6), "frequencies": [1.0, 4.0], "tolerance": 1e-4}
+    grid = {"amplitudes": np.linspace(0.5, 6.0, 6), "frequencies": [1.0, 4.0], "rtol": 1e-4}
     by_function, by_name = overturning_map(BLOCK, sampled, **grid), overturning_map(BLOCK, "one-sine", **grid)
     np.testing.assert_allclose(by_function.data.overturning_amplitude, by_name.data.overturning_amplitude, rtol=1e-2)

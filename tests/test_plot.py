@@ -27,7 +27,7 @@ def legend_of(figure):
     [("slenderness", 1.0 / ALPHA[0], 1.0 / ALPHA[1]), ("rad", 1.0, 1.0), ("deg", 180.0 / math.pi, 180.0 / math.pi)],
 )
 def test_the_rotation_and_the_motion_are_drawn_as_simulated(units, plus, minus):
-    rotation, motion = SHAKEN.plot(units=units).axes
+    rotation, motion = SHAKEN.plot(rotation_units=units).axes
     (line,) = labelled(rotation, "_rotation")
     theta = SHAKEN.rotation(line.get_xdata())
     np.testing.assert_allclose(line.get_ydata(), np.where(theta >= 0.0, plus * theta, minus * theta), rtol=1e-15)
@@ -39,18 +39,18 @@ def test_the_rotation_and_the_motion_are_drawn_as_simulated(units, plus, minus):
 @pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("units", ["slenderness", "rad"])
 def test_an_axis_in_degrees_stands_on_the_right(units):
-    figure = SHAKEN.plot(units=units)
+    figure = SHAKEN.plot(rotation_units=units)
     figure.draw_without_rendering()
     (degrees,) = figure.axes[0].child_axes
     assert degrees.get_ylabel() == "rotation (°)"
     low, high = figure.axes[0].get_ylim()
     plus, minus = ALPHA if units == "slenderness" else (1.0, 1.0)
     np.testing.assert_allclose(degrees.get_ylim(), np.degrees([low * minus, high * plus]))
-    assert not SHAKEN.plot(units="deg").axes[0].child_axes
+    assert not SHAKEN.plot(rotation_units="deg").axes[0].child_axes
 
 
 def test_the_angles_of_tipping_are_drawn_where_they_are_in_the_frame():
-    figure = FALLEN[1.0].plot(units="rad")
+    figure = FALLEN[1.0].plot(rotation_units="rad")
     (low, high), dashed = figure.axes[0].get_ylim(), labelled(figure.axes[0], "tipping, θ = ±α")
     assert {line.get_ydata()[0] for line in dashed} == {at for at in (ALPHA[0], -ALPHA[1]) if low < at < high} != set()
     assert legend_of(figure).count("tipping, θ = ±α") == 1

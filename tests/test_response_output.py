@@ -191,7 +191,7 @@ def test_a_window_is_a_stretch_of_the_response(shaken, window):
 
 def test_unknown_units_and_times_that_are_no_numbers_are_refused(shaken):
     with pytest.raises(InvalidOption, match="units must be one of slenderness, rad, deg, not 'degrees'"):
-        shaken.plot(units="degrees")
+        shaken.plot(rotation_units="degrees")
     for evaluate in (shaken.rotation, shaken.angular_velocity, shaken.normal_force, shaken.friction_demand):
         with pytest.raises(InvalidOption, match="time"):
             evaluate("1.0")

@@ -179,7 +179,7 @@ def results(bars, spectrum, study):
         "BlockTable": study.block_fragilities(),
         "Basins": dynamics.basins(BLOCK, ONE_PERIOD, np.linspace(-0.2, 0.2, 5), np.linspace(-0.4, 0.4, 5)),
         "BifurcationDiagram": dynamics.bifurcation_diagram(
-            lambda factor: (BLOCK, ONE_PERIOD.scaled(factor)), [0.5, 1.0], [0.01, 0.1], kept=4, direction="both"
+            lambda factor: (BLOCK, ONE_PERIOD.scaled(factor)), [0.5, 1.0], [0.01, 0.1], recorded=4, direction="both"
         ),
     }
 

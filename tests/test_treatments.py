@@ -181,7 +181,7 @@ def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
     scheme = rocking.AsymptoticTime(critical="exact")
     sine = rocking.pulses.sine(4.0, 1.0, cycles=2)
     symmetric = rocking.Blocks([2.0], [0.2], [0.9])
-    assert scheme.bounds(symmetric, sine, "linear").shape == (1, 2)
+    assert scheme.thresholds(symmetric, sine, "linear").shape == (1, 2)
     for different in (
         rocking.Blocks([[2.0, 2.5]], [0.2], [0.9]),
         rocking.Blocks([2.0], [[0.2, 0.25]], [0.9]),
@@ -189,9 +189,9 @@ def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
         rocking.Blocks([[2.0, 2.0], [2.0, 2.5]], [0.2], [0.9]),
     ):
         with pytest.raises(rocking.errors.InvalidOption, match="symmetric blocks"):
-            scheme.bounds(different, sine, "linear")
+            scheme.thresholds(different, sine, "linear")
     with pytest.raises(rocking.errors.InvalidOption, match="sinusoidal"):
-        scheme.bounds(symmetric, sine.delayed(1.0), "linear")
+        scheme.thresholds(symmetric, sine.delayed(1.0), "linear")
 
 
 @pytest.mark.parametrize("value", ["1e-9", True, np.nan, np.inf, 0.0, -1.0, None])

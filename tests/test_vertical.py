@@ -184,21 +184,21 @@ def test_levels_begin_where_a_motion_with_its_vertical_component_lifts_a_block(m
     block = block_for(2.0, 0.2, 0.5)
     alone = wave(2.0, 5)
     motion = alone.with_vertical(wave(5.0, 6))
-    found = rocking.incremental_dynamic_analysis(block, motion, model=model, tolerance=0.2)
+    found = rocking.incremental_dynamic_analysis(block, motion, model=model, rtol=0.2)
     lifting = found.data.lowest_uplift / motion.pga
     for excess, uplifts in ((1.0 - 1e-9, 0), (1.0 + 1e-9, 1)):
         response = rocking.simulate(block, motion.scaled(lifting * excess), model=model)
         assert min(len(response.events), 1) == uplifts
     assert found.data.lowest_uplift < min(block.uplift_thresholds(model))
     assert found.data.level.values[0] == found.data.lowest_uplift
-    horizontal = rocking.incremental_dynamic_analysis(block, alone, model=model, tolerance=0.2)
+    horizontal = rocking.incremental_dynamic_analysis(block, alone, model=model, rtol=0.2)
     assert horizontal.data.lowest_uplift == pytest.approx(min(block.uplift_thresholds(model)))
 
 
 def test_levels_of_a_block_with_two_sides_begin_at_the_side_that_the_motion_lifts() -> None:
     block = rocking.Block.from_parameters(p=2.0, alpha=(0.1, 0.2), restitution=0.5)
     push = Motion.from_samples([0.0, 1.0, 0.0], 0.2)  # to side -, whose slenderness is 0.2
-    found = rocking.incremental_dynamic_analysis(block, push, tolerance=1e-2)
+    found = rocking.incremental_dynamic_analysis(block, push, rtol=1e-2)
     assert found.data.lowest_uplift == pytest.approx(G * math.tan(0.2))
     pair = [block.uplift_thresholds("nonlinear")]
     curved = rocking.pulses.one_sine(1.0, 1.0)
