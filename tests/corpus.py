@@ -580,7 +580,7 @@ def suite() -> dict[str, rocking.Motion]:
 SUITE_BLOCKS: Final = rocking.Blocks.grid(p=[1.0, 2.5], alpha=[0.15, 0.25], restitution=[0.9])
 LEVELS: Final = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0]
 LIMITS: Final = {"overturning": math.inf, "half": 0.5}
-QUIET: Final = {"progress": False}
+QUIET: Final[dict[str, Any]] = {}
 
 
 @group(digits=6)
@@ -712,7 +712,7 @@ def validations() -> Iterator[Item]:
         for k, (motion, fell) in enumerate(zip(motions, overturned, strict=True))
     ]
     block = rocking.Block.from_parameters(p=3.2, alpha=0.21, restitution=0.88)
-    options = {"lapse": 0.01, "bins": 4, "simulations": 200, "seed": 3}
+    options = {"outlier_probability": 0.01, "bins": 4, "simulations": 200, "seed": 3}
     yield from of_result(rocking.validate(tests, block, **options, **QUIET))
     yield from of_result(rocking.validate(tests, SUITE_BLOCKS, weights=[1.0, 2.0, 1.0, 1.0], **options, **QUIET))
 
@@ -766,7 +766,7 @@ def continuations() -> Iterator[Item]:
 @group(digits=6)
 def bifurcation_diagrams() -> Iterator[Item]:
     ball, one = dynamics.BouncingBall(0.5, gravity=10.0), steady(pulses.sine(10.0, 5.0, cycles=1))
-    options = {"transient": 300, "kept": 8, "direction": "both"}
+    options = {"transient": 300, "recorded": 8, "direction": "both"}
     found = dynamics.bifurcation_diagram(
         lambda q: (ball, one.scaled(q)), [1.1, 1.3, 1.45, 1.6], [0.0, 0.8], **options, **QUIET
     )

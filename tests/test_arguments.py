@@ -68,7 +68,7 @@ TAKES_A_BLOCK = {
     "simulate": lambda block: rocking.simulate(block, MOTION),
     "simulate_many": lambda block: rocking.simulate_many(block, MOTION),
     "fragility": lambda block: rocking.fragility(block, MOTION, levels=[1.0, 2.0], measure="pga"),
-    "Blocks.of": Blocks.of,
+    "Blocks.from_bodies": Blocks.from_bodies,
 }
 
 
@@ -141,7 +141,7 @@ TAKES_ONE_THING = {
     "response of episodes": rocking.chattering.chattering_episodes,
     "slenderness": rocking.block.housner_restitution,
     "label of a part": lambda value: a_map().select(frequency=value),
-    "limits": lambda value: rocking.fragility(BLOCK, [MOTION], limit_states=value),
+    "limit_states": lambda value: rocking.fragility(BLOCK, [MOTION], limit_states=value),
     "polarity": lambda value: rocking.fragility(BLOCK, [MOTION], polarity=value),
     "polarity of an ensemble": lambda value: rocking.simulate_many(BLOCK, MOTION, polarity=value),
     "confidence": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trials=3, confidence=value),

@@ -177,6 +177,13 @@ def test_bad_arrays_of_blocks_are_refused(make, word):
         make()
 
 
+@pytest.mark.parametrize("factor", [0.0, -0.5, np.nextafter(1.0, 2.0), 2.0])
+def test_a_restitution_outside_its_range_is_refused(factor):
+    for make in (lambda: Block.from_parameters(2.0, 0.2, factor), lambda: Blocks([2.0], [0.2], [factor])):
+        with pytest.raises(InvalidBlock, match=r"restitution.* must be in \(0, 1\]"):
+            make()
+
+
 def test_sides_that_are_equal_but_for_rounding_are_those_of_a_rectangle():
     block = Block.from_parameters(p=(2.7, 2.7 * (1.0 + 1e-10)), alpha=(0.2, 0.2 * (1.0 - 3e-10)))
     assert [side.restitution for side in block.sides] == pytest.approx([1.0 - 1.5 * math.sin(0.2) ** 2] * 2, rel=1e-9)
@@ -189,3 +196,16 @@ def test_parameters_of_two_sides_tell_the_body_that_has_them(distances):
     said = "body from its parameters, centre of mass 1.2 m high, radius of gyration 0.8 m"
     assert found.description.startswith(said)
     assert [side.radius for side in found.sides] == pytest.approx([math.hypot(b, 1.2) for b in distances], rel=1e-9)
+
+
+def test_sizes_come_back_as_they_were_given():
+    block = Block(width=0.4, height=2.0)
+    assert (block.width, block.height, block.half_width, block.half_height) == (0.4, 2.0, 0.2, 1.0)
+    assert Block.from_parameters(2.0, 0.2).width is None
+
+
+def test_a_wrong_keyword_names_the_constructor_that_accepts_it():
+    with pytest.raises(TypeError, match=r"^Block has no argument p; use Block.from_parameters$"):
+        Block(p=2.0, alpha=0.2)
+    with pytest.raises(TypeError, match=r"^Block has no argument size; see help\(rocking.Block\)$"):
+        Block(size=2.0)

@@ -213,7 +213,7 @@ def test_a_note_is_said_once(run):
 
 
 def test_levels_of_a_velocity_may_have_their_unit(run):
-    code, out, _ = run("ida", RECORD, *SIZES, "--measure", "pgv", "--levels", "20cm/s:40cm/s:3", "--tolerance", "1e-3")
+    code, out, _ = run("ida", RECORD, *SIZES, "--measure", "pgv", "--levels", "20cm/s:40cm/s:3", "--rtol", "1e-3")
     assert code == 0
     assert "looked at: 3 levels, 0.2 to 0.4 m/s" in out
 
@@ -222,7 +222,7 @@ ECCENTRIC = ["--p", "2.9858,3.0053", "--alpha", "0.27417,0.155"]
 
 
 def test_a_map_takes_a_block_as_the_other_commands_do(run):
-    grid = ["--amplitudes", "1,3", "--frequencies", "2", "--tolerance", "1e-2", "--json"]
+    grid = ["--amplitudes", "1,3", "--frequencies", "2", "--rtol", "1e-2", "--json"]
     alone, with_p = (run("map", "one-sine", *p, "--alpha", "0.2", *grid) for p in ([], ["--p", "2.5"]))
     assert (alone[0], with_p[0]) == (0, 0)
     assert json.loads(alone[1]) == json.loads(with_p[1])

@@ -139,7 +139,7 @@ def test_every_public_name_is_in_the_reference():
     whole = {name for name in listed if inspect.ismodule(getattr(rocking, name, None))}
     modules = {part.__name__.partition(".")[2] for part in parts}
     names = [
-        *rocking.__all__,
+        *(name for name in rocking.__all__ if not inspect.ismodule(getattr(rocking, name))),
         *(f"{part.__name__.partition('.')[2]}.{name}" for part in parts for name in part.__all__),
     ]
     missing = [

@@ -73,7 +73,7 @@ def test_a_body_that_overturns_has_none():
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     found = dynamics.lyapunov_exponents(block, pulses.sine(20.0, 0.5, cycles=1), [0.1, 0.2], 100)
     assert math.isnan(found.largest) and found.outcome == dynamics.PeriodOutcome.OVERTURNED
-    assert "overturns" in found.summary() and found.to_dict()["fate"] == "OVERTURNED"
+    assert "overturns" in found.summary() and found.to_dict()["outcome"] == "OVERTURNED"
 
 
 def chaotic_cases():

@@ -90,7 +90,7 @@ def test_motions_of_a_cluster_count_as_one_in_the_intervals():
     # Three stations, two components each; the last is a multiple of the first, so that two clusters remain.
     pulses = [rocking.pulses.half_sine(1.0, f) for f in (0.5, 0.6, 1.0, 1.2, 1.4)]
     pulses.append(pulses[0].scaled(2.0))
-    options = {"periods": [0.7], "model": "linear", "tolerance": 1e-3, "progress": False}
+    options = {"periods": [0.7], "model": "linear", "rtol": 1e-3}
     alone = compare_measures(SLENDER, pulses, **options)
     found = compare_measures(SLENDER, pulses, clusters=["a", "a", "b", "b", "c", "c"], **options)
     assert np.array_equal(found.data.dispersion, alone.data.dispersion)
@@ -108,7 +108,7 @@ def test_reversed_motions_count_where_the_sides_of_a_block_differ(slendernesses)
     block = rocking.Block.from_parameters(p=2.0, alpha=slendernesses, restitution=0.9)
     up = rocking.pulses.one_sine(0.2, 2.0)
     pulses = [rocking.pulses.ricker(1.0, f).with_vertical(up) for f in (0.4, 0.6, 0.9)]
-    options = {"periods": [1.0], "tolerance": 1e-3, "progress": False}
+    options = {"periods": [1.0], "rtol": 1e-3}
     found = compare_measures(block, [*pulses, *(pulse.scaled(-1.0) for pulse in pulses)], **options)
     logarithms = np.log(found.data.intensity.sel(measure="PGA").values[:, 0])
     counts = logarithms if block.sides[0] != block.sides[1] else logarithms[:3]

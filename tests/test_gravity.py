@@ -91,7 +91,7 @@ ANALYSES = {
         blocks_of(k), motion_of(k), measure="pgv_ratio", rtol=1e-3
     ).bands(block=1),
     "critical scale": lambda k: rocking.critical_scale(
-        rocking.Block.from_parameters(2.0, 0.2, 0.9, gravity=k * G), motion_of(k), low=0.1, high=9.0
+        rocking.Block.from_parameters(2.0, 0.2, 0.9, gravity=k * G), motion_of(k), bounds=(0.1, 9.0)
     ).scale,
     "sizes of spectrum": lambda k: rocking.rocking_spectrum(blocks_of(k), motion_of(k)).data["size"].values / k,
 }  # fmt: skip

@@ -173,7 +173,7 @@ def test_the_figure_shows_peaks_and_bands(analysis):
         ({"measure": "factor"}, "measure"),
         ({"levels": [2.0, 1.0]}, "increase"),
         ({"levels": [0.0, 1.0]}, "positive"),
-        ({"tolerance": -1.0}, "tolerance"),
+        ({"rtol": -1.0}, "rtol"),
         ({"motions": []}, "at least one motion"),
         ({"motions": rocking.Motion([0.0, 1.0], [[0.0]])}, "zero throughout"),
         ({"blocks": rocking.Block.from_parameters(1.0, 0.2, 1.0)}, "restitution 1"),

@@ -98,22 +98,6 @@ def test_an_error_that_says_what_was_given_keeps_it() -> None:
     assert judged >= 80
 
 
-def test_who_is_asked_for_silence_is_silent() -> None:
-    """Every function with an argument `progress` passes it to its bar, and commands show theirs where there is one."""
-    judged = 0
-    for path, tree in modules("Progress("):
-        for function in ast.walk(tree):
-            if not isinstance(function, ast.FunctionDef) or "progress" not in {
-                each.arg for each in [*function.args.args, *function.args.kwonlyargs]
-            }:
-                continue
-            for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
-                if isinstance(call.func, ast.Name) and call.func.id == "Progress":
-                    judged += 1
-                    assert "show" in {each.arg for each in call.keywords}, f"{path}, line {call.lineno}"
-    assert judged >= 15
-
-
 def test_functions_take_few_parameters_in_plain_words() -> None:
     assert len(FUNCTIONS) > 280
     for name, function in FUNCTIONS.items():

@@ -121,7 +121,7 @@ def test_every_table_is_a_data_frame_and_a_file_with_units(shaken, tmp_path, tab
 
 
 def test_tables_that_are_none_and_steps_that_mean_nothing_are_refused(shaken, tmp_path):
-    with pytest.raises(InvalidOption, match="table must be one of histories, events, impacts, chattering, not 'nodes'"):
+    with pytest.raises(InvalidOption, match="table must be one of histories, events, impacts, sequences, not 'nodes'"):
         shaken.to_dataframe("nodes")
     with pytest.raises(InvalidOption, match="dt is the step of the histories"):
         shaken.to_csv(tmp_path / "impacts.csv", "impacts", dt=0.01)
@@ -214,7 +214,7 @@ def test_a_time_of_rest_has_no_more_digits_than_the_motion_leaves(below, shown):
     (rest,) = re.findall(r"^rest +(.*)$", response.summary(), re.MULTILINE)
     assert re.fullmatch(shown, rest), rest
     by_threshold = simulate(block, pulse, model="linear", chattering="velocity").summary()
-    assert ", by the treatment, not proven" in by_threshold
+    assert ", by the scheme, not proven" in by_threshold
 
 
 def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():

@@ -544,14 +544,6 @@ def test_a_vertical_component_is_part_of_a_study(tmp_path):
             rocking.create_study(tmp_path / "study", BLOCKS, other)
 
 
-def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
-    rocking.create_study(tmp_path / "one", BLOCKS, MOTIONS, levels=[0.5, 1.0], unit_blocks=512)
-    others = ({"model": "linear"}, {"chattering": "velocity"}, {"measure": "pga"}, {"polarity": "both"})
-    for given in (*others, {"levels": [1.0, 2.0]}, {"duration": 3.0}, {"unit_blocks": 512}):
-        with pytest.raises(errors.InvalidOption, match="has rules of its own: give its folder alone"):
-            rocking.create_study(tmp_path / "one", **given)
-
-
 def test_bodies_of_another_kind_with_the_same_numbers_are_another_study(tmp_path):
     motion = rocking.pulses.one_sine(4.0, 1.0)
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)

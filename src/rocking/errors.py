@@ -134,8 +134,11 @@ class InvalidBlock(RockingError):
     """Sizes or parameters do not describe a block that stands and rocks."""
 
 
-class UnequalSides(InvalidBlock):
-    """A property of one value was requested for a block with unequal sides (see `Block.sides`)."""
+class UnequalSides(InvalidBlock, AttributeError):
+    """A property of one value was requested for a block with unequal sides (see `Block.sides`).
+
+    It is also an AttributeError, so that tools that inspect all attributes of an object skip the property.
+    """
 
 
 class InvalidMotion(RockingError):

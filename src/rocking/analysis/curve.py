@@ -151,10 +151,10 @@ class FragilityCurve:
         with np.errstate(over="ignore", under="ignore"):
             return float(np.exp((score - self.fitted.intercept[0]) / self.fitted.slope[0]))
 
-    def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.9) -> Floats:
+    def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
         """Compute the largest annual rates of exceeding an intensity that are consistent with survival.
 
-        The rates are -ln(1 - confidence)/(years P(intensity)), with the shape of the intensities (SI units, 0 or more),
+        The rates are -ln(1 - confidence)/(years P(intensity)), with a one-sided confidence as in `Fragility.survival` and the shape of the intensities (SI units, 0 or more),
         and infinite at 0. A precarious rock that has stood for so long contradicts hazard curves above them.
         """
         time = checks.positive(years, "years", InvalidOption)

@@ -211,7 +211,7 @@ class Fragility(Result):
         years: float,
         hazard: HazardCurve | None = None,
         *,
-        confidence: float = 0.9,
+        confidence: float = 0.95,
         limit_state: str = "overturning",
     ) -> Survival:
         """Constrain past ground motions by a limit state that was not exceeded, as by a rock that still stands.
@@ -223,7 +223,8 @@ class Fragility(Result):
         hazard : HazardCurve, optional
             Annual rates of the intensities, for the probability of survival.
         confidence : float
-            Probability with which stronger or more frequent motions would have exceeded the limit.
+            Probability with which stronger or more frequent motions would have exceeded the limit. It is one-sided:
+            0.95 is the upper end of a two-sided interval with confidence 0.9.
         limit_state : str
             Name of the limit state.
 

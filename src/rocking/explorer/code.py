@@ -55,7 +55,7 @@ _QUANTITIES: Final = {
     return rests[0] - uplifts[0] if len(rests) else np.nan""",
     "peak": """\
     # Peak rotation over the slenderness, the smaller one of two; infinite where the block overturns.
-    slenderness = min(side.alpha for side in one_block(response.block).sides)
+    slenderness = min(side.alpha for side in response.block.sides)
     return np.inf if response.overturned else response.peak_rotation / slenderness""",
     "mode": """\
     # -4: overturns after a rest; -3: no uplift; -2: rests before the motion is over; -1: rocks; else overturns, and
@@ -82,10 +82,11 @@ def case({name}):
 
 
 rock = dynamics.stroboscopic_map(*case({at!r}){options})
-print(rock.orbit(({rotation!r}, {velocity!r}), {last})[-{kept}:])
+print(rock.orbit(({rotation!r}, {velocity!r}), {last})[-{recorded}:])
 
 found = dynamics.bifurcation_diagram(
-    case, {values}, (0.0, 0.0), direction="both", transient={transient}, kept={kept}, parameter={name!r}{options}
+    case, {values}, (0.0, 0.0), direction="both",
+    transient={transient}, recorded={recorded}, parameter={name!r}{options}
 )
 print(found.summary())
 """
@@ -173,7 +174,7 @@ def sweep_as_python(sweep: Sweep) -> str:
         values=_write_axis(sweep.axis),
         rotation=case.initial_rotation,
         velocity=case.initial_velocity,
-        kept=STORED_STATES,
+        recorded=STORED_STATES,
         transient=TRANSIENT_PERIODS - 1,
         last=TRANSIENT_PERIODS + STORED_STATES - 1,
     )
