@@ -63,7 +63,7 @@ def test_the_response_of_a_ball_is_told_in_its_own_words():
     assert [axes.get_ylabel() for axes in found.plot().axes] == ["position (m)", "ground\nacceleration\n(g)"]
     with pytest.raises(InvalidOption, match="forces of the ground are not known of this body: bouncing ball"):
         found.normal_force(0.1)
-    assert found.block == found.body == BALL
+    assert found.block == BALL
 
 
 def test_a_rest_that_the_ground_ends_at_once_passes_on_what_shifts_it():

@@ -181,7 +181,7 @@ def test_scales_that_bracket_no_overturning_are_refused() -> None:
     record = Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
     with pytest.raises(rocking.errors.InvalidOption, match=r"does not overturn at the scale 0.2"):
         rocking.critical_scale(BLOCK, record, (0.1, 0.2))
-    with pytest.raises(rocking.errors.InvalidOption, match=r"overturns at the scale low = 8"):
+    with pytest.raises(rocking.errors.InvalidOption, match=r"overturns at the scale 8"):
         rocking.critical_scale(BLOCK, record, (8.0, 9.0))
     with pytest.raises(rocking.errors.InvalidOption, match="no motion to scale"):
         rocking.critical_scale(BLOCK, None, (8.0, 9.0))
