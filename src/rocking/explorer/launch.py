@@ -165,7 +165,7 @@ class Frame:
 
     See Also
     --------
-    explore : Create a frame from a response.
+    rocking.explore : Create a frame from a response.
     """
 
     texts: dict[str, str]

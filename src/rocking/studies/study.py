@@ -110,7 +110,7 @@ class RunReport:
 
 
 class Study:
-    """Simulations of blocks, motions, scales and polarities, stored in a folder; from `rocking.study`.
+    """Simulations of blocks, motions, scales and polarities, stored in a folder, created by `create_study`.
 
     Parameters
     ----------
@@ -119,14 +119,14 @@ class Study:
 
     Attributes
     ----------
-    place : str
+    folder : str
         Folder of the study.
     product : Product
         Inputs of the simulations.
 
     See Also
     --------
-    study : Create or open a study.
+    create_study : Create a study.
     simulate_many : Simulate in memory.
 
     Examples
