@@ -1,5 +1,9 @@
 """Sphinx configuration; the pages load nothing from the network."""
 
+import functools
+import inspect
+import os
+import pydoc
 import re
 import sys
 from importlib.metadata import version as installed_version
@@ -19,6 +23,8 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.intersphinx",
+    "sphinx.ext.viewcode",
     "sphinx.ext.mathjax",
     "sphinx-mathjax-offline",
     "sphinx_design",
@@ -40,6 +46,19 @@ bibtex_bibfiles = ["references.bib"]
 bibtex_default_style = "unsrtalpha"
 bibtex_reference_style = "author_year"
 copybutton_exclude = ".linenos, .gp, .go"
+
+default_role = "literal"
+# Inventories of other projects need the network, so that only the build for
+# publication links them.
+if os.environ.get("ROCKING_DOCS_INTERSPHINX"):
+    intersphinx_mapping = {
+        "python": ("https://docs.python.org/3", None),
+        "numpy": ("https://numpy.org/doc/stable", None),
+        "scipy": ("https://docs.scipy.org/doc/scipy", None),
+        "xarray": ("https://docs.xarray.dev/en/stable", None),
+        "pandas": ("https://pandas.pydata.org/docs", None),
+        "matplotlib": ("https://matplotlib.org/stable", None),
+    }
 
 autosummary_generate = True
 autosummary_ignore_module_all = False
@@ -129,6 +148,38 @@ def escape_bars(_app, _what, _name, _object, _options, lines):
     lines[:] = [re.sub(r"\|([^|`\s]+)\|", r"\\|\1\\|", line) for line in lines]
 
 
+METHODS = (property, functools.cached_property, classmethod, staticmethod)
+
+
+@functools.cache
+def public_names():
+    """Return the full name of every object in the reference, by short name."""
+    page = (Path(__file__).parent / "api" / "index.md").read_text("utf-8")
+    names = re.findall(r"^   ([\w.]+)$", page, re.MULTILINE)
+    # Of two equal short names, the one of the top level.
+    names.sort(key=len, reverse=True)
+    return {name.rpartition(".")[2]: f"rocking.{name}" for name in names}
+
+
+def link_names(_app, _what, name, _object, _options, lines):
+    """Link public names in backticks, such as `Response.plot`."""
+    known = public_names()
+
+    def link(match):
+        first, dot, rest = match[1].removeprefix("rocking.").partition(".")
+        target = known.get(first)
+        if target is None or target == name or "." in rest:
+            return match[0]
+        # Fields have no entry of their own.
+        part = inspect.getattr_static(pydoc.locate(target), rest, None)
+        if callable(part) or isinstance(part, METHODS):
+            target += dot + rest
+        return f":py:obj:`{match[1]} <{target}>`"
+
+    pattern = r"(?<![:`\w])`((?:rocking\.)?\w+(?:\.\w+)*)`(?![`\w])"
+    lines[:] = [re.sub(pattern, link, line) for line in lines]
+
+
 def lead_within(_app, _path, _page, content):
     """Let links of an included page of the repository lead to its page here."""
     for file, page in INCLUDED.items():
@@ -143,3 +194,4 @@ def setup(app):
     app.connect("include-read", lead_within)
     # After numpydoc, which reads the docstring at the default priority.
     app.connect("autodoc-process-docstring", escape_bars, priority=900)
+    app.connect("autodoc-process-docstring", link_names, priority=901)

@@ -61,7 +61,7 @@ def rocking_spectrum(
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         Grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), the dimensions of the spectrum.
         Other blocks, for example from a calibration, and a grid with `p`, `size` or `weights` are an ensemble, resized
-        together (`Blocks.resized`) so that its median p equals each of `p`.
+        together (`Blocks.with_p_scaled`) so that its median p equals each of `p`.
     motions : optional
         As for `simulate_many`.
     p : array_like, optional
