@@ -30,7 +30,7 @@ from rocking.dynamics.maps import (
     describe_input,
     stroboscopic_map,
 )
-from rocking.dynamics.orbits import count_impacts
+from rocking.dynamics.orbits import count_orbit_impacts
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import measure_stretches
@@ -247,7 +247,7 @@ def bifurcation_diagram(
             for s in np.flatnonzero(~np.isnan(final_states[:, 0])):
                 n = periods[d, k, s] = find_period(states[d, k, s], scale)
                 if n:
-                    impacts[d, k, s] = count_impacts(
+                    impacts[d, k, s] = count_orbit_impacts(
                         strobe, final_states[s], n, strobe.derivative(final_states[s], n)[1]
                     )
         return len(value_indices)

@@ -229,12 +229,12 @@ def create_orbit(strobe: StroboscopicMap, state: Floats, period: int) -> Periodi
         symmetric = bool(np.all(np.abs(half_period_state + state) < 1e-9 * np.array(compute_scale(strobe))))
     return PeriodicOrbit(
         strobe.body, strobe.motion, strobe.model, strobe.chattering, state, period,
-        count_impacts(strobe, state, period, derivative), compute_multipliers(strobe, derivative), symmetric,
+        count_orbit_impacts(strobe, state, period, derivative), compute_multipliers(strobe, derivative), symmetric,
         not np.any(derivative),
     )  # fmt: skip
 
 
-def count_impacts(strobe: StroboscopicMap, state: Floats, period: int, derivative: Floats) -> float:
+def count_orbit_impacts(strobe: StroboscopicMap, state: Floats, period: int, derivative: Floats) -> float:
     """Count the impacts over a number of periods; infinity with complete chattering."""
     impacts = float(strobe.advance(state, period)[2])
     chatters = impacts > 0.0 and strobe.chattering.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
