@@ -101,7 +101,7 @@ def test_asymptotic_functions_know_their_ends():
     assert chattering.first_impact_speed([[1.0], [1.1]], [1.0, 2.0]).shape == (2, 2)
     with pytest.raises(InvalidOption, match="below 1"):
         chattering.asymptotic_table(1.01, 2.0, 1.0)
-    with pytest.raises(InvalidOption, match="lift off"):
+    with pytest.raises(InvalidOption, match="uplifts"):
         chattering.asymptotic_table(0.9, 2.0, 0.9)
 
 

@@ -95,7 +95,7 @@ def test_series_knows_its_ends():
     assert np.isnan(time[0]) and time[1] == 0.0
     with pytest.raises(InvalidOption, match="order must be"):
         chattering.series_coefficients(2.0, 0.9, order=41)
-    with pytest.raises(InvalidOption, match="not resolved"):
+    with pytest.raises(InvalidOption, match="does not resolve"):
         chattering.series_coefficients(1e-6, 0.9, order=40)
 
 

@@ -9,7 +9,7 @@ from numpy.random import default_rng
 import rocking
 from rocking import Block, dynamics, pulses
 from rocking.dynamics.attractors import KnownAttractors
-from rocking.dynamics.bifurcation import period_of, states_after
+from rocking.dynamics.bifurcation import find_period, record_states
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 SHAKING = pulses.sine(3.5, 1.2, cycles=1)
@@ -107,16 +107,16 @@ def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
     """A few points of a long orbit have a neighbourhood; a cell may end at another one, before or after it is known."""
     strobe = dynamics.stroboscopic_map(dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(16.92, 5.0, cycles=1))
     states = np.stack(np.meshgrid(np.linspace(0.05, 0.15, 5), np.linspace(0.3, 0.7, 5)), axis=-1).reshape(-1, 2)
-    kept = states_after(strobe, states, 400, 64)[0]
-    periods = [period_of(each) for each in kept]
+    kept = record_states(strobe, states, 400, 64)[0]
+    periods = [find_period(each) for each in kept]
     assert sorted(set(periods)) == [4, 23]
     known = KnownAttractors(strobe, np.array([0.1, 0.4]))
-    owners = known.settle(kept[:, -1])
+    owners = known.classify_or_search(kept[:, -1])
     assert [each.period for each in known.attractors] in ([4, 23], [23, 4])
     assert [known.attractors[owner].period for owner in owners] == periods
     on = kept[periods.index(23)][:23]
-    assert np.count_nonzero(known.owners(on) == -1) > KnownAttractors.MOST_TRIES
-    assert set(known.settle(on).tolist()) == {owners[periods.index(23)]} and len(known.attractors) == 2
+    assert np.count_nonzero(known.classify(on) == -1) > KnownAttractors.MAX_TRIES
+    assert set(known.classify_or_search(on).tolist()) == {owners[periods.index(23)]} and len(known.attractors) == 2
 
 
 @pytest.mark.parametrize("width", [1e-2, 1e-6, 1e-9, 0.0])
@@ -150,19 +150,21 @@ def test_a_neighbourhood_holds_what_enters_it():
         strobe = dynamics.stroboscopic_map(body, motion, model=model)
         known = KnownAttractors(strobe, np.array([np.ptp(low), np.ptp(high)]))
         ends, fates, _ = strobe.advance(default_rng(seed).uniform(*np.transpose([low, high]), (20, 2)), 300)
-        known.settle(ends[fates != dynamics.PeriodOutcome.OVERTURNED])
-        for trap, owner in zip(known.traps, known.owner, strict=True):
+        known.classify_or_search(ends[fates != dynamics.PeriodOutcome.OVERTURNED])
+        for trap, owner in zip(known.traps, known.attractor_of_trap, strict=True):
             if trap[0] < 0:
                 continue
             shape = np.linalg.cholesky(np.array([[trap[3], trap[4]], [trap[4], trap[5]]]))
             disc = default_rng(seed).normal(size=(200, 2))
             disc *= np.sqrt(default_rng(seed + 1).uniform(size=(200, 1))) / np.linalg.norm(disc, axis=1, keepdims=True)
             uv = trap[1:3] + disc @ np.linalg.inv(shape)
-            states = strobe._coordinates(*uv[uv[:, 0] > 0.0].T, np.full(np.count_nonzero(uv[:, 0] > 0.0), int(trap[0])))
+            states = strobe._to_coordinates(
+                *uv[uv[:, 0] > 0.0].T, np.full(np.count_nonzero(uv[:, 0] > 0.0), int(trap[0]))
+            )
             attractor = known.attractors[owner]
             for _ in range(3):
                 states = strobe(states, attractor.period)
-                assert np.all(known.owners(states) == owner)
+                assert np.all(known.classify(states) == owner)
             judged += len(states)
     assert judged > 500
 

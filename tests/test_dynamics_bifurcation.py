@@ -99,7 +99,7 @@ def test_a_velocity_that_is_zero_but_for_rounding_has_no_period_of_its_own():
 
 def test_a_small_orbit_has_its_period():
     states = 1e-5 * np.array([[1.0, 2.0], [1.0, 2.0 + 1e-5]] * 8)
-    assert bifurcation.period_of(states, (1.0, 1.0)) == bifurcation.period_of(states) == 2
+    assert bifurcation.find_period(states, (1.0, 1.0)) == bifurcation.find_period(states) == 2
 
 
 @pytest.mark.parametrize("chattering", ["certified", "velocity=0.001"])

@@ -257,7 +257,7 @@ def test_a_spring_that_presses_against_one_of_two_stops_brings_the_body_to_rest_
     lively = dynamics.ImpactOscillator(1.0, 1.0, stop=stops[0], second_stop=stops[1])
     with pytest.raises(InvalidOption, match="restitution 1"):
         dynamics.simulate(lively, shaking)
-    with pytest.raises(InvalidOption, match="nothing presses"):
+    with pytest.raises(InvalidOption, match="not pressed against a stop"):
         dynamics.simulate(free, None)
 
 

@@ -9,7 +9,7 @@ from oracles import closed_orbits
 
 from rocking import Block, dynamics, pulses
 from rocking.chattering import critical_amplitude
-from rocking.dynamics.maps import distances
+from rocking.dynamics.maps import compute_distances
 from rocking.errors import InvalidOption
 
 G = 10.0
@@ -368,4 +368,4 @@ def test_distances_in_a_period_are_those_of_all_pairs() -> None:
         period = 10.0 ** random.uniform(-2.0, 2.0)
         marks, times = (period * random.uniform(size=random.integers(1, 12)) for _ in range(2))
         away = np.abs(times[:, None] - marks)
-        assert distances(times, marks, period).tolist() == np.minimum(away, period - away).min(axis=1).tolist()
+        assert compute_distances(times, marks, period).tolist() == np.minimum(away, period - away).min(axis=1).tolist()

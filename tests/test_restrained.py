@@ -91,12 +91,12 @@ def test_maps_take_restraints_but_no_tendon_that_yields():
         step = np.eye(2)[k] * h
         assert change[:, k] == pytest.approx((strobe(start + step) - strobe(start - step)) / (2.0 * h), rel=1e-5)
     assert np.all(strobe(start) == end)
-    from rocking.dynamics.maps import is_mirrored
+    from rocking.dynamics.maps import has_mirror_symmetry
 
     aside = RestrainedBlock(column, Tendon(3e5, prestress=1e3, offset=0.1))
-    assert is_mirrored(strobe)
-    assert not is_mirrored(rocking.dynamics.stroboscopic_map(aside, sine))
-    with pytest.raises(InvalidBlock, match="a tendon that yields remembers"):
+    assert has_mirror_symmetry(strobe)
+    assert not has_mirror_symmetry(rocking.dynamics.stroboscopic_map(aside, sine))
+    with pytest.raises(InvalidBlock, match="yielding tendons have internal state"):
         rocking.dynamics.stroboscopic_map(RestrainedBlock(column, Tendon(3e5, strength=1e3)), sine)
 
 

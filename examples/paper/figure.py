@@ -15,11 +15,11 @@ from rocking import pulses
 from rocking.block import Block
 from rocking.chattering.duration import chattering_time, critical_amplitude
 from rocking.chattering.expansions import (
-    checked_frequency,
-    checked_loss,
-    checked_slenderness,
-    lifting_amplitude,
-    single,
+    check_frequency,
+    check_lifting_amplitude,
+    check_lossy_restitution,
+    check_slenderness,
+    require_scalar,
 )
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -66,11 +66,11 @@ class BlockUnderSine:
     alpha: float = ALPHA
 
     def __post_init__(self) -> None:
-        lifting_amplitude(self.a, above=True)
-        single(checked_frequency(self.omega), "omega")
-        single(checked_loss(self.eta), "eta")
+        check_lifting_amplitude(self.a, above=True)
+        require_scalar(check_frequency(self.omega), "omega")
+        require_scalar(check_lossy_restitution(self.eta), "eta")
         checks.positive(self.p, "p", InvalidOption, "rad/s")
-        single(checked_slenderness(self.alpha), "alpha")
+        require_scalar(check_slenderness(self.alpha), "alpha")
 
     @property
     def period(self) -> float:

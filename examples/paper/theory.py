@@ -26,12 +26,12 @@ from histories import Ratios, chattering_figure, ratio_figure
 
 from rocking.chattering.duration import (
     chattering_time,
+    compute_default_resolved,
     critical_amplitude,
     interval_ratios,
-    resolved_by_default,
     sequence,
 )
-from rocking.chattering.expansions import checked_loss, first_impact_speed, first_interval, single
+from rocking.chattering.expansions import check_lossy_restitution, first_impact_speed, first_interval, require_scalar
 from rocking.core.arrays import Floats
 from rocking.core.bisection import bisect
 from rocking.errors import InvalidOption
@@ -123,7 +123,7 @@ def figure_6() -> PaperFigure:
 
 def figure_7(*, eta: float = ETA) -> PaperFigure:
     """Critical amplitude against frequency: exact, Eq. 76 and Eq. 77."""
-    single(checked_loss(eta), "eta")
+    require_scalar(check_lossy_restitution(eta), "eta")
     labels = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77"}
     critical = {name: critical_amplitude(_FREQUENCIES, eta, method=name) for name in labels}
     exact = critical["exact"]
@@ -190,7 +190,7 @@ def _duration_statements(case: BlockUnderSine) -> tuple[Statement, ...]:
             digits=3,
         ),
         Statement(
-            f"the same of Eq. 75 with {resolved_by_default(np.array(case.eta))} impacts resolved, %",
+            f"the same of Eq. 75 with {compute_default_resolved(np.array(case.eta))} impacts resolved, %",
             '"remarkable agreement"' if papers else None,
             semianalytical,
             digits=2,

@@ -13,16 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import pulses
 from rocking.block import Block
 from rocking.chattering.expansions import (
-    HIGHEST_ORDER,
-    asymptotic_times,
-    broadcast,
-    checked_amplitude,
-    checked_frequency,
-    checked_restitution,
-    checked_slenderness,
-    lifting_amplitude,
-    series_times,
-    single,
+    MAX_ORDER,
+    broadcast_flat,
+    check_amplitude,
+    check_frequency,
+    check_lifting_amplitude,
+    check_restitution,
+    check_slenderness,
+    compute_asymptotic_times,
+    compute_series_times,
+    require_scalar,
 )
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -34,21 +34,21 @@ from rocking.engine.schemes import critical_amplitudes_by
 from rocking.engine.tasks import require_finished
 from rocking.errors import InvalidOption, Unfinished
 from rocking.kernels.sine import SequenceStatus
-from rocking.kernels.sine.sequence import IMPACT as RESOLVED
+from rocking.kernels.sine.sequence import IMPACT as RESOLVED_IMPACT
 from rocking.kernels.sine.sequence import resolve_impacts, write_rest_phases, write_semianalytical_phases
 from rocking.simulation.simulate import simulate
 
-#: Sequences per task of a thread.
-_PART: Final = 1 << 12
+#: Number of sequences per task of a thread.
+_CHUNK: Final = 1 << 12
 
 #: Number of impacts in the paper, at this restitution.
 _PAPER_IMPACTS: Final = 60
 _PAPER_RESTITUTION: Final = 0.92
 
-#: Two ulp: largest loss of the bracket by adding to the phase and dividing by omega.
+#: Relative rounding error of the bounds of the time of rest (two ulp).
 _ROUNDING: Final = 2.0**-51
 
-_LARGEST_CAPACITY: Final = 1 << 23
+_MAX_CAPACITY: Final = 1 << 23
 
 IMPACT: Final = np.dtype(
     [("time", float), ("side", np.int8), ("interval", float), ("speed_before", float), ("speed_after", float)]
@@ -107,7 +107,7 @@ def chattering_time(
 
     Notes
     -----
-    Source: "Chattering: An overlooked peculiarity of rocking motion", Eqs 4 to 13 (problem), 65 and 75.
+    Source: :cite:t:`giouvanidis2022`, Eqs 4 to 13 (problem), 65 and 75.
 
     Close to the critical amplitude a_cr the relative error of "exact" is at most 2^-51 nu (pi/omega - tau)/((a_cr - a)
     tau) plus 1e-13, with an exponent nu of eta alone (`critical_amplitude`): for example, 3e-12 at 1e-8 below a_cr for
@@ -118,18 +118,18 @@ def chattering_time(
     >>> round(float(chattering_time(1.03, 2.0, 0.92)), 12)
     1.125947676934
     """
-    order = checks.integer(order, "order", InvalidOption, 1, HIGHEST_ORDER)
+    order = checks.integer(order, "order", InvalidOption, 1, MAX_ORDER)
     if resolved is not None:
         resolved = checks.integer(resolved, "resolved", InvalidOption, 1, 1_000_000)
-    parameters = checked_amplitude(a), checked_frequency(omega), checked_restitution(eta)
+    parameters = check_amplitude(a), check_frequency(omega), check_restitution(eta)
     methods: dict[str, Callable[[], Floats]] = {
-        "exact": lambda: _exact_times(*parameters),
-        "asymptotic": lambda: asymptotic_times(*parameters),
-        "series": lambda: series_times(*parameters, order),
-        "semianalytical": lambda: _semianalytical_times(*parameters, resolved),
+        "exact": lambda: _compute_exact_times(*parameters),
+        "asymptotic": lambda: compute_asymptotic_times(*parameters),
+        "series": lambda: compute_series_times(*parameters, order),
+        "semianalytical": lambda: _compute_semianalytical_times(*parameters, resolved),
     }
-    chosen = checks.choice(method, "method", InvalidOption, list(methods))
-    return methods[chosen]()
+    selected = checks.choice(method, "method", InvalidOption, list(methods))
+    return methods[selected]()
 
 
 def is_complete(a: ArrayLike, omega: ArrayLike, eta: ArrayLike) -> NDArray[np.bool_]:
@@ -216,30 +216,30 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     >>> chattering.complete, chattering.impacts["side"][:3].tolist()
     (True, [1, -1, 1])
     """
-    amplitude, frequency, restitution = _single_case(a, omega, eta)
+    amplitude, frequency, restitution = _check_case(a, omega, eta)
     if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
-        raise InvalidOption(f"{{}} must be at least 1e-15 and finite, not {tolerance!r}", "tolerance", value=tolerance)
+        raise InvalidOption(f"{{}} must be finite and at least 1e-15; got {tolerance!r}", "tolerance", value=tolerance)
     if amplitude == 1.0:
         return ChatteringSequence(np.zeros(0, IMPACT), True, 0.0, 0.0, 0.0)
     capacity, half_period = 512, math.pi / frequency
     while True:
-        status, impacts, phases = _resolved(amplitude, frequency, restitution, tolerance, capacity)
-        stays = impacts.size > 1 and not impacts["time"][-1] > impacts["time"][impacts.size // 2]
-        if status != SequenceStatus.UNRESOLVED or impacts.size < capacity or stays:
+        status, impacts, phases = _resolve_sequence(amplitude, frequency, restitution, tolerance, capacity)
+        has_stalled = impacts.size > 1 and not impacts["time"][-1] > impacts["time"][impacts.size // 2]
+        if status != SequenceStatus.UNRESOLVED or impacts.size < capacity or has_stalled:
             break
         capacity *= 2
-        if capacity > _LARGEST_CAPACITY:
+        if capacity > _MAX_CAPACITY:
             raise InvalidOption(
-                f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower {{}} = {eta!r}", "eta", value=eta
+                f"the sequence has more than {_MAX_CAPACITY} impacts: reduce {{}} = {eta!r}", "eta", value=eta
             )
-    # This late, the amplitude may be within rounding of the critical one.
+    # A sequence that lasts almost half a period may have the critical amplitude within rounding error.
     if status == SequenceStatus.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - 1e-6):
-        # If rounding decides, the outcome of `chattering_time` counts.
-        settled = float(chattering_time(amplitude, frequency, restitution))
-        if status != SequenceStatus.FOUND and math.isfinite(settled):
-            impacts = impacts[impacts["time"] < settled]
-            return ChatteringSequence(impacts, True, settled, float(impacts["time"].max(initial=0.0)), half_period)
-        status = status if math.isfinite(settled) else SequenceStatus.INCOMPLETE
+        # If rounding error decides, `chattering_time` determines the outcome.
+        rest_time = float(chattering_time(amplitude, frequency, restitution))
+        if status != SequenceStatus.FOUND and math.isfinite(rest_time):
+            impacts = impacts[impacts["time"] < rest_time]
+            return ChatteringSequence(impacts, True, rest_time, float(impacts["time"].max(initial=0.0)), half_period)
+        status = status if math.isfinite(rest_time) else SequenceStatus.INCOMPLETE
     if status == SequenceStatus.FOUND:
         return ChatteringSequence(impacts, True, *phases)
     return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
@@ -271,26 +271,27 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     >>> round(float(ratios[-1]), 3), round(0.86**2, 3)
     (0.74, 0.74)
     """
-    amplitude, frequency, restitution = _single_case(a, omega, eta)
+    amplitude, frequency, restitution = _check_case(a, omega, eta)
     n = checks.integer(n, "n", InvalidOption, 1, 100_000)
     ratios = np.full(n, math.nan)
-    intervals = _resolved(amplitude, frequency, restitution, -1.0, n + 2)[1]["interval"]
+    intervals = _resolve_sequence(amplitude, frequency, restitution, -1.0, n + 2)[1]["interval"]
     intervals = intervals[intervals > 0.0]
-    known = max(0, intervals.size - 2)
-    ratios[:known] = intervals[2:] / intervals[:known]
+    n_known = max(0, intervals.size - 2)
+    ratios[:n_known] = intervals[2:] / intervals[:n_known]
     return ratios
 
 
-def _single_case(a: float, omega: float, eta: float) -> tuple[float, float, float]:
-    amplitude = lifting_amplitude(a)
-    return amplitude, single(checked_frequency(omega), "omega"), single(checked_restitution(eta), "eta")
+def _check_case(a: float, omega: float, eta: float) -> tuple[float, float, float]:
+    """Return the parameters of a single sequence as floats."""
+    amplitude = check_lifting_amplitude(a)
+    return amplitude, require_scalar(check_frequency(omega), "omega"), require_scalar(check_restitution(eta), "eta")
 
 
-def _resolved(
+def _resolve_sequence(
     a: float, omega: float, eta: float, tolerance: float, capacity: int
 ) -> tuple[int, NDArray[np.void], tuple[float, float, float]]:
-    """Return the status (UNRESOLVED if the capacity is exhausted), impacts, and time of rest with its bracket."""
-    table = np.zeros(capacity, RESOLVED)
+    """Compute the status (UNRESOLVED if the capacity is exhausted), impacts, and time of rest with its bracket."""
+    table = np.zeros(capacity, RESOLVED_IMPACT)
     status, count, rest, lower, upper = resolve_impacts(a - 1.0, 1.0 / (omega * omega), eta, tolerance, table)
     table = table[:count]
     impacts = np.zeros(count, IMPACT)
@@ -302,48 +303,51 @@ def _resolved(
     return status, impacts, (rest / omega, lower / omega * (1.0 - _ROUNDING), upper / omega * (1.0 + _ROUNDING))
 
 
-def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
-    shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
+def _compute_exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
+    """Compute the chattering times by method "exact"."""
+    shape, (amplitudes, frequencies, restitutions) = broadcast_flat(a, omega, eta)
     times = np.where(amplitudes == 1.0, 0.0, math.nan)
-    rock = np.flatnonzero((amplitudes > 1.0) & (restitutions < 1.0))
+    rocking_indices = np.flatnonzero((amplitudes > 1.0) & (restitutions < 1.0))
 
-    def part(start: int) -> None:
-        some = rock[start : start + _PART]
-        phases, statuses = np.zeros(some.size), np.zeros(some.size, np.int8)
-        write_rest_phases((amplitudes[some], frequencies[some], restitutions[some]), phases, statuses)
+    def compute_chunk(start: int) -> None:
+        chunk = rocking_indices[start : start + _CHUNK]
+        phases, statuses = np.zeros(chunk.size), np.zeros(chunk.size, np.int8)
+        write_rest_phases((amplitudes[chunk], frequencies[chunk], restitutions[chunk]), phases, statuses)
         phases[statuses == SequenceStatus.INCOMPLETE] = math.nan
         phases[statuses == SequenceStatus.UNRESOLVED] = math.inf
-        times[some] = phases / frequencies[some]
+        times[chunk] = phases / frequencies[chunk]
 
-    for _ in map_in_threads(part, range(0, rock.size, _PART)):  # the compiled function holds no lock
+    # The compiled function holds no lock.
+    for _ in map_in_threads(compute_chunk, range(0, rocking_indices.size, _CHUNK)):
         pass
     return times.reshape(shape)[()]
 
 
-def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int | None) -> Floats:
-    shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
-    exact = np.atleast_1d(_exact_times(amplitudes, frequencies, restitutions))
+def _compute_semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int | None) -> Floats:
+    """Compute the chattering times by method "semianalytical"."""
+    shape, (amplitudes, frequencies, restitutions) = broadcast_flat(a, omega, eta)
+    exact = np.atleast_1d(_compute_exact_times(amplitudes, frequencies, restitutions))
     times = np.where(amplitudes == 1.0, 0.0, exact)
     complete = np.flatnonzero(np.isfinite(exact) & (amplitudes > 1.0))
     sequences = amplitudes[complete], frequencies[complete], restitutions[complete]
-    impacts = resolved_by_default(sequences[2]) if resolved is None else np.full(complete.size, resolved)
+    impacts = compute_default_resolved(sequences[2]) if resolved is None else np.full(complete.size, resolved)
     phases = np.zeros(complete.size)
     statuses = np.full(complete.size, SequenceStatus.UNRESOLVED, np.int8)
     write_semianalytical_phases(sequences, impacts, phases, statuses)
-    # Proven complete: an estimate beyond half a period is inaccurate.
+    # Chattering is proven to be complete, so that an estimate beyond half a period is inaccurate.
     phases[statuses == SequenceStatus.UNRESOLVED] = math.inf
     times[complete] = phases / sequences[1]
     return times.reshape(shape)[()]
 
 
-def resolved_by_default(eta: Floats) -> NDArray[np.int64]:
-    """Return the default number of impacts that Eq. 75 resolves."""
+def compute_default_resolved(eta: Floats) -> NDArray[np.int64]:
+    """Compute the default number of impacts that Eq. 75 resolves."""
     count = np.ceil(_PAPER_IMPACTS * math.log(_PAPER_RESTITUTION) / np.log(eta))
     return np.maximum(count, _PAPER_IMPACTS).astype(np.int64)
 
 
 #: Phase before uplift at which the simulated motion starts.
-_LEAD: Final = 0.1
+_LEAD_PHASE: Final = 0.1
 
 
 def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact") -> Floats:
@@ -383,9 +387,9 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     >>> round(float(critical_amplitude(2.0, 0.92)), 12)
     1.03801553873
     """
-    chosen = checks.choice(method, "method", InvalidOption, ("exact", "eq76", "eq77"))
-    shape, flat = broadcast(checked_frequency(omega), checked_restitution(eta))
-    return critical_amplitudes_by(chosen, *flat).reshape(shape)[()]
+    selected = checks.choice(method, "method", InvalidOption, ("exact", "eq76", "eq77"))
+    shape, flat_parameters = broadcast_flat(check_frequency(omega), check_restitution(eta))
+    return critical_amplitudes_by(selected, *flat_parameters).reshape(shape)[()]
 
 
 def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike) -> Floats:
@@ -419,18 +423,19 @@ def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayL
     >>> f"{nonlinear - critical_amplitude(2.0, 0.92):.1e}"
     '-7.3e-06'
     """
-    parameters = checked_frequency(omega), checked_restitution(eta), checked_slenderness(alpha)
-    shape, flat = broadcast(*parameters)
-    cases = list(zip(*(values.tolist() for values in flat), strict=True))
-    found = np.empty(len(cases))
+    parameters = check_frequency(omega), check_restitution(eta), check_slenderness(alpha)
+    shape, flat_parameters = broadcast_flat(*parameters)
+    cases = list(zip(*(values.tolist() for values in flat_parameters), strict=True))
+    amplitudes = np.empty(len(cases))
     with Progress("bisecting", len(cases)) as bar:
-        for k, amplitude in enumerate(map_in_threads(lambda case: _critical(*case), cases)):
-            found[k] = amplitude
+        for k, amplitude in enumerate(map_in_threads(lambda case: _bisect_critical_amplitude(*case), cases)):
+            amplitudes[k] = amplitude
             bar.advance()
-    return found.reshape(shape)[()]
+    return amplitudes.reshape(shape)[()]
 
 
-def _critical(omega: float, eta: float, alpha: float) -> float:
+def _bisect_critical_amplitude(omega: float, eta: float, alpha: float) -> float:
+    """Find the critical amplitude of one nonlinear block; NaN if a simulation does not finish."""
     if eta == 1.0:
         return 1.0
     block = Block.from_parameters(p=1.0, alpha=alpha, restitution=eta)
@@ -447,8 +452,10 @@ def _critical(omega: float, eta: float, alpha: float) -> float:
 def _comes_to_rest(block: Block, a: float, omega: float) -> bool:
     """Whether the block rests within half a period of its first uplift under a sine of amplitude a g tan(alpha)."""
     amplitude = a * block.gravity * math.tan(block.sides[0].alpha)
-    turn = 2.0 * math.pi
-    motion = pulses.sine(amplitude, omega / turn, cycles=(math.pi + _LEAD) / turn, phase=math.asin(1.0 / a) - _LEAD)
+    two_pi = 2.0 * math.pi
+    motion = pulses.sine(
+        amplitude, omega / two_pi, cycles=(math.pi + _LEAD_PHASE) / two_pi, phase=math.asin(1.0 / a) - _LEAD_PHASE
+    )
     response = simulate(block, motion, model="nonlinear", duration=motion.duration)
     require_finished(response.unfinished)
     return bool((response.events["kind"] == "rest").any())

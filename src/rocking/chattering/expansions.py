@@ -14,18 +14,18 @@ from rocking.core.arrays import Flags, Floats
 from rocking.errors import InvalidOption
 from rocking.kernels.sine.series import compute_phase_coefficients, sum_eq65, write_eq65_terms
 
-#: Frequencies, divided by p of the block, for which double precision resolves the problem.
-LOWEST_FREQUENCY: Final = 1e-6
-HIGHEST_FREQUENCY: Final = 1e6
+#: Range of frequencies, divided by p of the block, that double precision resolves.
+MIN_FREQUENCY: Final = 1e-6
+MAX_FREQUENCY: Final = 1e6
 
-#: Closer to one, a sequence has more than a million impacts; at one it never ends.
-LARGEST_RESTITUTION: Final = 0.99999
+#: Largest coefficient of restitution below one; above it, a sequence has more than a million impacts.
+MAX_RESTITUTION: Final = 0.99999
 
 #: Maximum number of terms of the consistent expansion.
-HIGHEST_ORDER: Final = 40
+MAX_ORDER: Final = 40
 
-#: Powers of absurdly large amplitudes are infinite, and so are results from them.
-_BEYOND_RANGE: Final = np.errstate(over="ignore", invalid="ignore")
+#: Context in which very large amplitudes yield infinite results without warnings.
+_IGNORE_OVERFLOW: Final = np.errstate(over="ignore", invalid="ignore")
 
 CYCLE: Final = np.dtype(
     [("n", np.int64), ("sign", np.int8), ("order", np.int8)]
@@ -33,97 +33,101 @@ CYCLE: Final = np.dtype(
 )
 
 
-def _checked(given: ArrayLike, name: str, meaning: str, allowed: Callable[[Floats], Flags], bounds: str) -> Floats:
-    """Return values of a parameter as an array, or raise an error about the first that is not allowed."""
-    values = checks.numbers(given, name, InvalidOption)
-    finite = np.isfinite(values)
-    usable = finite & allowed(values)
-    if usable.all():
+def _check_values(
+    parameter: ArrayLike, name: str, meaning: str, allowed: Callable[[Floats], Flags], bounds: str
+) -> Floats:
+    """Return the values of a parameter as an array; raise an error for the first invalid value."""
+    values = checks.numbers(parameter, name, InvalidOption)
+    is_finite = np.isfinite(values)
+    is_valid = is_finite & allowed(values)
+    if is_valid.all():
         return values
-    index = tuple(map(int, np.argwhere(~(usable if finite.all() else finite))[0]))
-    condition = bounds if finite.all() else f"finite ({meaning})"
-    where, value = f" at index {index}" if values.ndim else "", float(values[index])
-    raise InvalidOption(f"{{}} must be {condition}, not {value:g}{where}", name, value=value)
+    index = tuple(map(int, np.argwhere(~(is_valid if is_finite.all() else is_finite))[0]))
+    condition = bounds if is_finite.all() else f"finite ({meaning})"
+    position, value = f" at index {index}" if values.ndim else "", float(values[index])
+    raise InvalidOption(f"{{}} must be {condition}; got {value:g}{position}", name, value=value)
 
 
-def checked_amplitude(a: ArrayLike) -> Floats:
+def check_amplitude(a: ArrayLike) -> Floats:
     """Return amplitudes as an array of finite numbers."""
-    return _checked(a, "a", "the acceleration amplitude over g alpha", np.isfinite, "")
+    return _check_values(a, "a", "the acceleration amplitude divided by g alpha", np.isfinite, "")
 
 
-def checked_frequency(omega: ArrayLike) -> Floats:
+def check_frequency(omega: ArrayLike) -> Floats:
     """Return frequencies as an array."""
-    bounds = f"between {LOWEST_FREQUENCY:g} and {HIGHEST_FREQUENCY:g}"
-    return _checked(
-        omega, "omega", "the forcing frequency over p",
-        lambda values: (values >= LOWEST_FREQUENCY) & (values <= HIGHEST_FREQUENCY), bounds,
+    bounds = f"between {MIN_FREQUENCY:g} and {MAX_FREQUENCY:g}"
+    return _check_values(
+        omega, "omega", "the forcing frequency divided by p",
+        lambda values: (values >= MIN_FREQUENCY) & (values <= MAX_FREQUENCY), bounds,
     )  # fmt: skip
 
 
-def checked_restitution(eta: ArrayLike) -> Floats:
+def check_restitution(eta: ArrayLike) -> Floats:
     """Return coefficients of restitution as an array."""
-    bounds = f"above 0 and at most {LARGEST_RESTITUTION:g}, or exactly 1"
-    return _checked(
+    bounds = f"above 0 and at most {MAX_RESTITUTION:g}, or exactly 1"
+    return _check_values(
         eta, "eta", "the coefficient of restitution",
-        lambda values: (values > 0.0) & ((values <= LARGEST_RESTITUTION) | (values == 1.0)), bounds,
+        lambda values: (values > 0.0) & ((values <= MAX_RESTITUTION) | (values == 1.0)), bounds,
     )  # fmt: skip
 
 
-def checked_loss(eta: ArrayLike) -> Floats:
+def check_lossy_restitution(eta: ArrayLike) -> Floats:
     """Return coefficients of restitution below one as an array."""
-    values = checked_restitution(eta)
+    values = check_restitution(eta)
     if (values == 1.0).any():
-        raise InvalidOption("{} must be below 1 here: without loss at impacts chattering never ends", "eta", value=eta)
+        raise InvalidOption(
+            "{} must be below 1, because without energy loss at impacts chattering never ends", "eta", value=eta
+        )
     return values
 
 
-def checked_slenderness(alpha: ArrayLike) -> Floats:
+def check_slenderness(alpha: ArrayLike) -> Floats:
     """Return slenderness angles as an array."""
     meaning = "the slenderness angle in rad"
-    return _checked(alpha, "alpha", meaning, lambda a: (a > 0.0) & (a < 0.5 * np.pi), "between 0 and pi/2 rad")
+    return _check_values(alpha, "alpha", meaning, lambda a: (a > 0.0) & (a < 0.5 * np.pi), "between 0 and pi/2 rad")
 
 
-def single(values: Floats, name: str) -> float:
+def require_scalar(values: Floats, name: str) -> float:
     """Return the single value of a parameter that must not be an array."""
     if values.ndim:
-        raise InvalidOption(f"{{}} must be a single number here, not an array of shape {values.shape}", name)
+        raise InvalidOption(f"{{}} must be a single number; got an array of shape {values.shape}", name)
     return float(values)
 
 
-def lifting_amplitude(a: ArrayLike, *, above: bool = False) -> float:
-    """Return one amplitude that lifts the block, and with ``above`` also rocks it (above 1)."""
-    amplitude = single(checked_amplitude(a), "a")
+def check_lifting_amplitude(a: ArrayLike, *, above: bool = False) -> float:
+    """Return a single amplitude as a float that is at least 1, and with ``above`` above 1."""
+    amplitude = require_scalar(check_amplitude(a), "a")
     if amplitude < 1.0 or (above and amplitude == 1.0):
         bound = "above" if above else "at least"
-        raise InvalidOption(f"{{}} must be {bound} 1, or the block does not lift off, not {amplitude:g}", "a", value=a)
+        raise InvalidOption(f"{{}} must be {bound} 1, so that the block uplifts; got {amplitude:g}", "a", value=a)
     return amplitude
 
 
-def broadcast(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
-    """Return the common shape of the parameters, and each as a flat array of that size."""
+def broadcast_flat(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
+    """Return the broadcast shape of the parameters, and the parameters as flat arrays of this size."""
     try:
         shape = np.broadcast_shapes(*(parameter.shape for parameter in parameters))
     except ValueError:
         shapes = ", ".join(str(parameter.shape) for parameter in parameters)
-        raise InvalidOption(f"the parameters' shapes {shapes} do not broadcast: make them compatible") from None
+        raise InvalidOption(f"the shapes of the parameters must be compatible; {shapes} do not broadcast") from None
     return shape, [np.broadcast_to(parameter, shape).ravel() for parameter in parameters]
 
 
-@_BEYOND_RANGE
-def asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
-    """Compute Eq. 65, with its sums once per value of eta."""
-    values, where = np.unique(eta, return_inverse=True)
-    sums = np.array([sum_eq65(float(value)) for value in values])[where.reshape(eta.shape)]
-    shape, (amplitudes, frequencies, first, third) = broadcast(a, omega, sums[..., 0], sums[..., 1])
+@_IGNORE_OVERFLOW
+def compute_asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
+    """Compute Eq. 65 of the paper."""
+    values, inverse = np.unique(eta, return_inverse=True)
+    sums = np.array([sum_eq65(float(value)) for value in values])[inverse.reshape(eta.shape)]
+    shape, (amplitudes, frequencies, first, third) = broadcast_flat(a, omega, sums[..., 0], sums[..., 1])
     excess = amplitudes - 1.0
     times = np.full(excess.shape, math.nan)
     times[excess == 0.0] = 0.0
-    rocks = excess > 0.0
-    times[rocks] = np.sqrt(excess[rocks]) * (first[rocks] + excess[rocks] * third[rocks]) / frequencies[rocks]
+    lifted = excess > 0.0
+    times[lifted] = np.sqrt(excess[lifted]) * (first[lifted] + excess[lifted] * third[lifted]) / frequencies[lifted]
     return times.reshape(shape)[()]
 
 
-@_BEYOND_RANGE
+@_IGNORE_OVERFLOW
 def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     """Compute the iterative procedure of the paper, cycle by cycle.
 
@@ -157,29 +161,31 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     >>> round(float(table["time"][-1]), 9)
     0.57342594
     """
-    excess = lifting_amplitude(a) - 1.0
-    frequency = single(checked_frequency(omega), "omega")
-    restitution = single(checked_loss(eta), "eta")
+    excess = check_lifting_amplitude(a) - 1.0
+    frequency = require_scalar(check_frequency(omega), "omega")
+    restitution = require_scalar(check_lossy_restitution(eta), "eta")
     pairs = 64
     while (count := write_eq65_terms(restitution, *(terms := np.zeros((2, pairs))))) == pairs:
         pairs *= 2
     table = np.zeros(2 * count, CYCLE)
-    even = np.arange(2 * count) % 2 == 0
+    is_even = np.arange(2 * count) % 2 == 0
     table["n"] = np.arange(2 * count)
-    table["sign"] = np.where(even, -1, 1)
-    table["order"] = np.where(even, 1, 3)
+    table["sign"] = np.where(is_even, -1, 1)
+    table["order"] = np.where(is_even, 1, 3)
     table["term"] = terms[:, :count].T.ravel() / frequency
     table["interval"] = table["term"] * np.sqrt(excess) ** table["order"]
     table["time"] = np.cumsum(table["interval"])
     table["phase"] = frequency * table["time"] + math.asin(1.0 / (1.0 + excess))
     # In these units an arc of the second side lasts as long as its initial speed, which is conserved.
-    entering = np.repeat(terms[1, :count], 2)
-    table["speed_before"] = np.where(even, entering / restitution, entering) * np.float64(excess) ** 1.5 / frequency
+    initial_speeds = np.repeat(terms[1, :count], 2)
+    table["speed_before"] = (
+        np.where(is_even, initial_speeds / restitution, initial_speeds) * np.float64(excess) ** 1.5 / frequency
+    )
     table["speed_after"] = restitution * table["speed_before"]
     return table
 
 
-@_BEYOND_RANGE
+@_IGNORE_OVERFLOW
 def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
     """Compute the time from uplift to the first impact, to two orders (Eq. 32).
 
@@ -208,11 +214,11 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
     >>> round(float(first_interval(1.01, 2.0)), 5)
     0.28242
     """
-    eps, frequency, second = _first_arc(a, omega)
+    eps, frequency, second = _compute_first_arc(a, omega)
     return (math.sqrt(2.0) / frequency * np.sqrt(eps) * (4.0 + second * eps))[()]
 
 
-@_BEYOND_RANGE
+@_IGNORE_OVERFLOW
 def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     """Compute the angular velocity just before the first impact, to two orders (paper, Eq. 34).
 
@@ -236,28 +242,28 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     >>> round(float(first_impact_speed(1.01, 2.0)), 6)
     0.003754
     """
-    eps, frequency, second = _first_arc(a, omega)
+    eps, frequency, second = _compute_first_arc(a, omega)
     return (4.0 * math.sqrt(2.0) / frequency * eps * np.sqrt(eps) * (4.0 / 3.0 + second * eps))[()]
 
 
-def _first_arc(a: ArrayLike, omega: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Return eps (NaN below uplift), omega, and the bracket of Eqs 32 and 34."""
-    shape, (amplitudes, frequencies) = broadcast(checked_amplitude(a), checked_frequency(omega))
+def _compute_first_arc(a: ArrayLike, omega: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Compute eps (NaN below uplift), omega, and the expression in brackets of Eqs 32 and 34."""
+    shape, (amplitudes, frequencies) = broadcast_flat(check_amplitude(a), check_frequency(omega))
     eps = np.where(amplitudes >= 1.0, amplitudes - 1.0, math.nan).reshape(shape)
     frequency = frequencies.reshape(shape)
     omega2 = frequency**2
     return eps, frequency, 1.0 - 32.0 / 15.0 * (omega2 - 1.0) / omega2
 
 
-def series_times(a: Floats, omega: Floats, eta: Floats, order: int) -> Floats:
-    """Sum the first terms of the consistent expansion."""
-    coefficients = _coefficients(omega, eta, order)
-    return _summed(coefficients, _excess(a, coefficients))[()]
+def compute_series_times(a: Floats, omega: Floats, eta: Floats, order: int) -> Floats:
+    """Compute the chattering times by the first terms of the consistent expansion."""
+    coefficients = _compute_coefficients(omega, eta, order)
+    return _sum_series(coefficients, _compute_excess(a, coefficients))[()]
 
 
-def _excess(a: Floats, coefficients: Floats) -> Floats:
-    """Return eps in the broadcast shape, NaN below uplift."""
-    shape, _ = broadcast(a, coefficients[..., 0])
+def _compute_excess(a: Floats, coefficients: Floats) -> Floats:
+    """Compute eps in the broadcast shape, NaN below uplift."""
+    shape, _ = broadcast_flat(a, coefficients[..., 0])
     return np.broadcast_to(np.where(a >= 1.0, a - 1.0, math.nan), shape)
 
 
@@ -296,12 +302,12 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
     >>> (2.0 * series_coefficients(2.0, 0.92, order=2)).round(6)
     array([10.827448, 40.030207])
     """
-    order = checks.integer(order, "order", InvalidOption, 1, HIGHEST_ORDER)
-    return _coefficients(checked_frequency(omega), checked_restitution(eta), order)
+    order = checks.integer(order, "order", InvalidOption, 1, MAX_ORDER)
+    return _compute_coefficients(check_frequency(omega), check_restitution(eta), order)
 
 
-@_BEYOND_RANGE
-def _summed(coefficients: Floats, eps: Floats) -> Floats:
+@_IGNORE_OVERFLOW
+def _sum_series(coefficients: Floats, eps: Floats) -> Floats:
     """Sum the series by Horner's scheme; exactly zero at eps = 0."""
     total = np.zeros(eps.shape)
     for k in reversed(range(coefficients.shape[-1])):
@@ -309,17 +315,17 @@ def _summed(coefficients: Floats, eps: Floats) -> Floats:
     return np.where(eps == 0.0, 0.0, np.sqrt(eps) * total)
 
 
-def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
+def _compute_coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
     """Compute the coefficients once per distinct pair of parameters."""
-    shape, parameters = broadcast(omega, eta)
-    pairs, where = np.unique(np.stack(parameters), axis=1, return_inverse=True)
+    shape, parameters = broadcast_flat(omega, eta)
+    pairs, inverse = np.unique(np.stack(parameters), axis=1, return_inverse=True)
     coefficients = np.full((pairs.shape[1], order), math.inf)
     for i in np.flatnonzero(pairs[1] < 1.0):
         w, restitution = pairs[:, i].tolist()
         coefficients[i] = compute_phase_coefficients(1.0 / (w * w), restitution, order) / w
         if not np.isfinite(coefficients[i]).all():
             raise InvalidOption(
-                f"the expansion at omega = {w:g}, eta = {restitution:g} is not resolved to order {order} "
-                f"in double precision: lower the order, take a higher omega, or eta further from 1"
+                f"double precision does not resolve the expansion to order {order} at omega = {w:g} and "
+                f"eta = {restitution:g}: reduce the order, or increase omega or 1 - eta"
             )
-    return coefficients[where.ravel()].reshape((*shape, order))
+    return coefficients[inverse.ravel()].reshape((*shape, order))

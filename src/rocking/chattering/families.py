@@ -70,8 +70,10 @@ def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Fa
     >>> round(case.motion.pga / (0.2 * block.gravity), 9)
     1.1
     """
-    scale = _threshold(block, model)
-    return lambda a, omega: SimulationInput(block, pulses.sine(a * scale, _hertz(block, omega), cycles=cycles), model)
+    scale = _find_threshold(block, model)
+    return lambda a, omega: SimulationInput(
+        block, pulses.sine(a * scale, _to_hertz(block, omega), cycles=cycles), model
+    )
 
 
 def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> Family:
@@ -98,14 +100,14 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
     >>> round(case.motion.pga / min(block.uplift_thresholds()), 9)
     4.8
     """
-    scale = _threshold(block, model)
-    frequency = _hertz(block, checks.positive(omega, "omega", InvalidOption))
-    number = checks.integer(count, "count", InvalidOption, minimum=1)
+    scale = _find_threshold(block, model)
+    frequency = _to_hertz(block, checks.positive(omega, "omega", InvalidOption))
+    n_lobes = checks.integer(count, "count", InvalidOption, minimum=1)
 
-    def case(a: float, ratio: float) -> SimulationInput:
-        return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in range(number)], frequency), model)
+    def create_input(a: float, ratio: float) -> SimulationInput:
+        return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in range(n_lobes)], frequency), model)
 
-    return case
+    return create_input
 
 
 def ricker(
@@ -129,8 +131,8 @@ def ricker(
     >>> ricker(rocking.Block(width=0.2, height=0.8))(1.5, 2.0).motion.name
     'symmetric Ricker'
     """
-    scale = _threshold(block, model)
-    return lambda a, omega: SimulationInput(block, pulses.ricker(a * scale, _hertz(block, omega), kind=kind), model)
+    scale = _find_threshold(block, model)
+    return lambda a, omega: SimulationInput(block, pulses.ricker(a * scale, _to_hertz(block, omega), kind=kind), model)
 
 
 def mavroeidis_papageorgiou(
@@ -154,13 +156,13 @@ def mavroeidis_papageorgiou(
     >>> mavroeidis_papageorgiou(rocking.Block(width=0.2, height=0.8), gamma=2.0)(1.5, 2.0).model
     'nonlinear'
     """
-    scale = _threshold(block, model)
+    scale = _find_threshold(block, model)
 
-    def case(a: float, omega: float) -> SimulationInput:
-        pulse = pulses.mavroeidis_papageorgiou(1.0, _hertz(block, omega), phase=phase, gamma=gamma)
+    def create_input(a: float, omega: float) -> SimulationInput:
+        pulse = pulses.mavroeidis_papageorgiou(1.0, _to_hertz(block, omega), phase=phase, gamma=gamma)
         return SimulationInput(block, pulse.scaled_to(a * scale), model)
 
-    return case
+    return create_input
 
 
 def record(
@@ -175,7 +177,8 @@ def record(
     motion : Motion
         Motion to scale.
     alpha, restitution, model : float, float, str
-        Slenderness of the blocks, rad, their restitution (by default after Housner), and the model as in `sine`.
+        Slenderness of the blocks, rad, their restitution (by default after :cite:t:`housner1963`), and the model as in
+        `sine`.
 
     Returns
     -------
@@ -189,18 +192,20 @@ def record(
     2.0
     """
     if check_motion(motion) is None:
-        raise InvalidMotion("a Motion is needed, as rocking.pulses.one_sine(1, 1), not None")
+        raise InvalidMotion("motion must be a Motion, for example rocking.pulses.one_sine(1, 1); got None")
 
-    def case(a: float, p: float) -> SimulationInput:
+    def create_input(a: float, p: float) -> SimulationInput:
         block = Block.from_parameters(p, alpha, restitution)
-        return SimulationInput(block, motion.scaled_to(a * _threshold(block, model)), model)
+        return SimulationInput(block, motion.scaled_to(a * _find_threshold(block, model)), model)
 
-    return case
+    return create_input
 
 
-def _threshold(block: Block, model: Model) -> float:
+def _find_threshold(block: Block, model: Model) -> float:
+    """Compute the lowest uplift acceleration, m/s^2."""
     return min(one_block(block).uplift_thresholds(model))
 
 
-def _hertz(block: Block, omega: float) -> float:
+def _to_hertz(block: Block, omega: float) -> float:
+    """Convert a frequency, divided by p, to Hz."""
     return omega * min(side.p for side in block.sides) / (2.0 * math.pi)

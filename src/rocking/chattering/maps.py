@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class UpliftOutcome(IntEnum):
-    """UpliftOutcome of the first uplift.
+    """Outcome of the first uplift.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ _EPISODE: Final = np.dtype(
 )
 
 
-class _Point(NamedTuple):
+class _MapPoint(NamedTuple):
     """Results at one point of a map; missing times are NaN."""
 
     outcome: int
@@ -91,7 +91,7 @@ class _Point(NamedTuple):
 
 
 #: Units and meanings of the variables of a map.
-_ATTRIBUTES: Final[dict[str, dict[str, Any]]] = {
+_VARIABLE_ATTRIBUTES: Final[dict[str, dict[str, Any]]] = {
     "outcome": {
         "flag_values": [outcome.value for outcome in UpliftOutcome],
         "flag_meanings": " ".join(outcome.name.lower() for outcome in UpliftOutcome),
@@ -143,42 +143,44 @@ def chattering_map(
     >>> import rocking
     >>> from rocking.chattering import families
     >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
-    >>> found = chattering_map(families.sine(block, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
-    >>> found.data.complete.values.tolist()
+    >>> result = chattering_map(families.sine(block, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
+    >>> result.data.complete.values.tolist()
     [[False, False], [True, True], [False, False]]
     """
     import xarray as xr
 
     checks.mapping(parameters, "parameters", InvalidOption, '{"a": [1.0, 1.1], "omega": [1.0, 2.0]}')
     if len(parameters) != 2:
-        raise InvalidOption(f"{{}} must be two, not {len(parameters)}", "parameters", value=parameters)
+        raise InvalidOption(f"{{}} must contain two parameters; got {len(parameters)}", "parameters", value=parameters)
     if not callable(family):
         raise InvalidOption(
-            f"{{}} must be a function of two numbers, as rocking.chattering.families.sine(block), not {family!r}",
+            f"{{}} must be a function of two numbers, as rocking.chattering.families.sine(block); got {family!r}",
             "family",
             value=family,
         )
     (first, x), (second, y) = ((k, checks.axis(values, k, InvalidOption)) for k, values in parameters.items())
-    swapped = _is_swapped(family, str(first), str(second))
-    inputs = [family(*map(float, (other, one) if swapped else (one, other))) for one in x for other in y]
-    for each in inputs:
-        if not (isinstance(each, SimulationInput) and isinstance(each.motion, Motion)):
+    is_swapped = _is_swapped(family, str(first), str(second))
+    inputs = [family(*map(float, (b, a) if is_swapped else (a, b))) for a in x for b in y]
+    for entry in inputs:
+        if not (isinstance(entry, SimulationInput) and isinstance(entry.motion, Motion)):
             raise InvalidOption(
-                "{} must return a SimulationInput of a block and a Motion for each pair", "family", value=each
+                "{} must return a SimulationInput of a block and a Motion for each pair",
+                "family",
+                value=entry,
             )
-    points: list[_Point] = []
+    points: list[_MapPoint] = []
     with Progress("mapping", len(inputs)) as bar:
-        for point in map_in_threads(_simulated, inputs):
+        for point in map_in_threads(_simulate_point, inputs):
             points.append(point)
             bar.advance()
-    columns = zip(_Point._fields, zip(*points, strict=True), strict=True)
+    columns = zip(_MapPoint._fields, zip(*points, strict=True), strict=True)
     dataset = xr.Dataset(
         {
-            name: ((first, second), np.reshape(column, (x.size, y.size)), _ATTRIBUTES.get(name, {}))
+            name: ((first, second), np.reshape(column, (x.size, y.size)), _VARIABLE_ATTRIBUTES.get(name, {}))
             for name, column in columns
         },
         {first: x, second: y},
-        {"program": f"rocking {VERSION}", "case": _in_common(inputs[0], inputs[-1])},
+        {"program": f"rocking {VERSION}", "case": _describe_common_properties(inputs[0], inputs[-1])},
     )
     return ChatteringMap(dataset.assign(complete=dataset.outcome == UpliftOutcome.COMPLETE))
 
@@ -199,9 +201,9 @@ class ChatteringMap(DatasetResult):
     Attributes
     ----------
     data : xarray.Dataset
-        With the two parameters as dimensions: outcome (see `UpliftOutcome`), complete (whether it is COMPLETE), uplift and
-        rest (times of the first uplift and the first rest, s), lower and upper (proven bounds of that rest, s), rests
-        (total number), overturned (at any time).
+        With the two parameters as dimensions: outcome (see `UpliftOutcome`), complete (whether it is COMPLETE), uplift
+        and rest (times of the first uplift and the first rest, s), lower and upper (proven bounds of that rest, s),
+        rests (total number), overturned (at any time).
 
     See Also
     --------
@@ -219,13 +221,15 @@ class ChatteringMap(DatasetResult):
             for value, count in zip(values, counts, strict=True)
         ]
         first, second = self.data.outcome.dims
-        head = f"end of the first rocking, over {first} and {second}"
-        overturned, later = (100.0 * float(each.mean()) for each in (self.data.overturned, self._later()))
-        fate = f"overturns in the end: {overturned:.1f} %" + (f", {later:.1f} % after a first rest" if later else "")
-        return f"{head}\n\n{format_table(['outcome', 'share of the map'], rows)}\n\n{fate}"
+        headline = f"end of the first rocking, over {first} and {second}"
+        overturned, later = (100.0 * float(mask.mean()) for mask in (self.data.overturned, self._overturns_later()))
+        overturning = f"overturns in the end: {overturned:.1f} %" + (
+            f", {later:.1f} % after a first rest" if later else ""
+        )
+        return f"{headline}\n\n{format_table(['outcome', 'share of the map'], rows)}\n\n{overturning}"
 
-    def _later(self) -> NDArray[np.bool_]:
-        """Whether a block overturns after its first rocking has ended otherwise."""
+    def _overturns_later(self) -> NDArray[np.bool_]:
+        """Whether a block overturns after its first rocking has ended with another outcome."""
         return np.asarray(self.data.overturned & (self.data.outcome != UpliftOutcome.OVERTURNS))
 
     def to_dict(self) -> dict[str, Any]:
@@ -248,24 +252,24 @@ class ChatteringMap(DatasetResult):
         from rocking.plot.maps import outcome_figure
 
         first, second = self.data.outcome.dims
-        written = labels or {}
+        axis_labels = labels or {}
         return outcome_figure(
             x=self.data[second].values,
             y=self.data[first].values,
             outcome=self.data.outcome.values,
             meanings=[outcome.words for outcome in UpliftOutcome],
-            later=self._later(),
-            x_label=written.get(str(second), str(second)),
-            y_label=written.get(str(first), str(first)),
+            later=self._overturns_later(),
+            x_label=axis_labels.get(str(second), str(second)),
+            y_label=axis_labels.get(str(first), str(first)),
             title=title or escape_dollars(f"end of the first rocking under {self.data.attrs['case']}"),
             ax=ax,
             figsize=figsize,
         )
 
 
-def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: float) -> float | None:
-    """Return the time (s) of the last exceedance of the thresholds (m/s^2) by a motion; None if hardly exceeded."""
-    # Four ulp, because a peak that was meant to equal the threshold may exceed it.
+def find_last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: float) -> float | None:
+    """Find the time (s) of the last exceedance of the thresholds (m/s^2); None if exceeded only by rounding error."""
+    # Rounding error (four ulp) may raise a peak at the threshold above it.
     plus, minus = (threshold * (1.0 + 2.0**-50) for threshold in thresholds)
     lifts = motion.vertical is None and motion.pga > min(plus, minus)
     if not (lifts or len(find_exceedances(motion, (plus, minus), gravity))):
@@ -274,56 +278,62 @@ def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: fl
     return float(starts[-1]) if starts.size else None
 
 
-def outcomes_of(ends: NDArray[np.void], last: float | None) -> Integers:
-    """Return the `UpliftOutcome` of each block from the results of its certified simulation.
+def classify_uplifts(results: NDArray[np.void], last_exceedance: float | None) -> Integers:
+    """Determine the `UpliftOutcome` of each block from the results of its certified simulation.
 
-    ``last`` is the last exceedance of the motion from `last_exceedance`. For a block that rests several times UNPROVEN
-    means that one of the rests is not proven.
+    ``last_exceedance`` is a time from `find_last_exceedance`. For a block that rests several times, UNPROVEN means that
+    one of the rests is not proven.
     """
-    if last is None:
-        return np.full(len(ends), UpliftOutcome.NO_UPLIFT, dtype=np.int64)
-    rested = ends["rests"] > 0
-    found = np.where(ends["first_rest"] <= last, UpliftOutcome.RESTS_LATER, UpliftOutcome.RESTS_AT_LAST)
-    found[ends["complete_chattering"]] = UpliftOutcome.COMPLETE
-    found[~rested] = UpliftOutcome.OVERTURNS
-    found[(ends["rests_by_rounding"] > 0) | (ends["unfinished"] & ~rested)] = UpliftOutcome.UNPROVEN
-    found[ends["uplifts"] == 0] = UpliftOutcome.NO_UPLIFT
-    return found.astype(np.int64)
+    if last_exceedance is None:
+        return np.full(len(results), UpliftOutcome.NO_UPLIFT, dtype=np.int64)
+    rested = results["rests"] > 0
+    outcomes = np.where(
+        results["first_rest"] <= last_exceedance, UpliftOutcome.RESTS_LATER, UpliftOutcome.RESTS_AT_LAST
+    )
+    outcomes[results["complete_chattering"]] = UpliftOutcome.COMPLETE
+    outcomes[~rested] = UpliftOutcome.OVERTURNS
+    outcomes[(results["rests_by_rounding"] > 0) | (results["unfinished"] & ~rested)] = UpliftOutcome.UNPROVEN
+    outcomes[results["uplifts"] == 0] = UpliftOutcome.NO_UPLIFT
+    return outcomes.astype(np.int64)
 
 
-def _in_common(one: SimulationInput, other: SimulationInput) -> str:
+def _describe_common_properties(first: SimulationInput, last: SimulationInput) -> str:
     """Describe the common properties of two inputs: name of the motion, proportions and size of the block, model."""
 
-    def described(given: SimulationInput) -> list[str]:
+    def list_properties(point: SimulationInput) -> list[str]:
         alpha, restitution = (
-            ", ".join(dict.fromkeys(f"{getattr(side, name):.5g}" for side in given.block.sides))
+            ", ".join(dict.fromkeys(f"{getattr(side, name):.5g}" for side in point.block.sides))
             for name in ("alpha", "restitution")
         )
-        return [given.motion.name, f"alpha = {alpha} rad", f"restitution = {restitution}", f"{given.model} model"]
+        return [point.motion.name, f"alpha = {alpha} rad", f"restitution = {restitution}", f"{point.model} model"]
 
-    return ", ".join(a for a, b in zip(described(one), described(other), strict=True) if a == b)
+    return ", ".join(a for a, b in zip(list_properties(first), list_properties(last), strict=True) if a == b)
 
 
-def _simulated(given: SimulationInput) -> _Point:
-    """Simulate one point from a full response, because outcomes of the engine do not contain a bracket of the rest."""
-    response = simulate(given.block, given.motion, model=given.model)
-    last = last_exceedance(given.motion, given.block.uplift_thresholds(given.model), given.block.gravity)
-    if not len(response.events) or last is None:
-        return _Point(UpliftOutcome.NO_UPLIFT)
-    ends = np.zeros(1, OUTCOME)
+def _simulate_point(point: SimulationInput) -> _MapPoint:
+    """Simulate one point; only a full response contains a bracket of the rest."""
+    response = simulate(point.block, point.motion, model=point.model)
+    last_exceedance = find_last_exceedance(
+        point.motion, point.block.uplift_thresholds(point.model), point.block.gravity
+    )
+    if not len(response.events) or last_exceedance is None:
+        return _MapPoint(UpliftOutcome.NO_UPLIFT)
+    results = np.zeros(1, OUTCOME)
     uplift, rests = float(response.events["time"][0]), len(response.sequences)
-    ends["uplifts"], ends["rests"], ends["unfinished"] = 1, rests, response.unfinished
+    results["uplifts"], results["rests"], results["unfinished"] = 1, rests, response.unfinished
     times: dict[str, float] = {}
     if rests:
         first = response.sequences[0]
         times = {"rest": float(first["end"]), "lower": float(first["lower"]), "upper": float(first["upper"])}
         # The motion must not exceed a threshold before the upper bound of the rest.
-        ends["first_rest"], ends["rests_by_rounding"] = times["upper"], math.isnan(times["upper"])
+        results["first_rest"], results["rests_by_rounding"] = times["upper"], math.isnan(times["upper"])
         if not math.isnan(times["upper"]):
             states, trail = state.new_states(1, 0), response.solution.trail
             states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, times["upper"]
-            ends["complete_chattering"] = complete_chattering(trail.ground, np.array([trail.block]), states)
-    return _Point(int(outcomes_of(ends, last)[0]), uplift, **times, rests=rests, overturned=response.overturned)
+            results["complete_chattering"] = complete_chattering(trail.ground, np.array([trail.block]), states)
+    return _MapPoint(
+        int(classify_uplifts(results, last_exceedance)[0]), uplift, **times, rests=rests, overturned=response.overturned
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -382,12 +392,12 @@ class ChatteringEpisodes(Result):
             for row in self.episodes
         ]
         start, end = self.shaking
-        about = (
+        conclusion = (
             "the motion never passes a threshold of the block before the simulation ends"
             if math.isnan(start)
             else f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"
         )
-        return f"{format_table(header, rows)}\n{about}"
+        return f"{format_table(header, rows)}\n{conclusion}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -426,35 +436,35 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     --------
     >>> import rocking
     >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090"))
-    >>> found = chattering_episodes(response)
-    >>> len(found.episodes), bool((found.episodes["upper"] - found.episodes["lower"] < 1e-11).all())
+    >>> result = chattering_episodes(response)
+    >>> len(result.episodes), bool((result.episodes["upper"] - result.episodes["lower"] < 1e-11).all())
     (6, True)
-    >>> print(f"{found.share_at_rest:.3f}")
+    >>> print(f"{result.share_at_rest:.3f}")
     0.498
     """
     if not isinstance(response, Response):
         raise InvalidOption(
-            f"{{}} must be a Response, not a {type(response).__name__}: simulate(block, motion) makes one", "response"
+            f"{{}} must be a Response of simulate(block, motion); got {type(response).__name__}", "response"
         )
-    proven = response.sequences[np.isfinite(response.sequences["upper"])]
-    starts = response.events["time"][response.events["kind"] == "uplift"]
+    sequences = response.sequences[np.isfinite(response.sequences["upper"])]
+    uplifts = response.events["time"][response.events["kind"] == "uplift"]
     impacts = response.impacts["time"]
-    episodes = np.zeros(len(proven), _EPISODE)
-    before = np.searchsorted(starts, proven["end"], side="left") - 1
-    episodes["uplift"] = np.where(before >= 0, np.append(starts, 0.0)[before], 0.0)
-    for name, source in (("proven", "start"), ("rest", "end"), ("lower", "lower"), ("upper", "upper")):
-        episodes[name] = proven[source]
+    episodes = np.zeros(len(sequences), _EPISODE)
+    uplift_indices = np.searchsorted(uplifts, sequences["end"], side="left") - 1
+    episodes["uplift"] = np.where(uplift_indices >= 0, np.append(uplifts, 0.0)[uplift_indices], 0.0)
+    for name, field in (("proven", "start"), ("rest", "end"), ("lower", "lower"), ("upper", "upper")):
+        episodes[name] = sequences[field]
     episodes["duration"] = episodes["rest"] - episodes["uplift"]
     impacts_before = np.searchsorted(impacts, episodes["uplift"], "left")
-    episodes["impacts"] = np.searchsorted(impacts, proven["end"], "right") - impacts_before
+    episodes["impacts"] = np.searchsorted(impacts, sequences["end"], "right") - impacts_before
     if response.motion is None:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
-    episodes["ground"] = response.motion.acceleration(proven["end"])
+    episodes["ground"] = response.motion.acceleration(sequences["end"])
     block = one_block(response.block)
-    beyond = find_exceedances(response.motion, block.uplift_thresholds(response.model), block.gravity)
-    if not len(beyond) or beyond[0, 0] >= response.duration:
+    exceedances = find_exceedances(response.motion, block.uplift_thresholds(response.model), block.gravity)
+    if not len(exceedances) or exceedances[0, 0] >= response.duration:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
-    start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)
+    start, end = float(exceedances[0, 0]), min(float(exceedances[-1, 1]), response.duration)
     # The shaking starts with an uplift, within rounding error.
     at_rest = clear_rounding(np.diff(np.clip(response.rest_intervals, start, end)), end).sum()
     return ChatteringEpisodes(episodes, (start, end), float(at_rest))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rocking.chattering.duration import chattering_time, critical_amplitude, sequence
 from rocking.chattering.expansions import (
-    HIGHEST_ORDER,
+    MAX_ORDER,
     asymptotic_table,
     first_impact_speed,
     first_interval,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77"}
+_METHOD_LABELS: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,26 +63,26 @@ class ChatteringReport(Result):
 
     def _headline(self) -> str:
         case = ", ".join(f"{name} = {self.values[name]:g}" for name in ("a", "omega", "eta"))
-        return f"{case}: {self._verdict()}"
+        return f"{case}: {self._describe_completeness()}"
 
     def to_dict(self) -> dict[str, Any]:
         return self.values
 
     def summary(self) -> str:
-        result = self.values
-        times, resolved = result["chattering_time"], result["resolved"]
+        values = self.values
+        times, resolved = values["chattering_time"], values["resolved"]
         impacts = "" if resolved is None else f", {format_count(resolved, 'impact')}"
-        worth = "" if result["complete"] else ", worthless: it takes chattering for complete"
+        caveat = "" if values["complete"] else ", worthless: it takes chattering for complete"
         lines = [
-            ("chattering", self._verdict()),
-            ("critical amplitude", f"{result['critical_amplitude']:.9g}"),
-            ("time of rest, exact", self._time(times["exact"])),
-            ("  proven bracket", self._bracket(result["bracket"])),
-            (f"  by Eq. 75{impacts}", self._time(times["semianalytical"])),
-            ("  by Eq. 65", f"{self._time(times['asymptotic'])}{worth}"),
-            (f"  by a series, {result['order']} terms", f"{self._time(times['series'])}{worth}"),
-            ("first interval", self._pair(result["first_interval"], "eq32", time=True)),
-            ("speed at first impact", self._pair(result["first_impact_speed"], "eq34", time=False)),
+            ("chattering", self._describe_completeness()),
+            ("critical amplitude", f"{values['critical_amplitude']:.9g}"),
+            ("time of rest, exact", self._format_time(times["exact"])),
+            ("  proven bracket", self._format_bracket(values["bracket"])),
+            (f"  by Eq. 75{impacts}", self._format_time(times["semianalytical"])),
+            ("  by Eq. 65", f"{self._format_time(times['asymptotic'])}{caveat}"),
+            (f"  by a series, {values['order']} terms", f"{self._format_time(times['series'])}{caveat}"),
+            ("first interval", self._format_pair(values["first_interval"], "eq32", time=True)),
+            ("speed at first impact", self._format_pair(values["first_impact_speed"], "eq34", time=False)),
         ]
         units = "times are p t, counted from uplift; speeds are theta'/(p alpha)"
         return "\n".join(f"{name:<30}{text}" for name, text in lines) + f"\n\n{units}"
@@ -95,10 +95,11 @@ class ChatteringReport(Result):
         header = ["n", "sign", "term", "interval, p t", "time, p t", "phase, rad", "speed before", "speed after"]
         rows = [
             [
-                c["n"], f"{c['sign']:+d}", f"T_{c['n']};{c['order']} = {c['term']:.6g}", f"{c['interval']:.6e}",
-                f"{c['time']:.9f}", f"{c['phase']:.6f}", f"{c['speed_before']:.6e}", f"{c['speed_after']:.6e}",
+                cycle["n"], f"{cycle['sign']:+d}", f"T_{cycle['n']};{cycle['order']} = {cycle['term']:.6g}",
+                f"{cycle['interval']:.6e}", f"{cycle['time']:.9f}", f"{cycle['phase']:.6f}",
+                f"{cycle['speed_before']:.6e}", f"{cycle['speed_after']:.6e}",
             ]
-            for c in self.to_dataframe("cycles").to_dict("records")
+            for cycle in self.to_dataframe("cycles").to_dict("records")
         ]  # fmt: skip
         return format_some_rows(header, rows)
 
@@ -120,31 +121,32 @@ class ChatteringReport(Result):
         rows = self.impacts if table == "impacts" else self.cycles
         if rows is None:
             raise InvalidOption(
-                "{} must be below 1 for the iterative procedure: without loss at impacts nothing ends", "eta"
+                "{} must be below 1 for the iterative procedure, because without energy loss chattering never ends",
+                "eta",
             )
         return [Column(name, rows[name]) for name in rows.dtype.names or ()]
 
-    def _verdict(self) -> str:
-        half_period = self._time(self.values["half_period"])
+    def _describe_completeness(self) -> str:
+        half_period = self._format_time(self.values["half_period"])
         if self.values["complete"]:
             return f"complete: proven to rest before half a period, {half_period}, is over"
         return f"incomplete: the next half period, from {half_period} on, lifts the block before it rests"
 
-    def _time(self, time: float) -> str:
+    def _format_time(self, time: float) -> str:
         if math.isnan(time):
             return "none"
         return f"{time:.9g}" if self.p is None else f"{time:.9g} ({time / self.p:.6g} s)"
 
-    def _bracket(self, bracket: dict[str, Any]) -> str:
+    def _format_bracket(self, bracket: dict[str, Any]) -> str:
         if math.isnan(bracket["upper"]):
             return "none"
         return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {format_count(bracket['impacts'], 'impact')}"
 
-    def _pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
+    def _format_pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
         if math.isnan(values["exact"]):
             return f"none within half a period; {values[equation]:.9g} by Eq. {equation[2:]}"
         approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
-        exact = self._time(values["exact"]) if time else f"{values['exact']:.9g}"
+        exact = self._format_time(values["exact"]) if time else f"{values['exact']:.9g}"
         return f"{exact} exact, {approximate}"
 
 
@@ -180,10 +182,12 @@ def chattering_report(
     """
     if p is not None:
         p = checks.positive(p, "p", InvalidOption, "rad/s")
-    exact = sequence(a, omega, eta)
-    no_arc = 0.0 if exact.complete else math.nan
-    interval, speed = exact.impacts[["interval", "speed_before"]][0] if exact.impacts.size else (no_arc, no_arc)
-    checks.integer(order, "order", InvalidOption, 1, HIGHEST_ORDER)
+    chattering = sequence(a, omega, eta)
+    missing = 0.0 if chattering.complete else math.nan
+    interval, speed = (
+        chattering.impacts[["interval", "speed_before"]][0] if chattering.impacts.size else (missing, missing)
+    )
+    checks.integer(order, "order", InvalidOption, 1, MAX_ORDER)
     series = math.nan
     with suppress(InvalidOption):  # double precision does not resolve this many terms
         series = float(chattering_time(a, omega, eta, method="series", order=order))
@@ -195,12 +199,12 @@ def chattering_report(
         "a": a,
         "omega": omega,
         "eta": eta,
-        "complete": exact.complete,
+        "complete": chattering.complete,
         "half_period": math.pi / omega,
         "chattering_time": {**times, "series": series},
         "order": order,
         "resolved": resolved,
-        "bracket": {"lower": exact.lower, "upper": exact.upper, "impacts": int(exact.impacts.size)},
+        "bracket": {"lower": chattering.lower, "upper": chattering.upper, "impacts": int(chattering.impacts.size)},
         "critical_amplitude": float(critical_amplitude(omega, eta)),
         "first_interval": {"exact": float(interval), "eq32": float(first_interval(a, omega))},
         "first_impact_speed": {"exact": float(speed), "eq34": float(first_impact_speed(a, omega))},
@@ -209,7 +213,7 @@ def chattering_report(
         values["p_rad_s"] = p
         values["chattering_time_s"] = {method: time / p for method, time in values["chattering_time"].items()}
     cycles = None if eta == 1.0 else asymptotic_table(a, omega, eta)
-    return ChatteringReport(values, exact.impacts, cycles, p)
+    return ChatteringReport(values, chattering.impacts, cycles, p)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -240,13 +244,13 @@ class CriticalReport(Result):
         return {"omega": self.omega, "eta": self.eta, "critical_amplitude": self.amplitudes}
 
     def summary(self) -> str:
-        exact, *others = self.amplitudes.values()
+        exact, *approximations = self.amplitudes.values()
         assert exact is not None
         texts = [f"{exact:.9g}"] + [
             "none here: it holds for fewer omega and eta" if a is None else f"{a:<16.9g}off by {a - exact:+.2e}"
-            for a in others
+            for a in approximations
         ]
-        lines = [f"{name:<24}{text}" for name, text in zip(_AMPLITUDES.values(), texts, strict=True)]
+        lines = [f"{name:<24}{text}" for name, text in zip(_METHOD_LABELS.values(), texts, strict=True)]
         return "\n".join([*lines, "", "amplitudes of the ground acceleration over g alpha"])
 
 
@@ -273,11 +277,11 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
     >>> critical_report(20.0, 0.92).amplitudes["eq76"] is None
     True
     """
-    amplitudes: dict[str, float | None] = dict.fromkeys(_AMPLITUDES)
+    amplitudes: dict[str, float | None] = dict.fromkeys(_METHOD_LABELS)
     amplitudes["exact"] = float(critical_amplitude(omega, eta))
     with warnings.catch_warnings():
         warnings.simplefilter("error", OutsideFit)
-        for method in [*_AMPLITUDES][1:]:  # outside its range an approximation has no value
+        for method in [*_METHOD_LABELS][1:]:  # outside its range an approximation has no value
             with suppress(InvalidOption, OutsideFit):
                 amplitudes[method] = float(critical_amplitude(omega, eta, method=method))
     return CriticalReport(omega, eta, amplitudes)

@@ -1,4 +1,4 @@
-"""Periodic attractors of a map, with an invariant neighbourhood of each of their points.
+"""Periodic attractors of a map, with invariant neighbourhoods of their points.
 
 A neighbourhood is an ellipse in a norm in which the derivative contracts. This is checked at samples of twice its size,
 together with the number of impacts, so that no impact grazes.
@@ -15,19 +15,21 @@ from numpy.typing import NDArray
 from rocking.core.arrays import Flags, Floats, Integers, select_evenly
 from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
-from rocking.dynamics.maps import StroboscopicMap, parts_of
-from rocking.dynamics.orbits import multipliers_at, sizes_of
+from rocking.dynamics.maps import StroboscopicMap, split_states
+from rocking.dynamics.orbits import compute_moduli, compute_multipliers
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP, iterate
 from rocking.kernels.state import Records, new_scratch
 
-#: Longest period of an attractor, in periods of the motion, and largest relative distance of a recurrent state.
-LONGEST: Final = 64
-RETURN: Final = 1e-6
+#: Longest period of an attractor, in periods of the motion.
+MAX_PERIOD: Final = 64
+
+#: Largest distance of a recurrent state, relative to the size of states.
+RETURN_TOLERANCE: Final = 1e-6
 
 #: Number of rings and angles of the samples.
-_RINGS: Final = 4
-_ANGLES: Final = 24
+_N_RINGS: Final = 4
+_N_ANGLES: Final = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,95 +64,99 @@ class Attractor:
         return f"period {self.period}, {'rest' if self.rests else format_count(self.impacts, 'impact')}"
 
 
-def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:
-    """Return the periodic attractor on which a state has settled; None without a stable orbit."""
-    orbit = strobe.orbit(state, 2 * LONGEST)
-    back = (np.abs(orbit[-1 - LONGEST : -1][::-1] - orbit[-1]) / size).max(axis=1)
-    returns = np.flatnonzero(back < RETURN)
-    if returns.size == 0:
+def find_attractor(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:
+    """Find the periodic attractor on which a state has settled; None without a stable orbit."""
+    orbit = strobe.orbit(state, 2 * MAX_PERIOD)
+    distances = (np.abs(orbit[-1 - MAX_PERIOD : -1][::-1] - orbit[-1]) / size).max(axis=1)
+    recurrences = np.flatnonzero(distances < RETURN_TOLERANCE)
+    if recurrences.size == 0:
         return None
-    period = int(returns[0]) + 1
+    period = int(recurrences[0]) + 1
     try:
-        fixed = _fixed_point(strobe, orbit[-1], period, size)
+        fixed_point = _find_fixed_point(strobe, orbit[-1], period, size)
     except (np.linalg.LinAlgError, InvalidOption):  # a multiplier of exactly 1; a step that leads behind a stop
         return None
-    if fixed is None:
+    if fixed_point is None:
         return None
-    at, change = fixed
-    for shorter in range(1, period):  # a slow approach may come close only twice in a period
-        if period % shorter == 0 and np.abs((strobe(at, shorter) - at) / size).max() < 1e-3 * RETURN:
+    point, derivative = fixed_point
+    for divisor in range(1, period):  # a slow approach may come close only twice in a period
+        if period % divisor == 0 and np.abs((strobe(point, divisor) - point) / size).max() < 1e-3 * RETURN_TOLERANCE:
             return None
-    multipliers = multipliers_at(strobe, change)
-    if sizes_of(multipliers).max() >= 1.0:
+    multipliers = compute_multipliers(strobe, derivative)
+    if compute_moduli(multipliers).max() >= 1.0:
         return None
-    _, _, impacts = strobe.advance(at, period)
-    return Attractor(strobe.orbit(at, period)[:-1], multipliers, int(impacts), not change.any())
+    _, _, impacts = strobe.advance(point, period)
+    return Attractor(strobe.orbit(point, period)[:-1], multipliers, int(impacts), not derivative.any())
 
 
-def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats) -> tuple[Floats, Floats] | None:
-    """Find the fixed point of a number of periods near a state by Newton's method, with the derivative there."""
-    start = at
+def _find_fixed_point(
+    strobe: StroboscopicMap, point: Floats, period: int, size: Floats
+) -> tuple[Floats, Floats] | None:
+    """Find a fixed point near a state by Newton's method, and the derivative of the map at this point."""
+    start = point
     for _ in range(12):
-        after, change = strobe.derivative(at, period)
-        if not np.isfinite(change).all():
+        image, derivative = strobe.derivative(point, period)
+        if not np.isfinite(derivative).all():
             return None
-        off = after - at
-        if np.abs(off / size).max() < 1e-11:
-            return at, change
-        at = at + np.linalg.solve(np.eye(2) - change, off) if change.any() else after
-        if np.abs((at - start) / size).max() > np.sqrt(RETURN):
+        residual = image - point
+        if np.abs(residual / size).max() < 1e-11:
+            return point, derivative
+        point = point + np.linalg.solve(np.eye(2) - derivative, residual) if derivative.any() else image
+        if np.abs((point - start) / size).max() > np.sqrt(RETURN_TOLERANCE):
             return None
     return None
 
 
-def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats) -> Floats | None:
-    """Return an invariant neighbourhood of a point of an attractor, as a row for `kernels.periodic.iterate`."""
+def _build_trap(
+    strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats
+) -> Floats | None:
+    """Find an invariant neighbourhood of a point of an attractor, as a row for `kernels.periodic.iterate`."""
     side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
     if side < 0:  # at rest, whatever the previous state
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
-    _, change = strobe.derivative(point, attractor.period)
-    shape, rate = _contracting_norm(change, size)
-    if not np.isfinite(shape).all():
+    _, derivative = strobe.derivative(point, attractor.period)
+    norm_matrix, rate = _find_contracting_norm(derivative, size)
+    if not np.isfinite(norm_matrix).all():
         return None
 
-    def stays(offsets: Floats) -> bool:
+    def is_trapping(offsets: Floats) -> bool:
         """Whether states around the point approach it, on the same side and with the same number of impacts."""
-        here = offsets[u + offsets[:, 0] > 0.0]
-        if np.any(u + offsets[:, 0] >= strobe._records["overturn_angle"][0]) or len(here) == 0:
+        in_front = offsets[u + offsets[:, 0] > 0.0]
+        if np.any(u + offsets[:, 0] >= strobe._body_records["overturn_angle"][0]) or len(in_front) == 0:
             return False
-        samples = strobe._coordinates(u + here[:, 0], v + here[:, 1], np.full(len(here), side))
-        after, changes = strobe.derivative(samples, attractor.period)
-        if not np.isfinite(changes).all() or np.any(strobe._states(after)[1]["side"] != side):
+        samples = strobe._to_coordinates(u + in_front[:, 0], v + in_front[:, 1], np.full(len(in_front), side))
+        images, derivatives = strobe.derivative(samples, attractor.period)
+        if not np.isfinite(derivatives).all() or np.any(strobe._to_records(images)[1]["side"] != side):
             return False
         if attractor.rests:
-            target = strobe._coordinates(np.array([u]), np.array([v]), np.array([side]))[0]
-            return bool(not changes.any() and np.abs((after - target) / size).max() < 1e-9)
+            target = strobe._to_coordinates(np.array([u]), np.array([v]), np.array([side]))[0]
+            return bool(not derivatives.any() and np.abs((images - target) / size).max() < 1e-9)
         _, _, impacts = strobe.advance(samples, attractor.period)
-        norms = np.linalg.norm(shape @ changes @ np.linalg.inv(shape), ord=2, axis=(1, 2))
+        norms = np.linalg.norm(norm_matrix @ derivatives @ np.linalg.inv(norm_matrix), ord=2, axis=(1, 2))
         return bool(np.all(impacts == attractor.impacts) and np.all(norms <= 0.5 * (1.0 + rate)))
 
-    angles = 2.0 * np.pi * np.arange(_ANGLES) / _ANGLES
-    rings = np.arange(1, _RINGS + 1)[:, None, None] / _RINGS
-    disc = (rings * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).reshape(-1, 2) @ np.linalg.inv(shape).T
+    angles = 2.0 * np.pi * np.arange(_N_ANGLES) / _N_ANGLES
+    rings = np.arange(1, _N_RINGS + 1)[:, None, None] / _N_RINGS
+    disc = (rings * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).reshape(-1, 2) @ np.linalg.inv(norm_matrix).T
     radius = 0.25  # relative to the size of the states
     while radius > 1e-7:
         # The checked neighbourhood is twice as large.
         offsets = 2.0 * radius * disc
-        # First at a few angles of the outermost ring.
-        if stays(offsets[-_ANGLES :: _ANGLES // 4]) and stays(offsets):
-            form = shape.T @ shape / radius**2
+        # A few angles of the outermost ring exclude most sizes quickly.
+        if is_trapping(offsets[-_N_ANGLES :: _N_ANGLES // 4]) and is_trapping(offsets):
+            form = norm_matrix.T @ norm_matrix / radius**2
             return np.array([side, u, v, form[0, 0], form[0, 1], form[1, 1]])
         radius *= 0.5
     return None
 
 
-def _contracting_norm(change: Floats, size: Floats) -> tuple[Floats, float]:
-    """Return a matrix L and a rate such that |L M x| <= rate |L x|, where |L x| is at least |x| relative to the sizes.
+def _find_contracting_norm(derivative: Floats, size: Floats) -> tuple[Floats, float]:
+    """Find a matrix L and a rate such that |L M x| <= rate |L x|, and |L x| is at least |x| relative to the sizes.
 
     L is NaN if rounding error hides the eigenvalues of the derivative.
     """
     scale = np.diag(1.0 / size)
-    M = scale @ change @ np.diag(size)
+    M = scale @ derivative @ np.diag(size)
     rate = max(float(np.sqrt(np.abs(np.linalg.eigvals(M)).max())), 0.01)
     form, power = np.eye(2), np.eye(2)
     for _ in range(100_000):
@@ -177,72 +183,74 @@ class KnownAttractors:
         Index of the attractor of each trap.
     """
 
-    #: Maximum number of states per search, without those that lead to known attractors.
-    MOST_TRIES: Final = 12
+    #: Maximum number of states per search that do not lead to known attractors.
+    MAX_TRIES: Final = 12
 
     def __init__(self, strobe: StroboscopicMap, size: Floats) -> None:
         self.strobe, self.size = strobe, size
         self.attractors: list[Attractor] = []
-        self.traps, self.owner = np.empty((0, TRAP)), np.empty(0, dtype=np.int64)
+        self.traps, self.attractor_of_trap = np.empty((0, TRAP)), np.empty(0, dtype=np.int64)
 
-    def owners(self, states: Floats) -> Integers:
+    def classify(self, states: Floats) -> Integers:
         """Return the attractor of each state, -1 for a state outside all traps."""
-        return self._owner_of(self.strobe._states(states)[1])
+        return self._classify(self.strobe._to_records(states)[1])
 
-    def settle(self, states: Floats) -> Integers:
+    def classify_or_search(self, states: Floats) -> Integers:
         """Return the attractor of each state, -1 for a state outside all traps, and search for new attractors."""
-        _, made = self.strobe._states(states)
-        found = self._owner_of(made)
-        tries = self.MOST_TRIES
-        while tries and (unsettled := np.flatnonzero(found == -1)).size:
-            first, known = unsettled[0], len(self.attractors)
-            owner = self._add(attractor_from(self.strobe, states[first], self.size))
-            if owner == known:
-                passing = self.settled(made[unsettled], self.attractors[owner].period)[0]
-                found[unsettled] = np.append(self.owner, -1)[passing]
-            if owner < 0 or owner == known:  # known attractors do not count as tries
-                tries -= 1
-            found[first] = owner if owner >= 0 else -2
-        found[found == -2] = -1
-        return found
+        _, records = self.strobe._to_records(states)
+        indices = self._classify(records)
+        tries_left = self.MAX_TRIES
+        while tries_left and (unsettled := np.flatnonzero(indices == -1)).size:
+            first, new_index = unsettled[0], len(self.attractors)
+            index = self._add_attractor(find_attractor(self.strobe, states[first], self.size))
+            if index == new_index:
+                traps = self.advance_to_traps(records[unsettled], self.attractors[index].period)[0]
+                indices[unsettled] = np.append(self.attractor_of_trap, -1)[traps]
+            if index < 0 or index == new_index:  # known attractors do not count as tries
+                tries_left -= 1
+            indices[first] = index if index >= 0 else -2
+        indices[indices == -2] = -1
+        return indices
 
-    def settled(self, made: Records, periods: int) -> tuple[Integers, Integers]:
-        """Advance states, and return the trap that each reaches within these periods, or -1, and how many it takes."""
-        setting, traps, orbits = self.strobe._setting(), self.traps, np.empty((len(made), 0, 3))
-        found, taken = np.empty(len(made), dtype=np.int64), np.empty(len(made), dtype=np.int64)
+    def advance_to_traps(self, records: Records, max_periods: int) -> tuple[Integers, Integers]:
+        """Advance states until they reach a trap; return the trap (or -1) and the number of periods of each state."""
+        problem, traps, orbits = self.strobe._create_problem(), self.traps, np.empty((len(records), 0, 3))
+        reached, counts = np.empty(len(records), dtype=np.int64), np.empty(len(records), dtype=np.int64)
 
-        def follow(part: slice) -> None:
-            iterate(setting, new_scratch(), made[part], periods, orbits[part], traps, found[part], taken[part])
+        def advance_part(part: slice) -> None:
+            iterate(
+                problem, new_scratch(), records[part], max_periods, orbits[part], traps, reached[part], counts[part]
+            )
 
-        for _ in map_in_threads(follow, parts_of(len(made), periods)):
+        for _ in map_in_threads(advance_part, split_states(len(records), max_periods)):
             pass
-        return found, taken
+        return reached, counts
 
-    def _owner_of(self, made: Records) -> Integers:
-        found = np.full(len(made), -1)
-        for trap, owner in zip(self.traps, self.owner, strict=True):
-            du, dv = made["u"] - trap[1], made["v"] - trap[2]
+    def _classify(self, records: Records) -> Integers:
+        """Return the attractor of each state, -1 for a state outside all traps."""
+        indices = np.full(len(records), -1)
+        for trap, index in zip(self.traps, self.attractor_of_trap, strict=True):
+            du, dv = records["u"] - trap[1], records["v"] - trap[2]
             inside: Flags = trap[3] * du * du + 2.0 * trap[4] * du * dv + trap[5] * dv * dv <= 1.0
-            found[(made["side"] == trap[0]) & inside & (found == -1)] = owner
-        return found
+            indices[(records["side"] == trap[0]) & inside & (indices == -1)] = index
+        return indices
 
-    def _add(self, attractor: Attractor | None) -> int:
-        """Add an attractor if it is new, and return its number, or -1 without traps."""
+    def _add_attractor(self, attractor: Attractor | None) -> int:
+        """Add an attractor if it is new, and return its index, or -1 if it has no trap."""
         if attractor is None:
             return -1
-        for number, known in enumerate(self.attractors):
+        for index, known in enumerate(self.attractors):
             if known.period == attractor.period:
                 near = np.abs((known.states - attractor.states[0]) / self.size).max(axis=1)
-                if near.min() < RETURN:
-                    return number
-        points = attractor.states[
-            select_evenly(attractor.period, 8)
-        ]  # some points of a long orbit have a neighbourhood
-        pairs = zip(points, self.strobe._states(points)[1], strict=True)
-        traps = [row for pair in pairs if (row := _trap(self.strobe, attractor, *pair, self.size)) is not None]
+                if near.min() < RETURN_TOLERANCE:
+                    return index
+        # Some points of a long orbit have a neighbourhood.
+        points = attractor.states[select_evenly(attractor.period, 8)]
+        pairs = zip(points, self.strobe._to_records(points)[1], strict=True)
+        traps = [row for pair in pairs if (row := _build_trap(self.strobe, attractor, *pair, self.size)) is not None]
         if not traps:
             return -1
-        self.owner = np.append(self.owner, np.full(len(traps), len(self.attractors)))
+        self.attractor_of_trap = np.append(self.attractor_of_trap, np.full(len(traps), len(self.attractors)))
         self.traps = np.concatenate([self.traps, traps])
         self.attractors.append(attractor)
         return len(self.attractors) - 1

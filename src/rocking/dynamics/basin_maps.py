@@ -17,7 +17,7 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.dynamics.attractors import KnownAttractors
-from rocking.dynamics.maps import StroboscopicMap, described, scale_of, sensible
+from rocking.dynamics.maps import StroboscopicMap, check_magnitudes, compute_scale, describe_input
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import PeriodOutcome
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Codes of cells before attractors are sorted: 3 + k is attractor k.
-_TO_PLUS, _TO_MINUS, _UNSETTLED, _FIRST = 0, 1, 2, 3
-_NAMES: Final = ("overturns to side +", "overturns to side -", "not settled")
+_OVERTURNS_PLUS, _OVERTURNS_MINUS, _UNSETTLED, _FIRST_ATTRACTOR = 0, 1, 2, 3
+_OUTCOME_NAMES: Final = ("overturns to side +", "overturns to side -", "not settled")
 
-#: Cells before the first search for attractors, and between later searches.
-_BEFORE, _BETWEEN = 400, 16_384
+#: Numbers of cells before the first search for attractors, and between later searches.
+_CELLS_BEFORE_SEARCH, _CELLS_PER_SEARCH = 400, 16_384
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,8 +77,10 @@ class Basins(DatasetResult):
             for k in range(data.sizes["attractor"])
         ]
         cells = data.outcome.size
-        head = f"basins of {data.body} under {data.motion}: {cells} cells, {format_count(data.most_periods, 'period')}"
-        return f"{head}\n\n{format_table(['attractor', 'share', 'standard error', 'multiplier'], rows)}"
+        headline = (
+            f"basins of {data.body} under {data.motion}: {cells} cells, {format_count(data.most_periods, 'period')}"
+        )
+        return f"{headline}\n\n{format_table(['attractor', 'share', 'standard error', 'multiplier'], rows)}"
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
@@ -113,7 +115,10 @@ class Basins(DatasetResult):
             y=v.values,
             outcome=data.outcome.values,
             names=names,
-            kinds=["overturns" if n in _NAMES[:2] else "unsettled" if n == _NAMES[2] else "orbit" for n in names],
+            kinds=[
+                "overturns" if n in _OUTCOME_NAMES[:2] else "unsettled" if n == _OUTCOME_NAMES[2] else "orbit"
+                for n in names
+            ],
             orbits=np.stack([data.orbit_coordinate.values, data.orbit_velocity.values], axis=-1),
             x_label=f"{x.name} at the start of a period ({x.units})",
             y_label=f"{str(v.name).replace('_', ' ')} ({v.units})",
@@ -167,7 +172,7 @@ def basins(
 
     References
     ----------
-    P. J. Menck and others, "How basin stability complements the linear-stability paradigm", Nature Physics 9 (2013).
+    :cite:t:`menck2013`, "How basin stability complements the linear-stability paradigm".
 
     Examples
     --------
@@ -175,8 +180,8 @@ def basins(
     >>> from rocking import dynamics
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> shaking = rocking.pulses.sine(3.5, 1.2, cycles=1)
-    >>> found = dynamics.basins(block, shaking, np.linspace(-0.2, 0.2, 21), np.linspace(-0.4, 0.4, 21))
-    >>> for name, share in zip(found.data.attractor.values, found.data.share.values):
+    >>> result = dynamics.basins(block, shaking, np.linspace(-0.2, 0.2, 21), np.linspace(-0.4, 0.4, 21))
+    >>> for name, share in zip(result.data.attractor.values, result.data.share.values):
     ...     print(f"{name}: {share:.2f}")
     period 1, 2 impacts: 0.35
     overturns to side -: 0.52
@@ -184,111 +189,130 @@ def basins(
     """
     strobe = StroboscopicMap(body, motion, model, chattering)
     x, v = checks.axis(positions, "positions", InvalidOption), checks.axis(velocities, "velocities", InvalidOption)
-    sensible(x, "positions")
-    sensible(v, "velocities")
+    check_magnitudes(x, "positions")
+    check_magnitudes(v, "velocities")
     checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
-    most = checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)
-    work = _Grid(strobe, x, v, most)
-    work.run()
-    return Basins(work.dataset())
+    max_periods = checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)
+    grid = _BasinGrid(strobe, x, v, max_periods)
+    grid.follow_all()
+    return Basins(grid.to_dataset())
 
 
-class _Grid:
-    """Cells of a grid, and the attractors found so far."""
+class _BasinGrid:
+    """Cells of a grid of initial states, and the attractors that they approach."""
 
-    def __init__(self, strobe: StroboscopicMap, x: Floats, v: Floats, periods: int) -> None:
-        self.strobe, self.x, self.v, self.periods = strobe, x, v, periods
+    def __init__(self, strobe: StroboscopicMap, x: Floats, v: Floats, max_periods: int) -> None:
+        self.strobe, self.x, self.v, self.max_periods = strobe, x, v, max_periods
         # Later states of a small grid are as large as others. Comparison within their rounding error would find no
         # attractor.
-        size = np.maximum([float(np.ptp(each) or abs(each[0]) or 1.0) for each in (x, v)], scale_of(strobe))
+        size = np.maximum([float(np.ptp(axis) or abs(axis[0]) or 1.0) for axis in (x, v)], compute_scale(strobe))
         self.states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
         self.outcome = np.full(len(self.states), _UNSETTLED, dtype=np.int16)
-        self.taken = np.zeros(len(self.states), dtype=np.int32)
-        self.known = KnownAttractors(strobe, size)
-        # Raises an error for a start behind or into a stop.
-        strobe._states(self.states[[0, -1]], "positions", "velocities")
+        self.period_counts = np.zeros(len(self.states), dtype=np.int32)
+        self.known_attractors = KnownAttractors(strobe, size)
+        # Raise an error for a start behind a stop, or moving into it.
+        strobe._to_records(self.states[[0, -1]], "positions", "velocities")
 
-    def run(self) -> None:
-        """Follow all cells in a mixed order."""
-        count = len(self.outcome)
-        cells = np.random.default_rng(0).permutation(count)
-        later = range(_BEFORE, count, _BETWEEN)
-        with Progress("basins", count) as bar:
-            for first, last in zip((0, *later), (*later, count), strict=True):
-                self._follow(cells[first:last])
+    def follow_all(self) -> None:
+        """Follow all cells in random order."""
+        n_cells = len(self.outcome)
+        cells = np.random.default_rng(0).permutation(n_cells)
+        chunk_starts = range(_CELLS_BEFORE_SEARCH, n_cells, _CELLS_PER_SEARCH)
+        with Progress("basins", n_cells) as bar:
+            for first, last in zip((0, *chunk_starts), (*chunk_starts, n_cells), strict=True):
+                self._follow_cells(cells[first:last])
                 bar.advance(last - first)
 
-    def _follow(self, cells: Integers) -> None:
+    def _follow_cells(self, cells: Integers) -> None:
+        """Determine the outcomes of some cells."""
         strobe = self.strobe
-        _, made = strobe._states(self.states[cells])
-        traps, taken = self.known.settled(made, self.periods)
-        outcome = np.where(traps >= 0, _FIRST + np.append(self.known.owner, 0)[traps], _UNSETTLED)
-        over = made["ending"] == PeriodOutcome.OVERTURNED
-        outcome[over] = np.where(made["side"][over] > 0, _TO_MINUS, _TO_PLUS)
-        left = np.flatnonzero((traps < 0) & ~over & (made["ending"] != PeriodOutcome.UNFINISHED))
-        later = self.known.settle(strobe._coordinates(made["u"][left], made["v"][left], made["side"][left]))
-        outcome[left] = np.where(later >= 0, _FIRST + later, _UNSETTLED)
-        self.taken[cells], self.outcome[cells] = taken, outcome
+        _, records = strobe._to_records(self.states[cells])
+        traps, period_counts = self.known_attractors.advance_to_traps(records, self.max_periods)
+        outcome = np.where(
+            traps >= 0, _FIRST_ATTRACTOR + np.append(self.known_attractors.attractor_of_trap, 0)[traps], _UNSETTLED
+        )
+        overturned = records["ending"] == PeriodOutcome.OVERTURNED
+        outcome[overturned] = np.where(records["side"][overturned] > 0, _OVERTURNS_MINUS, _OVERTURNS_PLUS)
+        unsettled = np.flatnonzero((traps < 0) & ~overturned & (records["ending"] != PeriodOutcome.UNFINISHED))
+        attractors = self.known_attractors.classify_or_search(
+            strobe._to_coordinates(records["u"][unsettled], records["v"][unsettled], records["side"][unsettled])
+        )
+        outcome[unsettled] = np.where(attractors >= 0, _FIRST_ATTRACTOR + attractors, _UNSETTLED)
+        self.period_counts[cells], self.outcome[cells] = period_counts, outcome
 
-    def dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> xr.Dataset:
         """Create the dataset, with attractors in the order of their shares, then the outcomes without an attractor."""
         import xarray as xr
 
-        found, counts = np.unique(self.outcome, return_counts=True)
+        codes, counts = np.unique(self.outcome, return_counts=True)
         total = counts.sum()
-        order = sorted(zip(found.tolist(), counts.tolist(), strict=True), key=lambda each: (each[0] < _FIRST, -each[1]))
-        numbers, share = [number for number, _ in order], np.array([count for _, count in order]) / total
-        orbits = [self.known.attractors[n - _FIRST] if n >= _FIRST else None for n in numbers]
-        names = [_NAMES[n] if orbit is None else orbit.name for n, orbit in zip(numbers, orbits, strict=True)]
-        place = np.full(_FIRST + len(self.known.attractors) + 1, -1, dtype=np.int16)
-        place[numbers] = np.arange(len(numbers))
-        points = np.full((len(orbits), max([1, *(each.period for each in orbits if each is not None)]), 2), np.nan)
-        about: list[tuple[int, int, bool, float]] = []
+        order = sorted(
+            zip(codes.tolist(), counts.tolist(), strict=True), key=lambda item: (item[0] < _FIRST_ATTRACTOR, -item[1])
+        )
+        sorted_codes, share = [code for code, _ in order], np.array([count for _, count in order]) / total
+        orbits = [
+            self.known_attractors.attractors[code - _FIRST_ATTRACTOR] if code >= _FIRST_ATTRACTOR else None
+            for code in sorted_codes
+        ]
+        names = [
+            _OUTCOME_NAMES[code] if orbit is None else orbit.name
+            for code, orbit in zip(sorted_codes, orbits, strict=True)
+        ]
+        index_of_code = np.full(_FIRST_ATTRACTOR + len(self.known_attractors.attractors) + 1, -1, dtype=np.int16)
+        index_of_code[sorted_codes] = np.arange(len(sorted_codes))
+        points = np.full((len(orbits), max([1, *(item.period for item in orbits if item is not None)]), 2), np.nan)
+        properties: list[tuple[int, int, bool, float]] = []
         for k, orbit in enumerate(orbits):
             if orbit is None:
-                about.append((0, -1, False, np.nan))
+                properties.append((0, -1, False, np.nan))
                 continue
             points[k, : orbit.period] = orbit.states
-            about.append((orbit.period, orbit.impacts, orbit.rests, float(np.abs(orbit.multipliers).max())))
-        period, impacts, rests, multiplier = map(list, zip(*about, strict=True))
+            properties.append((orbit.period, orbit.impacts, orbit.rests, float(np.abs(orbit.multipliers).max())))
+        period, impacts, rests, multiplier = map(list, zip(*properties, strict=True))
         error = np.sqrt(share * (1.0 - share) / total)
         coordinate = self.strobe.body.coordinate
-        at, rate, unit = coordinate.name, coordinate.rate, coordinate.unit
-        cells, shape = (rate, at), (len(self.v), len(self.x))
+        coordinate_name, rate, unit = coordinate.name, coordinate.rate, coordinate.unit
+        dimensions, shape = (rate, coordinate_name), (len(self.v), len(self.x))
         return xr.Dataset(
             {
-                "outcome": variable(cells, place[self.outcome].reshape(shape), "number of the attractor"),
-                "periods": variable(cells, self.taken.reshape(shape), "periods until the outcome was known"),
+                "outcome": variable(dimensions, index_of_code[self.outcome].reshape(shape), "number of the attractor"),
+                "periods": variable(
+                    dimensions, self.period_counts.reshape(shape), "periods until the outcome was known"
+                ),
                 "share": variable("attractor", share, "share of the cells", "1"),
                 "standard_error": variable("attractor", error, "of the share, as of random states", "1"),
                 "period": variable("attractor", period, "periods of the motion"),
                 "impacts": variable("attractor", impacts, "impacts in a period of the orbit"),
                 "rests": variable("attractor", rests, "has a rest"),
                 "multiplier": variable("attractor", multiplier, "largest multiplier in size", "1"),
-                "orbit_coordinate": variable(("attractor", "phase"), points[..., 0], f"{at} on the orbit", unit),
+                "orbit_coordinate": variable(
+                    ("attractor", "phase"), points[..., 0], f"{coordinate_name} on the orbit", unit
+                ),
                 "orbit_velocity": variable(("attractor", "phase"), points[..., 1], "rate on the orbit", f"{unit}/s"),
             },
             {
                 rate: variable(rate, self.v, "velocity at the start of a period", f"{unit}/s"),
-                at: variable(at, self.x, f"{at} at the start of a period", unit),
-                "attractor": _distinct(names),
+                coordinate_name: variable(coordinate_name, self.x, f"{coordinate_name} at the start of a period", unit),
+                "attractor": _make_distinct(names),
             },
             {
                 "program": f"rocking {VERSION}",
-                "body": described(self.strobe.body),
-                "motion": described(self.strobe.motion),
+                "body": describe_input(self.strobe.body),
+                "motion": describe_input(self.strobe.motion),
                 "model": self.strobe.model,
-                "most_periods": self.periods,
+                "most_periods": self.max_periods,
                 "period_s": self.strobe.forcing_period,
             },
         )
 
 
-def _distinct(names: list[str]) -> list[str]:
+def _make_distinct(names: list[str]) -> list[str]:
     """Append a letter to names that are equal."""
-    seen: dict[str, int] = {}
-    found = []
+    counts: dict[str, int] = {}
+    labels = []
     for name in names:
-        k = seen[name] = seen.get(name, 0) + 1
-        found.append(f"{name} ({chr(ord('a') + k - 1) if k <= 26 else k})" if names.count(name) > 1 else name)
-    return found
+        count = counts[name] = counts.get(name, 0) + 1
+        labels.append(
+            f"{name} ({chr(ord('a') + count - 1) if count <= 26 else count})" if names.count(name) > 1 else name
+        )
+    return labels

@@ -19,10 +19,18 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, Result, format_some_rows, variable
 from rocking.core.tables import escape_dollars, format_count
 from rocking.core.threads import map_in_threads
-from rocking.dynamics.attractors import RETURN
+from rocking.dynamics.attractors import RETURN_TOLERANCE
 from rocking.dynamics.bodies import LinearBody
-from rocking.dynamics.maps import TOGETHER, PeriodOutcome, Scale, StroboscopicMap, described, scale_of, stroboscopic_map
-from rocking.dynamics.orbits import impacts_of
+from rocking.dynamics.maps import (
+    STATES_PER_CALL,
+    PeriodOutcome,
+    Scale,
+    StroboscopicMap,
+    compute_scale,
+    describe_input,
+    stroboscopic_map,
+)
+from rocking.dynamics.orbits import count_orbit_impacts
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import measure_stretches
@@ -32,10 +40,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Orders of the values of the parameter.
+#: Order in which the values of the parameter are computed.
 Direction = Literal["up", "down", "both", "afresh"]
 
-#: Values of the period if the body overturned, and if it took too many steps.
+#: Codes instead of a period if the body overturned, and if it required too many steps.
 OVERTURNED: Final = -1
 NOT_FOLLOWED: Final = -2
 
@@ -67,15 +75,17 @@ class BifurcationDiagram(DatasetResult):
     def changes(self, direction: str | None = None, start: int = 0) -> list[tuple[float, float, int, int]]:
         """List the changes of the period in the order of the computation.
 
-        Each entry contains the values before and after, and the periods there.
-        The direction is by default the first; `start` is the number of the initial state. The codes 0, -1 and -2 stand
-        for missing periods, as in ``data``. Raise `InvalidOption` if there is no such direction or start.
+        Each entry contains the values before and after, and the periods there. By default the direction is the first
+        one; `start` is the index of the initial state. The codes 0, -1 and -2 stand for missing periods, as in
+        ``data``. Raise `InvalidOption` if there is no such direction or start.
         """
-        ways = self.data.direction.values.tolist()
-        way = ways.index(checks.choice(ways[0] if direction is None else direction, "direction", InvalidOption, ways))
+        directions = self.data.direction.values.tolist()
+        index = directions.index(
+            checks.choice(directions[0] if direction is None else direction, "direction", InvalidOption, directions)
+        )
         number = checks.integer(start, "start", InvalidOption, minimum=0, maximum=self.data.sizes["start"] - 1)
-        values, periods = self.data.value.values, self.data.period.values[way, :, number]
-        if ways[way] == "down":
+        values, periods = self.data.value.values, self.data.period.values[index, :, number]
+        if directions[index] == "down":
             values, periods = values[::-1], periods[::-1]
         return [
             (float(values[k]), float(values[k + 1]), int(periods[k]), int(periods[k + 1]))
@@ -84,20 +94,22 @@ class BifurcationDiagram(DatasetResult):
 
     def summary(self) -> str:
         data = self.data
-        head = f"bifurcation diagram over {data.parameter}: {format_count(data.sizes['value'], 'value')}, {data.cases}"
-        parts = [head]
-        for way in data.direction.values.tolist():
+        headline = (
+            f"bifurcation diagram over {data.parameter}: {format_count(data.sizes['value'], 'value')}, {data.cases}"
+        )
+        parts = [headline]
+        for direction in data.direction.values.tolist():
             for start in range(data.sizes["start"]):
                 rows = [
-                    [f"{before:.6g}", f"{after:.6g}", _in_words(old), _in_words(new)]
-                    for before, after, old, new in self.changes(way, start)
+                    [f"{before:.6g}", f"{after:.6g}", _format_period(old), _format_period(new)]
+                    for before, after, old, new in self.changes(direction, start)
                 ]
-                which = f"{way}, start {start + 1}" if data.sizes["start"] > 1 else way
-                period = int(data.period.sel(direction=way).values[0, start])
-                said = f"{'period ' if period >= 0 else ''}{_in_words(period)} throughout"
+                orbit = f"{direction}, start {start + 1}" if data.sizes["start"] > 1 else direction
+                period = int(data.period.sel(direction=direction).values[0, start])
+                description = f"{'period ' if period >= 0 else ''}{_format_period(period)} throughout"
                 if rows:
-                    said = f"changes of the period\n{format_some_rows(['from', 'to', 'before', 'after'], rows)}"
-                parts.append(f"{which}: {said}")
+                    description = f"changes of the period\n{format_some_rows(['from', 'to', 'before', 'after'], rows)}"
+                parts.append(f"{orbit}: {description}")
         return "\n\n".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
@@ -113,8 +125,8 @@ class BifurcationDiagram(DatasetResult):
             "period": data.period.values,
             "impacts": data.impacts.values,
             "changes": {
-                way: [self.changes(way, start) for start in range(data.sizes["start"])]
-                for way in data.direction.values.tolist()
+                direction: [self.changes(direction, start) for start in range(data.sizes["start"])]
+                for direction in data.direction.values.tolist()
             },
         }
 
@@ -122,15 +134,15 @@ class BifurcationDiagram(DatasetResult):
         from rocking.plot.orbits import bifurcation_figure
 
         data = self.data
-        over = (data.period.values == OVERTURNED).all(axis=(0, 2))
+        overturned = (data.period.values == OVERTURNED).all(axis=(0, 2))
         return bifurcation_figure(
             value=data.value.values,
             states={
-                way: data.coordinate.sel(direction=way).values.reshape(data.sizes["value"], -1)
-                for way in data.direction.values.tolist()
+                direction: data.coordinate.sel(direction=direction).values.reshape(data.sizes["value"], -1)
+                for direction in data.direction.values.tolist()
             },
-            overturned=over,
-            not_followed=(data.period.values < 0).all(axis=(0, 2)) & ~over,
+            overturned=overturned,
+            not_followed=(data.period.values < 0).all(axis=(0, 2)) & ~overturned,
             x_label=escape_dollars(data.parameter.replace("_", " ")),
             y_label=f"{data.coordinate.attrs['long_name']} ({data.coordinate.units})",
             title=title or escape_dollars(data.cases),
@@ -194,151 +206,166 @@ def bifurcation_diagram(
     >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
     >>> def case(ratio):
     ...     return ball, rocking.pulses.sine(10.0 * ratio, 5.0, cycles=1)
-    >>> found = dynamics.bifurcation_diagram(case, np.linspace(1.4, 1.6, 5), [0.1, 0.5], parameter="A w^2/g")
-    >>> found.data.period.values[0, :, 0].tolist()
+    >>> diagram = dynamics.bifurcation_diagram(case, np.linspace(1.4, 1.6, 5), [0.1, 0.5], parameter="A w^2/g")
+    >>> diagram.data.period.values[0, :, 0].tolist()
     [1, 1, 1, 2, 2]
     """
     if not callable(case):
         raise InvalidOption("{} must be a function of the parameter that returns a body and one period", "case")
-    way = checks.choice(direction, "direction", InvalidOption, get_args(Direction))
-    levels = checks.axis(values, "values", InvalidOption)
-    first = checks.numbers(starts, "starts", InvalidOption)
-    if first.ndim not in (1, 2) or first.shape[-1] != 2 or first.size == 0:
+    selected = checks.choice(direction, "direction", InvalidOption, get_args(Direction))
+    parameters = checks.axis(values, "values", InvalidOption)
+    initial_states = checks.numbers(starts, "starts", InvalidOption)
+    if initial_states.ndim not in (1, 2) or initial_states.shape[-1] != 2 or initial_states.size == 0:
         raise InvalidOption("{} must be one pair (coordinate, velocity) or several", "starts")
-    first = first.reshape(-1, 2)
-    before = checks.integer(transient, "transient", InvalidOption, minimum=0)
-    count = checks.integer(recorded, "recorded", InvalidOption, minimum=2)
-    name = checks.text(parameter, "parameter", InvalidOption)
-    checks.grid_size({"values": levels.size, "starts": len(first), "recorded": count}, InvalidOption)
+    initial_states = initial_states.reshape(-1, 2)
+    n_transient = checks.integer(transient, "transient", InvalidOption, minimum=0)
+    n_recorded = checks.integer(recorded, "recorded", InvalidOption, minimum=2)
+    parameter_name = checks.text(parameter, "parameter", InvalidOption)
+    checks.grid_size({"values": parameters.size, "starts": len(initial_states), "recorded": n_recorded}, InvalidOption)
 
-    afresh, ways = way == "afresh", ("up", "down") if way == "both" else (way,)
-    order = {w: range(levels.size)[:: -1 if each == "down" else 1] for w, each in enumerate(ways)}
-    shape = len(ways), levels.size, len(first)
-    states, period, impacts = np.full((*shape, count, 2), np.nan), np.full(shape, OVERTURNED), np.full(shape, -1.0)
+    is_afresh, directions = selected == "afresh", ("up", "down") if selected == "both" else (selected,)
+    indices = {d: range(parameters.size)[:: -1 if name == "down" else 1] for d, name in enumerate(directions)}
+    shape = len(directions), parameters.size, len(initial_states)
+    states, periods, impacts = (
+        np.full((*shape, n_recorded, 2), np.nan),
+        np.full(shape, OVERTURNED),
+        np.full(shape, -1.0),
+    )
 
-    def follow(item: tuple[int, Sequence[int]]) -> int:
-        """Follow the orbits of one direction through some values, and return their number."""
-        w, some = item
-        for k in some:
-            strobe, last = _map_of(case(float(levels[k])), model, chattering), k - order[w].step
-            at = first if afresh or not 0 <= last < levels.size else states[w, last, :, -1]
-            at = _in_front(strobe, np.where(np.isnan(at), first, at))
-            states[w, k], outcomes = states_after(strobe, at, before, count)
-            now, scale = states[w, k, :, -1], scale_of(strobe)
-            period[w, k, outcomes == PeriodOutcome.UNFINISHED] = NOT_FOLLOWED
-            for s in np.flatnonzero(~np.isnan(now[:, 0])):
-                n = period[w, k, s] = period_of(states[w, k, s], scale)
+    def follow_values(chunk: tuple[int, Sequence[int]]) -> int:
+        """Compute consecutive values of the parameter in one direction, and return their number."""
+        d, value_indices = chunk
+        for k in value_indices:
+            strobe, previous = _create_map(case(float(parameters[k])), model, chattering), k - indices[d].step
+            start_states = (
+                initial_states if is_afresh or not 0 <= previous < parameters.size else states[d, previous, :, -1]
+            )
+            start_states = _move_before_stops(strobe, np.where(np.isnan(start_states), initial_states, start_states))
+            states[d, k], outcomes = record_states(strobe, start_states, n_transient, n_recorded)
+            final_states, scale = states[d, k, :, -1], compute_scale(strobe)
+            periods[d, k, outcomes == PeriodOutcome.UNFINISHED] = NOT_FOLLOWED
+            for s in np.flatnonzero(~np.isnan(final_states[:, 0])):
+                n = periods[d, k, s] = find_period(states[d, k, s], scale)
                 if n:
-                    impacts[w, k, s] = impacts_of(strobe, now[s], n, strobe.derivative(now[s], n)[1])
-        return len(some)
+                    impacts[d, k, s] = count_orbit_impacts(
+                        strobe, final_states[s], n, strobe.derivative(final_states[s], n)[1]
+                    )
+        return len(value_indices)
 
-    ends = [_map_of(case(float(each)), model, chattering) for each in levels[[0, -1]]]
-    for strobe in ends:
-        strobe.checked_starts(first, "starts")  # raises an error for a start behind a stop
-    with Progress("bifurcation diagram", len(ways) * levels.size) as bar:
-        for start in range(0, levels.size, _CHUNK):
-            chunks = [(w, each[start : start + _CHUNK]) for w, each in order.items()]
-            for done in map_in_threads(follow, [(0, [k]) for k in chunks[0][1]] if afresh else chunks):
-                bar.advance(done)
+    end_maps = [_create_map(case(float(value)), model, chattering) for value in parameters[[0, -1]]]
+    for strobe in end_maps:
+        strobe._check_starts(initial_states, "starts")  # raises an error for a start behind a stop
+    with Progress("bifurcation diagram", len(directions) * parameters.size) as bar:
+        for start in range(0, parameters.size, _CHUNK):
+            chunks = [(d, order[start : start + _CHUNK]) for d, order in indices.items()]
+            for n_done in map_in_threads(follow_values, [(0, [k]) for k in chunks[0][1]] if is_afresh else chunks):
+                bar.advance(n_done)
 
     import xarray as xr
 
-    coordinate = ends[0].body.coordinate
-    orbits, over = ("direction", "value", "start"), ("direction", "value", "start", "iterate")
-    said = (_common([described(each.body) for each in ends]), _common([described(each.motion) for each in ends]))
-    meaning = "periods of the motion, 0: none found, -1: overturned, -2: not followed"
+    coordinate = end_maps[0].body.coordinate
+    orbit_dimensions, state_dimensions = ("direction", "value", "start"), ("direction", "value", "start", "iterate")
+    texts = (
+        _join_common_parts([describe_input(strobe.body) for strobe in end_maps]),
+        _join_common_parts([describe_input(strobe.motion) for strobe in end_maps]),
+    )
+    meaning_of_period = "periods of the motion, 0: none found, -1: overturned, -2: not followed"
     meaning_of_impacts = "impacts in one period of the orbit, infinite: chattering, -1: not known"
-    found = xr.Dataset(
+    dataset = xr.Dataset(
         {
-            "coordinate": variable(over, states[..., 0], coordinate.name, coordinate.unit),
-            "velocity": variable(over, states[..., 1], coordinate.rate, f"{coordinate.unit}/s"),
-            "period": variable(orbits, period, meaning),
-            "impacts": variable(orbits, impacts, meaning_of_impacts),
-            "start_coordinate": variable("start", first[:, 0], "initial state", coordinate.unit),
-            "start_velocity": variable("start", first[:, 1], "initial state", f"{coordinate.unit}/s"),
+            "coordinate": variable(state_dimensions, states[..., 0], coordinate.name, coordinate.unit),
+            "velocity": variable(state_dimensions, states[..., 1], coordinate.rate, f"{coordinate.unit}/s"),
+            "period": variable(orbit_dimensions, periods, meaning_of_period),
+            "impacts": variable(orbit_dimensions, impacts, meaning_of_impacts),
+            "start_coordinate": variable("start", initial_states[:, 0], "initial state", coordinate.unit),
+            "start_velocity": variable("start", initial_states[:, 1], "initial state", f"{coordinate.unit}/s"),
         },
-        {"direction": list(ways), "value": variable("value", levels, name, "1")},
+        {"direction": list(directions), "value": variable("value", parameters, parameter_name, "1")},
         {
             "program": f"rocking {VERSION}",
-            "parameter": name,
-            "cases": " under ".join(said),
-            "model": ends[0].model,
-            "transient": before,
+            "parameter": parameter_name,
+            "cases": " under ".join(texts),
+            "model": end_maps[0].model,
+            "transient": n_transient,
         },
     )
-    return BifurcationDiagram(found)
+    return BifurcationDiagram(dataset)
 
 
-def _map_of(pair: Any, model: Model | None, chattering: str | ChatteringScheme) -> StroboscopicMap:
+def _create_map(pair: Any, model: Model | None, chattering: str | ChatteringScheme) -> StroboscopicMap:
     if not isinstance(pair, tuple) or len(pair) != 2:
         raise InvalidOption("{} must return a body and one period of a motion", "case")
     return stroboscopic_map(*pair, model=model, chattering=chattering)
 
 
-def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
-    """Move states that a change of the parameter has put behind a stop back to the stop."""
+def _move_before_stops(strobe: StroboscopicMap, states: Floats) -> Floats:
+    """Move states behind a stop, after a change of the parameter, to the stop."""
     low, high = strobe.body.stops
     if not isinstance(strobe.body, LinearBody):
         return states
-    inside = np.clip(states[:, 0], low, high if high > low else np.inf)
-    held = (inside != states[:, 0]) | ((inside == low) & (states[:, 1] < 0.0))
-    return np.stack([inside, np.where(held, 0.0, states[:, 1])], axis=-1)
+    clipped = np.clip(states[:, 0], low, high if high > low else np.inf)
+    is_stopped = (clipped != states[:, 0]) | ((clipped == low) & (states[:, 1] < 0.0))
+    return np.stack([clipped, np.where(is_stopped, 0.0, states[:, 1])], axis=-1)
 
 
-def states_after(strobe: StroboscopicMap, at: Floats, transient: int, recorded: int) -> tuple[Floats, Integers]:
-    """Return states at the starts of periods after a transient, shape (n, recorded, 2), and the `PeriodOutcome` of each."""
-    states, now, outcomes = np.full((len(at), recorded, 2), np.nan), at, np.full(len(at), PeriodOutcome.MOVES.value)
+def record_states(strobe: StroboscopicMap, starts: Floats, transient: int, recorded: int) -> tuple[Floats, Integers]:
+    """Compute states at the starts of periods after a transient, shape (n, recorded, 2), and each `PeriodOutcome`."""
+    states, current, outcomes = (
+        np.full((len(starts), recorded, 2), np.nan),
+        starts,
+        np.full(len(starts), PeriodOutcome.MOVES.value),
+    )
     if transient:
-        now, outcomes, _ = strobe.advance(at, transient)
-    moves = ~np.isnan(now[:, 0])
+        current, outcomes, _ = strobe.advance(starts, transient)
+    moves = ~np.isnan(current[:, 0])
     if moves.any():
-        states[moves] = strobe.orbit(now[moves], recorded)[:, 1:]
+        states[moves] = strobe.orbit(current[moves], recorded)[:, 1:]
     lost = moves & np.isnan(states[:, -1, 0])
     if lost.any():
-        outcomes[lost] = strobe.advance(now[lost], recorded)[1]
+        outcomes[lost] = strobe.advance(current[lost], recorded)[1]
     return states, outcomes
 
 
-def period_of(states: Floats, scale: Scale | None = None) -> int:
-    """Return the period of an orbit from its recorded states.
+def find_period(states: Floats, scale: Scale | None = None) -> int:
+    """Find the period of an orbit from its recorded states.
 
     The period is 0 if the orbit does not repeat within half of the states, or is still settling.
 
-    Differences are relative to the size of the orbit, but at least to a small share of the natural ``scale``, because
-    the size of a state at zero is only its rounding error.
+    Differences are relative to the size of the orbit, but at least to 1e-6 of the natural ``scale``, because the size
+    of a state at zero is only its rounding error.
     """
     size = np.abs(states).max(axis=0) + np.finfo(float).tiny
     if scale is not None:
-        # With this size `RETURN` is about a thousand times the rounding error.
+        # With this size `RETURN_TOLERANCE` is about a thousand times the rounding error.
         size = np.maximum(size, 1e-6 * np.array(scale))
 
-    def apart(period: int) -> Floats:
-        distance: Floats = (np.abs(states[period:] - states[:-period]) / size).max(axis=1)
-        return distance
+    def compute_gaps(period: int) -> Floats:
+        distances: Floats = (np.abs(states[period:] - states[:-period]) / size).max(axis=1)
+        return distances
 
     for period in range(1, len(states) // 2 + 1):
-        if apart(period).max() <= RETURN:
-            # Alternating approach to a shorter orbit resembles twice its period.
-            for shorter in (each for each in range(1, period) if period % each == 0):
-                gaps = apart(shorter)
-                if gaps[-period:].max() < 0.99 * gaps[:period].max():
+        if compute_gaps(period).max() <= RETURN_TOLERANCE:
+            # An alternating approach to a shorter orbit resembles an orbit of twice its period.
+            for divisor in (candidate for candidate in range(1, period) if period % candidate == 0):
+                distances = compute_gaps(divisor)
+                if distances[-period:].max() < 0.99 * distances[:period].max():
                     return 0
             return period
     return 0
 
 
-def _common(texts: Sequence[str]) -> str:
+def _join_common_parts(texts: Sequence[str]) -> str:
     """Return the comma-separated parts that all texts share."""
     first, last = (text.split(", ") for text in texts)
     return ", ".join(part for part in first if part in last)
 
 
-def _in_words(period: int) -> str:
+def _format_period(period: int) -> str:
     return {0: "none found", OVERTURNED: "overturned", NOT_FOLLOWED: "not followed"}.get(period, str(period))
 
 
-#: Number of parts of an orbit whose means determine the standard error.
-_BATCHES: Final = 20
+#: Number of parts of an orbit whose means yield the standard error.
+_N_BATCHES: Final = 20
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -380,16 +407,16 @@ class LyapunovExponents(Result):
     stretches: Floats
 
     def summary(self) -> str:
-        over = f"over {format_count(self.n_periods, 'period')}"
+        averaging = f"over {format_count(self.n_periods, 'period')}"
         if np.isnan(self.largest):
-            return f"no Lyapunov exponents: the body overturns or cannot be followed {over}"
+            return f"no Lyapunov exponents: the body overturns or cannot be followed {averaging}"
         if np.isneginf(self.largest):
             return (
                 f"Lyapunov exponents: minus infinity; the body comes to rest in {100.0 * self.resting:.3g} % of the "
-                f"periods, {over}"
+                f"periods, {averaging}"
             )
-        said = f"{self.largest:.6g} and {self.smallest:.6g} per period (standard error {self.standard_error:.1g})"
-        return f"Lyapunov exponents: {said}, {over}, {self.impacts:.4g} impacts in each"
+        exponents = f"{self.largest:.6g} and {self.smallest:.6g} per period (standard error {self.standard_error:.1g})"
+        return f"Lyapunov exponents: {exponents}, {averaging}, {self.impacts:.4g} impacts in each"
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -448,8 +475,8 @@ def lyapunov_exponents(
 
     References
     ----------
-    P. C. Mueller, "Calculation of Lyapunov exponents for dynamic systems with discontinuities", Chaos, Solitons and
-    Fractals 5 (1995). S. Das and others, "Measuring quasiperiodicity", Europhysics Letters 114 (2016).
+    :cite:t:`mueller1995`, "Calculation of Lyapunov exponents for dynamic systems with discontinuities".
+    :cite:t:`das2016`, "Measuring quasiperiodicity".
 
     Examples
     --------
@@ -457,41 +484,45 @@ def lyapunov_exponents(
     >>> from rocking import dynamics
     >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
     >>> shaking = rocking.pulses.sine(1.3 * 10.0, 5.0, cycles=1)
-    >>> found = dynamics.lyapunov_exponents(ball, shaking, [0.1, 0.5])
-    >>> f"{found.largest:.6f} {found.smallest:.6f}, ln 0.5 = {math.log(0.5):.6f}"
+    >>> exponents = dynamics.lyapunov_exponents(ball, shaking, [0.1, 0.5])
+    >>> f"{exponents.largest:.6f} {exponents.smallest:.6f}, ln 0.5 = {math.log(0.5):.6f}"
     '-0.693147 -0.693147, ln 0.5 = -0.693147'
     """
     strobe = stroboscopic_map(body, motion, model=model, chattering=chattering)
-    given = checks.numbers(state, "state", InvalidOption)
-    if given.shape != (2,):
-        raise InvalidOption(f"{{}} must be one pair (coordinate, velocity), not of shape {given.shape}", "state")
-    strobe.checked_starts(given, "state")
-    count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=_BATCHES)
-    before = checks.integer(transient, "transient", InvalidOption, minimum=0)
-    made, marching = strobe._states(given[None])[1][0], strobe._marching()
-    frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((before + count, 2), np.nan), 0
-    for start, stop in pairwise(sorted({*range(0, before + count, TOGETHER), before, before + count})):
-        here = measure_stretches(*marching, made, frame, logs[start:stop])
-        impacts += here if start >= before else 0
-        if made["ending"] not in (PeriodOutcome.MOVES, PeriodOutcome.RESTS):
+    initial_state = checks.numbers(state, "state", InvalidOption)
+    if initial_state.shape != (2,):
+        raise InvalidOption(
+            f"{{}} must be one pair (coordinate, velocity), not of shape {initial_state.shape}", "state"
+        )
+    strobe._check_starts(initial_state, "state")
+    count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=_N_BATCHES)
+    n_transient = checks.integer(transient, "transient", InvalidOption, minimum=0)
+    record, arguments = strobe._to_records(initial_state[None])[1][0], strobe._create_derivative_arguments()
+    frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((n_transient + count, 2), np.nan), 0
+    for start, stop in pairwise(
+        sorted({*range(0, n_transient + count, STATES_PER_CALL), n_transient, n_transient + count})
+    ):
+        new_impacts = measure_stretches(*arguments, record, frame, logs[start:stop])
+        impacts += new_impacts if start >= n_transient else 0
+        if record["ending"] not in (PeriodOutcome.MOVES, PeriodOutcome.RESTS):
             break
-    outcome, logs = PeriodOutcome(int(made["ending"])), logs[before:]
+    outcome, logs = PeriodOutcome(int(record["ending"])), logs[n_transient:]
     if outcome == PeriodOutcome.RESTS_FOR_EVER:
         logs[np.isnan(logs)] = -np.inf
     rests = np.isneginf(logs[:, 0])
-    if strobe._loses_nothing:  # neighbouring states never come to rest, and neither approach nor separate
+    if strobe._conserves_energy:  # neighbouring states never come to rest, and neither approach nor separate
         logs[rests] = 0.0
     # Weights of a mean over periods that vanish with all derivatives at both ends (Das and others 2016).
-    at = (np.arange(count) + 0.5) / count
-    bump = np.exp(-1.0 / (at * (1.0 - at)))
+    x = (np.arange(count) + 0.5) / count
+    bump = np.exp(-1.0 / (x * (1.0 - x)))
     weights: Floats = bump / bump.sum()
     known = ~np.isnan(logs).any(axis=1)
     mean, error = np.full(2, np.nan), float("nan")
     if known.all():  # otherwise the later periods are unknown, despite earlier rests
-        mean[:] = [-np.inf if np.isneginf(each).any() else weights @ each for each in logs.T]
+        mean[:] = [-np.inf if np.isneginf(column).any() else weights @ column for column in logs.T]
     if np.isfinite(logs[:, 0]).all():  # standard error of an unweighted mean, from consecutive parts
-        means = [part.mean() for part in np.array_split(logs[:, 0], _BATCHES)]
-        error = float(np.std(means, ddof=1) / np.sqrt(_BATCHES))
+        means = [batch.mean() for batch in np.array_split(logs[:, 0], _N_BATCHES)]
+        error = float(np.std(means, ddof=1) / np.sqrt(_N_BATCHES))
     return LyapunovExponents(
         largest=float(mean[0]),
         smallest=float(mean[1]),

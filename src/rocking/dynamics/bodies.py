@@ -79,7 +79,7 @@ class LinearBody(ABC):
 
     def uplift_thresholds(self, model: Model = "linear") -> tuple[float, float]:
         """Accelerations (m/s^2) that lift the body off its stops: -a for the first, a for the second; or inf."""
-        _check_model(model)
+        _require_linear_model(model)
         stiffness, _, pull, low, high = self.law
         return pull - stiffness * low, stiffness * high - pull if math.isfinite(high) else math.inf
 
@@ -87,7 +87,7 @@ class LinearBody(ABC):
         """Return a `LinearBodies` that contains only this body."""
         return LinearBodies((self,))
 
-    def _check(self, *positive: str) -> None:
+    def _check_parameters(self, *positive: str) -> None:
         """Check the restitution and that the named parameters are positive, and convert numbers to floats."""
         for name in positive:
             object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, self.units[name]))
@@ -125,12 +125,16 @@ class LinearBodies:
     members: tuple[LinearBody, ...]
 
     def __init__(self, members: Sequence[LinearBody]) -> None:
-        given = tuple(members)
-        if not given or any(type(each) is not type(given[0]) for each in given) or not isinstance(given[0], LinearBody):
-            raise InvalidBlock("bodies of one of the kinds in rocking.dynamics are needed, all of the same kind")
-        if len({each.gravity for each in given}) > 1:
-            raise InvalidBlock("all bodies must be under one {}", "gravity")
-        object.__setattr__(self, "members", given)
+        bodies = tuple(members)
+        if (
+            not bodies
+            or any(type(body) is not type(bodies[0]) for body in bodies)
+            or not isinstance(bodies[0], LinearBody)
+        ):
+            raise InvalidBlock("members must be bodies of rocking.dynamics, all of the same kind")
+        if len({body.gravity for body in bodies}) > 1:
+            raise InvalidBlock("all bodies must have the same {}", "gravity")
+        object.__setattr__(self, "members", bodies)
 
     @property
     def kind(self) -> str:
@@ -145,17 +149,17 @@ class LinearBodies:
     @property
     def restitution(self) -> Floats:
         """Coefficients of restitution at the stops, shape (n, 2)."""
-        return self._pairs("restitution")
+        return self._repeat_for_stops("restitution")
 
     @property
     def stops(self) -> Floats:
         """Positions of the stops, m, shape (n, 2)."""
-        return np.array([each.stops for each in self.members])
+        return np.array([body.stops for body in self.members])
 
     @property
     def is_symmetric(self) -> bool:
         """Whether every body is between two stops at equal distances, without a pull."""
-        return all(law.pull == 0.0 and law.low == -law.high for law in (each.law for each in self.members))
+        return all(law.pull == 0.0 and law.low == -law.high for law in (body.law for body in self.members))
 
     def __len__(self) -> int:
         return len(self.members)
@@ -171,37 +175,39 @@ class LinearBodies:
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         names = [entry.name for entry in fields(self.members[0]) if entry.name != "gravity"]
-        return {name: (self._pairs(name), self.members[0].units[name] or "1") for name in names}
+        return {name: (self._repeat_for_stops(name), self.members[0].units[name] or "1") for name in names}
 
     def speed_thresholds(self, share: float) -> Floats:
         return np.full((len(self), 2), share)  # these bodies have no natural speed
 
     def kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
-        _check_model(model)
-        made = state.new_records(len(self), state.BLOCK)
-        laws = np.array([each.law for each in self.members])
-        facing = np.isfinite(laws[:, 4])
-        made["stiffness"] = laws[:, :1]
-        made["damping"] = laws[:, 1:2]
-        made["restrained"] = laws[:, 1] > 0.0
-        made["threshold_slope"] = self.gravity
-        made["threshold"] = np.array([each.uplift_thresholds() for each in self.members]) / self.gravity
-        made["restitution"] = self.restitution
-        made["two_stops"] = facing
-        made["next_side"][:, 1] = facing
-        made["overturn_angle"] = laws[:, 4] - laws[:, 3]
-        made["rest_limit"] = thresholds
-        return made
+        _require_linear_model(model)
+        records = state.new_records(len(self), state.BLOCK)
+        laws = np.array([body.law for body in self.members])
+        two_stops = np.isfinite(laws[:, 4])
+        records["stiffness"] = laws[:, :1]
+        records["damping"] = laws[:, 1:2]
+        records["restrained"] = laws[:, 1] > 0.0
+        records["threshold_slope"] = self.gravity
+        records["threshold"] = np.array([body.uplift_thresholds() for body in self.members]) / self.gravity
+        records["restitution"] = self.restitution
+        records["two_stops"] = two_stops
+        records["next_side"][:, 1] = two_stops
+        records["overturn_angle"] = laws[:, 4] - laws[:, 3]
+        records["rest_limit"] = thresholds
+        return records
 
-    def _pairs(self, name: str) -> Floats:
-        values = [getattr(each, name) for each in self.members]
+    def _repeat_for_stops(self, name: str) -> Floats:
+        values = [getattr(body, name) for body in self.members]
         return np.repeat(np.array([math.nan if value is None else value for value in values])[:, None], 2, axis=1)
 
 
-def _check_model(model: Model) -> None:
+def _require_linear_model(model: Model) -> None:
     if model != "linear":
-        advice = 'call rocking.dynamics.simulate, or give {} "linear"'
-        raise InvalidOption(f"a body of rocking.dynamics moves by linear equations: {advice}", "model", value=model)
+        advice = 'call rocking.dynamics.simulate, or set {} to "linear"'
+        raise InvalidOption(
+            f"bodies of rocking.dynamics have linear equations of motion: {advice}", "model", value=model
+        )
 
 
 @dataclass(frozen=True)
@@ -228,8 +234,7 @@ class BouncingBall(LinearBody):
 
     References
     ----------
-    J. M. Luck and A. Mehta, "Bouncing ball with a finite restitution: chattering, locking, and chaos", Physical Review
-    E 48 (1993).
+    :cite:t:`luck1993`, "Bouncing ball with a finite restitution: chattering, locking, and chaos".
 
     Examples
     --------
@@ -246,7 +251,7 @@ class BouncingBall(LinearBody):
     gravity: float = STANDARD_GRAVITY
 
     def __post_init__(self) -> None:
-        self._check("gravity")
+        self._check_parameters("gravity")
 
     @property
     def law(self) -> Law:
@@ -281,9 +286,8 @@ class ImpactOscillator(LinearBody):
 
     References
     ----------
-    S. W. Shaw and P. J. Holmes, "A periodically forced piecewise linear oscillator", Journal of Sound and Vibration 90
-    (1983). C. Budd and F. Dux, "Chattering and related behaviour in impact oscillators", Philosophical Transactions of
-    the Royal Society A 347 (1994).
+    :cite:t:`shaw1983`, "A periodically forced piecewise linear oscillator". :cite:t:`budd1994`, "Chattering and related
+    behaviour in impact oscillators".
 
     Examples
     --------
@@ -307,7 +311,7 @@ class ImpactOscillator(LinearBody):
     second_stop: float | None = None
 
     def __post_init__(self) -> None:
-        self._check("frequency")
+        self._check_parameters("frequency")
         damping = checks.finite(self.damping_ratio, "damping_ratio", InvalidBlock)
         if not 0.0 <= damping < 1.0:
             raise InvalidBlock(f"{{}} must be at least 0 and below 1, not {damping:g}", "damping_ratio", value=damping)
@@ -348,8 +352,7 @@ class InvertedPendulum(LinearBody):
 
     References
     ----------
-    S. W. Shaw and R. H. Rand, "The transition to chaos in a simple mechanical system", International Journal of
-    Non-Linear Mechanics 24 (1989).
+    :cite:t:`shaw1989`, "The transition to chaos in a simple mechanical system".
 
     Examples
     --------
@@ -368,7 +371,7 @@ class InvertedPendulum(LinearBody):
     restitution: float
 
     def __post_init__(self) -> None:
-        self._check("p", "gap")
+        self._check_parameters("p", "gap")
 
     @property
     def law(self) -> Law:
@@ -376,22 +379,22 @@ class InvertedPendulum(LinearBody):
         return Law(self.p * self.p, 0.0, 0.0, -self.gap, self.gap)
 
 
-class _MakerOfKind(NamedTuple):
-    """Functions that create bodies of a kind from `LinearBodies.parameters`, and collect single bodies."""
+class _BodyFactory(NamedTuple):
+    """Function that creates bodies of one kind from `LinearBodies.parameters`."""
 
-    made: type[LinearBody]
+    body_class: type[LinearBody]
 
     def __call__(self, *, gravity: float, **parameters: Any) -> LinearBodies:
-        own = {"gravity": gravity} if self.made is BouncingBall else {}
+        gravity_argument = {"gravity": gravity} if self.body_class is BouncingBall else {}
         rows = zip(*(values[:, 0].tolist() for values in parameters.values()), strict=True)
-        given = ({k: None if math.isnan(v) else v for k, v in zip(parameters, row, strict=True)} for row in rows)
-        return LinearBodies([self.made(**each, **own) for each in given])
+        arguments = ({k: None if math.isnan(v) else v for k, v in zip(parameters, row, strict=True)} for row in rows)
+        return LinearBodies([self.body_class(**body_arguments, **gravity_argument) for body_arguments in arguments])
 
     def from_bodies(self, bodies: Iterable[LinearBody], /) -> LinearBodies:
         return LinearBodies([*bodies])
 
 
-KINDS.update({made.kind: _MakerOfKind(made) for made in (BouncingBall, ImpactOscillator, InvertedPendulum)})
+KINDS.update({cls.kind: _BodyFactory(cls) for cls in (BouncingBall, ImpactOscillator, InvertedPendulum)})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -426,7 +429,7 @@ class Response(rocking.response.Response):
         return unwrap_scalar(self.states(time)[..., 1])
 
 
-def in_positions(response: rocking.response.Response) -> Response:
+def convert_to_positions(response: rocking.response.Response) -> Response:
     """Convert the response of a body between stops to positions."""
     return Response(**{entry.name: getattr(response, entry.name) for entry in fields(response)})
 
@@ -482,13 +485,13 @@ def simulate(
     >>> f"{response.events['time'][0]:.12f}"
     '1.800000000000'
     """
-    body, motion = _one_body(body), check_motion(motion)
-    until = _duration(body, motion, duration)
-    at = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
-    return in_positions(response_to(body, motion, "linear", chattering, until, (at, initial_velocity)))
+    body, motion = _require_linear_body(body), check_motion(motion)
+    end_time = _choose_duration(body, motion, duration)
+    position = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
+    return convert_to_positions(response_to(body, motion, "linear", chattering, end_time, (position, initial_velocity)))
 
 
-def _one_body(body: object) -> LinearBody:
+def _require_linear_body(body: object) -> LinearBody:
     if not isinstance(body, LinearBody):
         raise InvalidBlock(
             "a BouncingBall, ImpactOscillator or InvertedPendulum of rocking.dynamics is needed, not "
@@ -498,24 +501,22 @@ def _one_body(body: object) -> LinearBody:
 
 
 def _is_pressed(body: LinearBody) -> bool:
-    """Whether the body, while nothing moves, is pressed against one of its stops."""
+    """Whether the body is pressed against one of its stops while its support is at rest."""
     low, high = body.uplift_thresholds()
     return low > 0.0 or 0.0 < high < np.inf
 
 
-def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
-    """Return the duration: the given one, otherwise until rest, or of the motion if the body need not come to rest."""
+def _choose_duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
+    """Return the requested duration, otherwise None (until rest), or that of the motion if the body need not rest."""
     if duration is not None:
         return duration
     if not _is_pressed(body):
         if motion is None:
-            raise InvalidOption(
-                "nothing presses this body against a stop, so that it need not rest; give {}", "duration"
-            )
+            raise InvalidOption("this body is not pressed against a stop and may never rest; specify {}", "duration")
         return motion.end
     if never_rests(body.alone()):
         raise InvalidOption(
-            f"a body with {{}} 1, as this {body.description}, never comes to rest; give {{}} to say when to stop",
+            f"a body with {{}} 1, as this {body.description}, never comes to rest; specify {{}}",
             *("restitution", "duration"),
         )
     return None

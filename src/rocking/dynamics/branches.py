@@ -17,7 +17,7 @@ from rocking.core.constants import Model
 from rocking.core.result import Result
 from rocking.core.tables import Column, add_unit, escape_dollars, format_cell, format_count, format_table
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, peak_of, sizes_of
+from rocking.dynamics.orbits import PeriodicOrbit, compute_moduli, compute_peak, create_orbit
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
 
 FOLD: Final = "fold"
 FLIP: Final = "flip"
-SYMMETRY: Final = "symmetry breaking"
-BRANCHES: Final = "branch point"
+SYMMETRY_BREAKING: Final = "symmetry breaking"
+BRANCH_POINT: Final = "branch point"
 GRAZING: Final = "grazing"
-CHATTERING: Final = "loss of complete chattering"
-REST: Final = "start of rest"
+LOSS_OF_CHATTERING: Final = "loss of complete chattering"
+START_OF_REST: Final = "start of rest"
 UPLIFT: Final = "uplift"
 OVERTURNING: Final = "overturning"
 
 #: Ends of a branch without a bifurcation.
 LIMIT: Final = "limit of the parameter"
 CLOSED: Final = "where it began"
-SHORT: Final = "too many points"
+TOO_MANY_POINTS: Final = "too many points"
 LOST: Final = "lost"
 
 
@@ -126,7 +126,7 @@ class Branch(Result):
     @property
     def is_stable(self) -> Flags:
         """Whether the orbit at each point is stable, shape (n,)."""
-        return np.asarray(np.all(sizes_of(self.multipliers) < 1.0, axis=1))
+        return np.asarray(np.all(compute_moduli(self.multipliers) < 1.0, axis=1))
 
     def __len__(self) -> int:
         return len(self.values)
@@ -135,7 +135,7 @@ class Branch(Result):
         """Return the orbit at a point of the branch, with its multipliers."""
         index = checks.integer(index, "index", InvalidOption, minimum=-len(self), maximum=len(self) - 1)
         body, motion = self.family(float(self.values[index]))
-        return orbit_at(StroboscopicMap(body, motion, self.model, self.chattering), self.states[index], self.period)
+        return create_orbit(StroboscopicMap(body, motion, self.model, self.chattering), self.states[index], self.period)
 
     def _headline(self) -> str:
         impacts = "complete chattering" if math.isinf(self.impacts) else format_count(int(self.impacts), "impact")
@@ -149,7 +149,10 @@ class Branch(Result):
         lines = [self._headline(), f"{len(self)} points, {int(np.sum(stable))} of them stable"]
         if self.bifurcations:
             header = ["bifurcation", add_unit(self.name, self.unit), "multipliers"]
-            rows = [[each.kind, f"{each.value:.12g}", _written(each.orbit.multipliers)] for each in self.bifurcations]
+            rows = [
+                [point.kind, f"{point.value:.12g}", _format_multipliers(point.orbit.multipliers)]
+                for point in self.bifurcations
+            ]
             lines += ["", format_table(header, rows)]
         return "\n".join([*lines, "", f"ends: {self.ends[0]}; {self.ends[1]}"])
 
@@ -165,20 +168,20 @@ class Branch(Result):
             "stable": self.is_stable,
             "peaks": self.peaks,
             "bifurcations": [
-                {"kind": each.kind, "value": each.value, "bracket": [*each.bracket]} for each in self.bifurcations
+                {"kind": point.kind, "value": point.value, "bracket": [*point.bracket]} for point in self.bifurcations
             ],
             "ends": [*self.ends],
         }
 
     def _columns(self, table: str) -> list[Column]:
         if table == "bifurcations":
-            parameter, each = add_unit(self.name, self.unit), self.bifurcations
+            parameter, bifurcations = add_unit(self.name, self.unit), self.bifurcations
             return [
-                Column("kind", [one.kind for one in each]),
-                Column(parameter, [one.value for one in each]),
+                Column("kind", [point.kind for point in bifurcations]),
+                Column(parameter, [point.value for point in bifurcations]),
                 *(
-                    Column(f"{parameter}_{end}", [one.bracket[k] for one in each])
-                    for k, end in enumerate(("lower", "upper"))
+                    Column(f"{parameter}_{bound}", [point.bracket[k] for point in bifurcations])
+                    for k, bound in enumerate(("lower", "upper"))
                 ),
             ]
         coordinate = self.family(float(self.values[0]))[0].coordinate
@@ -211,32 +214,38 @@ class Branch(Result):
         body, _ = self.family(float(self.values[0]))
         coordinate, branches = body.coordinate, [self, *others]
         unit = "" if self.unit == "1" else f" ({self.unit.replace('^2', '²')})"
-        # Between two stops that are hit, this is always a stop.
-        peaks = np.concatenate([each.peaks for each in branches])
-        places = [at for each in branches for at in each.bifurcations]
-        flat = float(np.ptp(peaks)) <= 1e-9 * float(np.max(peaks))
-        what = f"{coordinate.name} at the start of a period" if flat else f"largest {coordinate.name}"
-        periods = ", ".join(str(each) for each in sorted({each.period for each in branches}))
+        # The peak is constant if the body hits two stops.
+        peaks = np.concatenate([branch.peaks for branch in branches])
+        bifurcations = [point for branch in branches for point in branch.bifurcations]
+        has_constant_peak = float(np.ptp(peaks)) <= 1e-9 * float(np.max(peaks))
+        quantity = f"{coordinate.name} at the start of a period" if has_constant_peak else f"largest {coordinate.name}"
+        periods = ", ".join(str(period) for period in sorted({branch.period for branch in branches}))
         headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
         return branch_figure(
-            values=_apart([each.values for each in branches]),
-            heights=_apart([each.states[:, 0] if flat else each.peaks for each in branches]),
-            stable=_apart([each.is_stable for each in branches]) == 1.0,
+            values=_join_with_gaps([branch.values for branch in branches]),
+            heights=_join_with_gaps(
+                [branch.states[:, 0] if has_constant_peak else branch.peaks for branch in branches]
+            ),
+            stable=_join_with_gaps([branch.is_stable for branch in branches]) == 1.0,
             marks=[
-                (each.kind, each.value, float(each.orbit.state[0]) if flat else peak_of(each.orbit.response))
-                for each in places
+                (
+                    point.kind,
+                    point.value,
+                    float(point.orbit.state[0]) if has_constant_peak else compute_peak(point.orbit.response),
+                )
+                for point in bifurcations
             ],
-            labels=(f"{self.name}{unit}", f"{what} ({coordinate.unit})"),
+            labels=(f"{self.name}{unit}", f"{quantity} ({coordinate.unit})"),
             title=title or escape_dollars(f"{body.description}, {headline.replace('^2', '²')}"),
             ax=ax,
             figsize=figsize,
         )
 
 
-def _apart(lines: Sequence[NDArray[Any]]) -> Floats:
-    """Join lines with a NaN between them, at which a plotted line is interrupted."""
+def _join_with_gaps(lines: Sequence[NDArray[Any]]) -> Floats:
+    """Join lines with a NaN between them, which interrupts the plotted line."""
     return np.concatenate([np.append(np.asarray(line, dtype=np.float64), np.nan) for line in lines])[:-1]
 
 
-def _written(multipliers: NDArray[np.complex128]) -> str:
-    return ", ".join(format_cell(float(each.real)) if each.imag == 0.0 else f"{each:.5g}" for each in multipliers)
+def _format_multipliers(multipliers: NDArray[np.complex128]) -> str:
+    return ", ".join(format_cell(float(value.real)) if value.imag == 0.0 else f"{value:.5g}" for value in multipliers)

@@ -15,25 +15,36 @@ import numpy as np
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.dynamics import branches as ends
+from rocking.dynamics import branches
 from rocking.dynamics.branches import Bifurcation, Branch
-from rocking.dynamics.maps import are_halved, distances, is_mirrored
-from rocking.dynamics.orbit_equations import AT_VALUE, DIFFERENCE, OrbitEquations, Solved, Tests, at_zero, tangent_of
+from rocking.dynamics.maps import compute_distances, has_mirror_symmetry, have_opposite_breakpoints
+from rocking.dynamics.orbit_equations import (
+    MAX_DIFFERENCE,
+    PARAMETER_AXIS,
+    BranchPoint,
+    OrbitEquations,
+    TestFunctions,
+    compute_tangent,
+    interpolate_at_zero,
+)
 from rocking.dynamics.orbits import PeriodicOrbit
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 
-#: Smallest cosine between tangents, and largest distance from the tangent, relative to the step (twice that of such a
-#: bend).
-_COSINE: Final = 0.97
-_ASIDE: Final = 0.25
+#: Smallest cosine between the tangents of consecutive points.
+_MIN_COSINE: Final = 0.97
 
-#: Step below which the branch ends, and steps beyond the end at which the kind of orbits is examined.
-_LEAST_STEP: Final = 1e-13
-_BEYOND: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
+#: Largest distance from the tangent, relative to the step (twice the distance of a bend with the smallest cosine).
+_MAX_OFFSET: Final = 0.25
+
+#: Step below which the branch ends.
+_MIN_STEP: Final = 1e-13
+
+#: Distances beyond the end at which the kind of orbit is examined.
+_STEPS_BEYOND_END: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
 
 #: Fractions of the parameter range that are searched for the orbits from which a branch bifurcates.
-_WIDER: Final = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+_SEARCH_FRACTIONS: Final = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 
 def continue_orbit(
@@ -95,8 +106,7 @@ def continue_orbit(
 
     References
     ----------
-    H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems", in Applications of Bifurcation
-    Theory, Academic Press (1977).
+    :cite:t:`keller1977`, "Numerical solution of bifurcation and nonlinear eigenvalue problems".
 
     Examples
     --------
@@ -104,27 +114,27 @@ def continue_orbit(
     >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
     >>> def family(amplitude):
     ...     return ball, pulses.sine(amplitude, 5.0, cycles=1)
-    >>> stable = next(each for each in dynamics.periodic_orbits(*family(12.0)) if each.is_stable)
+    >>> stable = next(orbit for orbit in dynamics.periodic_orbits(*family(12.0)) if orbit.is_stable)
     >>> branch = dynamics.continue_orbit(stable, family, 12.0, (9.0, 16.0))
-    >>> for each in branch.bifurcations:
-    ...     print(f"{each.kind} {each.value:.8f}")
+    >>> for bifurcation in branch.bifurcations:
+    ...     print(f"{bifurcation.kind} {bifurcation.value:.8f}")
     fold 10.47197551
     flip 15.26823701
     """
     if not isinstance(orbit, PeriodicOrbit):
-        raise InvalidOption("{} must be one of those that periodic_orbits returns", "orbit", value=orbit)
+        raise InvalidOption("{} must be a PeriodicOrbit, as periodic_orbits returns", "orbit", value=orbit)
     low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
     start = checks.between(value, "value", InvalidOption, low, high)
-    longest = checks.positive(step, "step", InvalidOption)
-    count = checks.integer(max_points, "max_points", InvalidOption, minimum=1)
+    max_step = checks.positive(step, "step", InvalidOption)
+    n_points = checks.integer(max_points, "max_points", InvalidOption, minimum=1)
     equations = OrbitEquations.from_orbit(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
-    backward, forward = (_Walk(equations, z, direction, longest) for direction in (-1.0, 1.0))
-    backward.run(count)
-    if backward.end == ends.CLOSED:  # a closed branch is complete
-        forward.end = ends.CLOSED
+    backward, forward = (_BranchWalk(equations, z, direction, max_step) for direction in (-1.0, 1.0))
+    backward.follow(n_points)
+    if backward.end == branches.CLOSED:  # a closed branch is complete
+        forward.end = branches.CLOSED
     else:
-        forward.run(count)
+        forward.follow(n_points)
     points = [*reversed(backward.points), *forward.points[1:]]
     values, states, multipliers, peaks = (np.array(column) for column in zip(*points, strict=True))
     return Branch(
@@ -133,176 +143,193 @@ def continue_orbit(
     )  # fmt: skip
 
 
-class _Walk:
+class _BranchWalk:
     """Continuation of a branch in one direction of the parameter: points, current position and next step."""
 
-    def __init__(self, equations: OrbitEquations, z: Floats, direction: float, longest: float) -> None:
+    def __init__(self, equations: OrbitEquations, z: Floats, direction: float, max_step: float) -> None:
         self.equations, self.z = equations, z
-        self.direction, self.step, self.longest = direction, min(0.005, longest), longest
-        self.response = equations.response(z)
-        self.points = [equations.point(z, self.response)]
+        self.direction, self.step, self.max_step = direction, min(0.005, max_step), max_step
+        self.response = equations.simulate_period(z)
+        self.points = [equations.evaluate_point(z, self.response)]
         self.bifurcations: list[Bifurcation] = []
-        self.end = ends.SHORT
-        #: Distance ahead at which there is no known point of this kind, and number of successful steps since.
-        self.ahead, self.successes = math.inf, 0
-        #: Whether the last step failed only because of its distance from the tangent.
-        self.turned = False
+        self.end = branches.TOO_MANY_POINTS
+        #: Length of the last failed step, less later steps, and number of later successful steps.
+        self.distance_to_end, self.successes = math.inf, 0
+        #: Whether the last step failed only because of a bend of the branch.
+        self.is_bent = False
         #: Speed of the slowest impact, and scaled parameter, at all points so far.
-        self.slowest: list[tuple[float, float]] = []
+        self.slowest_impacts: list[tuple[float, float]] = []
 
-    def run(self, most: int) -> None:
+    def follow(self, max_points: int) -> None:
         """Follow the branch over a number of points, or to its end."""
         if self.points[0][0] == self.equations.bounds[0 if self.direction < 0.0 else 1]:
-            self.end = ends.LIMIT
+            self.end = branches.LIMIT
             return
-        found = self.equations.solved(self.z, AT_VALUE)
-        if found is None:
-            self.end = ends.LOST
+        solution = self.equations.solve(self.z, PARAMETER_AXIS)
+        if solution is None:
+            self.end = branches.LOST
             return
-        self.go_to(found, self.direction * AT_VALUE)
-        self.written = self.z
-        self.move_start()
-        for _ in range(4 * most):  # some steps fail
-            # Keeps most differences by the parameter within the branch.
-            self.equations.difference = min(max(1e-3 * self.step, 1e-13), DIFFERENCE)
-            if len(self.points) >= most:
+        self.move_to(solution, self.direction * PARAMETER_AXIS)
+        self.last_recorded = self.z
+        self.shift_start()
+        for _ in range(4 * max_points):  # some steps fail
+            # Small differences of the parameter remain on the branch.
+            self.equations.difference = min(max(1e-3 * self.step, 1e-13), MAX_DIFFERENCE)
+            if len(self.points) >= max_points:
                 break
-            if end := self.advance():
+            if end := self.take_step():
                 self.end = end
                 break
 
-    def go_to(self, found: Solved, like: Floats) -> None:
-        """Move to a point, with its tangent in the direction of another."""
-        self.z, self.tangent = found.z, tangent_of(found.jacobian, like)
-        self.tests = found.tests(self.tangent)
+    def move_to(self, solution: BranchPoint, previous_tangent: Floats) -> None:
+        """Move to a point, with its tangent oriented like the previous one."""
+        self.z, self.tangent = solution.z, compute_tangent(solution.jacobian, previous_tangent)
+        self.tests = solution.compute_tests(self.tangent)
 
-    def advance(self) -> str:
+    def take_step(self) -> str:
         """Take a step along the branch or shorten it, and return the reason if the branch ends."""
         equations = self.equations
-        if self.ahead < _LEAST_STEP:
-            reason = self.reason_of_end()
-            values = [(self.z + step * self.tangent)[2] for step in (0.0, self.ahead)]
-            self.bifurcations += [] if reason == ends.LOST else [equations.bifurcation(reason, self.z, values)]
+        if self.distance_to_end < _MIN_STEP:
+            reason = self.find_reason_of_end()
+            values = [(self.z + step * self.tangent)[2] for step in (0.0, self.distance_to_end)]
+            self.bifurcations += (
+                [] if reason == branches.LOST else [equations.create_bifurcation(reason, self.z, values)]
+            )
             return reason
-        found = self.next()
-        if found is None:
+        result = self.try_step()
+        if result is None:
             self.shorten()
             return ""
-        solved, at_limit = found
-        new, tests = solved.z, solved.tests(tangent_of(solved.jacobian, self.tangent))
-        if self.turns(tests) or equations.is_parent(new):
-            self.bifurcations.append(self.joined(new))
+        point, at_limit = result
+        z, tests = point.z, point.compute_tests(compute_tangent(point.jacobian, self.tangent))
+        if self.turns_without_fold(tests) or equations.is_parent(z):
+            self.bifurcations.append(self.locate_junction(z))
             return self.bifurcations[-1].kind
-        self.pass_bifurcations(new, tests)
-        self.response = equations.response(new)
+        self.add_bifurcations(z, tests)
+        self.response = equations.simulate_period(z)
         # A point this close replaces the previous one.
-        if len(self.points) > 1 and np.max(np.abs(new - self.written)) < 1e-5:
+        if len(self.points) > 1 and np.max(np.abs(z - self.last_recorded)) < 1e-5:
             self.points.pop()
         else:
-            self.written = new
-        self.points.append(equations.point(new, self.response))
-        self.go_to(solved, self.tangent)
+            self.last_recorded = z
+        self.points.append(equations.evaluate_point(z, self.response))
+        self.move_to(point, self.tangent)
         self.successes += 1
-        self.ahead = math.inf if self.successes > 5 else self.ahead - self.step
+        self.distance_to_end = math.inf if self.successes > 5 else self.distance_to_end - self.step
         if at_limit:
-            return ends.LIMIT
-        if grazing := self.vanishing():
+            return branches.LIMIT
+        if grazing := self.extrapolate_grazing():
             self.bifurcations.append(grazing)
-            return ends.GRAZING
+            return branches.GRAZING
         if len(self.points) > 12 and self.has_returned():
-            return ends.CLOSED
-        self.move_start()
-        if self.ahead < math.inf:
-            self.step = 0.5 * self.ahead
-        elif solved.steps <= 4:
-            self.step = min(self.step * 1.4, self.longest)
+            return branches.CLOSED
+        self.shift_start()
+        if self.distance_to_end < math.inf:
+            self.step = 0.5 * self.distance_to_end
+        elif point.steps <= 4:
+            self.step = min(self.step * 1.4, self.max_step)
         return ""
 
     def shorten(self) -> None:
-        """Halve a step that failed; no point of this kind is at its end, unless the branch bends."""
-        # With a longer step the branch bends, or the point belongs to another branch.
-        if not (self.turned and self.step > 1e-3):
-            self.ahead, self.successes = self.step, 0
+        """Halve a step that failed, and record its length unless the branch bends."""
+        # After a longer step a distant point may belong to another branch.
+        if not (self.is_bent and self.step > 1e-3):
+            self.distance_to_end, self.successes = self.step, 0
         self.step *= 0.5
-        _, jacobian = self.equations.at(self.z)
+        _, jacobian = self.equations.compute_residual(self.z)
         if np.all(np.isfinite(jacobian)):
-            self.tangent = tangent_of(jacobian, self.tangent)
+            self.tangent = compute_tangent(jacobian, self.tangent)
 
-    def next(self) -> tuple[Solved, bool] | None:
-        """Return the next point, if a step leads to one of the same kind, and whether the point is at a limit."""
-        equations, z, tangent, self.turned = self.equations, self.z, self.tangent, False
+    def try_step(self) -> tuple[BranchPoint, bool] | None:
+        """Return the next point and whether it is at a bound; None if the step does not reach an orbit of this kind."""
+        equations, z, tangent, self.is_bent = self.equations, self.z, self.tangent, False
         guess = z + self.step * tangent
-        found = equations.solved(guess, tangent)
-        new = guess if found is None else found.z  # beyond a limit the body or the motion may not exist
-        low, high = (each / equations.sizes[2] for each in equations.bounds)
-        at_limit = not low <= new[2] <= high
+        point = equations.solve(guess, tangent)
+        new_z = guess if point is None else point.z  # beyond a limit the body or the motion may not exist
+        low, high = (bound / equations.sizes[2] for bound in equations.bounds)
+        at_limit = not low <= new_z[2] <= high
         if at_limit:
-            wanted = low if new[2] < low else high
-            guess = z + (wanted - z[2]) / (new[2] - z[2]) * (new - z)
-            guess[2] = wanted
-            found = equations.solved(guess, AT_VALUE)
-        if found is None:
+            limit = low if new_z[2] < low else high
+            guess = z + (limit - z[2]) / (new_z[2] - z[2]) * (new_z - z)
+            guess[2] = limit
+            point = equations.solve(guess, PARAMETER_AXIS)
+        if point is None:
             return None
-        onwards = tangent_of(found.jacobian, tangent)
+        new_tangent = compute_tangent(point.jacobian, tangent)
         # A point far from the prediction belongs to another branch.
-        self.turned = bool(np.linalg.norm(found.z - guess) > _ASIDE * self.step or onwards @ tangent < _COSINE)
-        if self.turned:
+        self.is_bent = bool(
+            np.linalg.norm(point.z - guess) > _MAX_OFFSET * self.step or new_tangent @ tangent < _MIN_COSINE
+        )
+        if self.is_bent:
             return None
-        before, after = self.tests, found.tests(onwards)
-        if before.at_one * after.at_one < 0.0 and before.at_minus_one * after.at_minus_one < 0.0:
+        tests, new_tests = self.tests, point.compute_tests(new_tangent)
+        if (
+            tests.multiplier_one * new_tests.multiplier_one < 0.0
+            and tests.multiplier_minus_one * new_tests.multiplier_minus_one < 0.0
+        ):
             return None  # A multiplier passes 1 and -1, or changes sign through infinity at a grazing impact.
-        if self.turns(after) and max(abs(before.at_one), abs(after.at_one)) > 0.05:
-            return None  # Too far from a turn, or the difference by the parameter extends past an end.
-        return (found, at_limit) if equations.kind_at(found.z) == equations.kind else None
+        if self.turns_without_fold(new_tests) and max(abs(tests.multiplier_one), abs(new_tests.multiplier_one)) > 0.05:
+            return None  # The turn is too far away, or a difference of the parameter extends past an end.
+        return (point, at_limit) if equations.find_kind(point.z) == equations.kind else None
 
-    def turns(self, after: Tests) -> bool:
+    def turns_without_fold(self, tests: TestFunctions) -> bool:
         """Whether the parameter turns before a point although no multiplier passes 1.
 
-        There the branch meets orbits of half the period, or symmetric ones. The same orbits follow, shifted or
-        mirrored.
+        At such a turn the branch meets orbits of half the period, or symmetric ones, and then repeats its own orbits,
+        shifted or mirrored.
         """
-        return self.tests.onwards * after.onwards < 0.0 < self.tests.at_one * after.at_one
+        return self.tests.parameter_rate * tests.parameter_rate < 0.0 < self.tests.multiplier_one * tests.multiplier_one
 
-    def pass_bifurcations(self, new: Floats, tests: Tests) -> None:
-        """Add the bifurcations between this point and the next at which the branch continues."""
-        turns, length = self.tests.onwards * tests.onwards < 0.0, float(self.tangent @ (new - self.z))
-        at_minus_one = ends.SYMMETRY if self.equations.by_half else ends.FLIP
-        for k, kind in enumerate((ends.FOLD if turns else ends.BRANCHES, at_minus_one)):
+    def add_bifurcations(self, z: Floats, tests: TestFunctions) -> None:
+        """Add the bifurcations between this point and the next that do not end the branch."""
+        turns, length = self.tests.parameter_rate * tests.parameter_rate < 0.0, float(self.tangent @ (z - self.z))
+        at_minus_one = branches.SYMMETRY_BREAKING if self.equations.uses_half_map else branches.FLIP
+        for k, kind in enumerate((branches.FOLD if turns else branches.BRANCH_POINT, at_minus_one)):
             if self.tests[k] * tests[k] < 0.0:
-                there = self.equations.located(kind, self.z, self.tangent, length, k)
-                self.bifurcations += [] if there is None else [there]
+                bifurcation = self.equations.locate_bifurcation(kind, self.z, self.tangent, length, k)
+                self.bifurcations += [] if bifurcation is None else [bifurcation]
 
-    def joined(self, new: Floats) -> Bifurcation:
-        """Locate, between two points, where the branch meets orbits of half the period, or symmetric orbits."""
-        equations, middle = self.equations, 0.5 * (self.z + new)
-        even = equations.period % 2 == 0
-        parent = replace(equations, period=equations.period // 2 if even else equations.period, by_half=not even)
-        kind = ends.FLIP if even else ends.SYMMETRY
-        for share in _WIDER if even or is_mirrored(equations.strobe(equations.physical(middle)[1])) else ():
-            if found := parent.located(kind, middle - share * AT_VALUE, AT_VALUE, 2.0 * share, 1):
-                return found
-        return equations.bifurcation(ends.BRANCHES, middle, [self.z[2], new[2]])
+    def locate_junction(self, z: Floats) -> Bifurcation:
+        """Locate the point at which the branch meets orbits of half the period, or symmetric orbits."""
+        equations, middle = self.equations, 0.5 * (self.z + z)
+        is_even = equations.period % 2 == 0
+        parent = replace(
+            equations, period=equations.period // 2 if is_even else equations.period, uses_half_map=not is_even
+        )
+        kind = branches.FLIP if is_even else branches.SYMMETRY_BREAKING
+        for fraction in (
+            _SEARCH_FRACTIONS
+            if is_even or has_mirror_symmetry(equations.create_map(equations.to_physical(middle)[1]))
+            else ()
+        ):
+            if bifurcation := parent.locate_bifurcation(
+                kind, middle - fraction * PARAMETER_AXIS, PARAMETER_AXIS, 2.0 * fraction, 1
+            ):
+                return bifurcation
+        return equations.create_bifurcation(branches.BRANCH_POINT, middle, [self.z[2], z[2]])
 
-    def vanishing(self) -> Bifurcation | None:
-        """Extrapolate to the grazing at zero speed of the slowest impact, where the equations are singular."""
+    def extrapolate_grazing(self) -> Bifurcation | None:
+        """Extrapolate the speed of the slowest impact to zero (grazing), where the equations are singular."""
         speed, equations = float(np.min(self.response.impacts["speed_before"], initial=math.inf)), self.equations
-        self.slowest.append((speed, self.z[2]))
+        self.slowest_impacts.append((speed, self.z[2]))
         if equations.kind.rests or speed >= 2e-3 * equations.sizes[1]:
             return None
-        chosen: list[tuple[float, float]] = []
-        for each in reversed(self.slowest):
-            if len(chosen) == 6 or (chosen and each[0] < chosen[-1][0]):
+        fitted: list[tuple[float, float]] = []
+        for impact in reversed(self.slowest_impacts):
+            if len(fitted) == 6 or (fitted and impact[0] < fitted[-1][0]):
                 break
-            if not chosen or each[0] >= chosen[-1][0] + speed:
-                chosen.append(each)
-        if len(chosen) < 4:
+            if not fitted or impact[0] >= fitted[-1][0] + speed:
+                fitted.append(impact)
+        if len(fitted) < 4:
             return None
-        speeds, values = zip(*chosen, strict=True)
-        estimates = [at_zero(speeds[:most], values[:most]) for most in range(len(chosen) - 2, len(chosen) + 1)]
+        speeds, values = zip(*fitted, strict=True)
+        estimates = [
+            interpolate_at_zero(speeds[:count], values[:count]) for count in range(len(fitted) - 2, len(fitted) + 1)
+        ]
         if abs(estimates[-1] - estimates[-2]) > 1e-6:
             return None
-        found = equations.bifurcation(ends.GRAZING, self.z, estimates)
-        return found._replace(value=float(estimates[-1] * equations.sizes[2]))
+        bifurcation = equations.create_bifurcation(branches.GRAZING, self.z, estimates)
+        return bifurcation._replace(value=float(estimates[-1] * equations.sizes[2]))
 
     def has_returned(self) -> bool:
         """Whether the branch has returned to its first point in its initial direction."""
@@ -312,50 +339,50 @@ class _Walk:
         near = np.linalg.norm(last - first) < np.linalg.norm(last - before)
         return bool(near and (last - before) @ (second - first) > 0.0)
 
-    def move_start(self) -> None:
+    def shift_start(self) -> None:
         """Move the start of the period to another breakpoint of the motion if an impact is close to it."""
         equations = self.equations
-        _, motion = equations.family(equations.physical(self.z)[1])
+        _, motion = equations.family(equations.to_physical(self.z)[1])
         starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
         phases = np.mod(self.response.impacts["time"] + starts[equations.shift], period)
         if not len(phases):
             return
-        nearest = distances(starts, phases, period)
-        if equations.by_half:  # the map of half a period ends at a breakpoint, too
-            nearest[~are_halved(motion)] = -1.0
-        best = int(np.argmax(nearest))
-        if nearest[equations.shift] > 0.03 * period or nearest[best] <= nearest[equations.shift]:
+        nearest = compute_distances(starts, phases, period)
+        if equations.uses_half_map:  # the map of half a period ends at a breakpoint, too
+            nearest[~have_opposite_breakpoints(motion)] = -1.0
+        new_shift = int(np.argmax(nearest))
+        if nearest[equations.shift] > 0.03 * period or nearest[new_shift] <= nearest[equations.shift]:
             return
-        moved = replace(equations, shift=best)
+        shifted = replace(equations, shift=new_shift)
         # At a fold not the parameter but the response slightly ahead determines the direction.
         z, ahead = (
-            np.append(equations.state(each, best), equations.physical(each)[1]) / equations.sizes
-            for each in (self.z, self.z + 1e-6 * self.tangent)
+            np.append(equations.compute_state(point, new_shift), equations.to_physical(point)[1]) / equations.sizes
+            for point in (self.z, self.z + 1e-6 * self.tangent)
         )
-        onwards = (ahead - z) / np.linalg.norm(ahead - z)
-        if found := moved.solved(z, onwards):
-            self.equations = moved
-            self.go_to(found, onwards)
+        tangent = (ahead - z) / np.linalg.norm(ahead - z)
+        if solution := shifted.solve(z, tangent):
+            self.equations = shifted
+            self.move_to(solution, tangent)
 
-    def reason_of_end(self) -> str:
+    def find_reason_of_end(self) -> str:
         """Return the reason why the branch ends just beyond its last point."""
-        kind, beyond = self.equations.kind, self.z + 8.0 * _LEAST_STEP * self.tangent
-        on_other_courses = False
-        for step in _BEYOND:
+        kind, beyond = self.equations.kind, self.z + 8.0 * _MIN_STEP * self.tangent
+        rests_differently = False
+        for step in _STEPS_BEYOND_END:
             try:
-                found = self.equations.kind_at(beyond + step * self.tangent)
+                kind_beyond = self.equations.find_kind(beyond + step * self.tangent)
             except RockingError:
                 continue
-            if found.unknown:
-                return ends.LOST
-            if found.overturns:
-                return ends.OVERTURNING
-            if found.for_ever != kind.for_ever:
-                return ends.UPLIFT
-            if found.rests != kind.rests:
-                return ends.REST if found.rests else ends.CHATTERING
-            if found != kind:
-                return ends.GRAZING
-            on_other_courses = kind.rests and not kind.for_ever
-        # A body that lifts and rests as before, but in another way, has touched or missed a stop in between.
-        return ends.GRAZING if on_other_courses else ends.LOST
+            if kind_beyond.unknown:
+                return branches.LOST
+            if kind_beyond.overturns:
+                return branches.OVERTURNING
+            if kind_beyond.rests_forever != kind.rests_forever:
+                return branches.UPLIFT
+            if kind_beyond.rests != kind.rests:
+                return branches.START_OF_REST if kind_beyond.rests else branches.LOSS_OF_CHATTERING
+            if kind_beyond != kind:
+                return branches.GRAZING
+            rests_differently = kind.rests and not kind.rests_forever
+        # A body that uplifts and rests as before has touched or missed a stop in between.
+        return branches.GRAZING if rests_differently else branches.LOST

@@ -28,26 +28,28 @@ from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
 
-#: Ground acceleration, g, that lifts any body; it follows the second period.
-_BEYOND_ALL: Final = 1e12
+#: Ground acceleration after the second period, g, which lifts any body.
+_LIFTING_ACCELERATION: Final = 1e12
 
-#: States per call of a kernel, few for quick interrupts.
-TOGETHER: Final = 256
+#: Number of states per call of a kernel, small so that a computation can be interrupted quickly.
+STATES_PER_CALL: Final = 256
 
-#: Share that equals one within rounding error.
-_ALMOST: Final = 1.0 - 2.0**-40
+#: Factor that equals one within rounding error.
+_BELOW_ONE: Final = 1.0 - 2.0**-40
 
 
 class PeriodicForcing:
     """Body under periodic motion, in the form that kernels accept."""
 
     def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | ChatteringScheme) -> None:
-        given = check_motion(motion)
-        if given is None:
-            raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")
-        if given.vertical is not None:
-            raise InvalidMotion("maps are made for one component; give a motion without a vertical one")
-        self.body, self.motion = one_body(body), given
+        one_period = check_motion(motion)
+        if one_period is None:
+            raise InvalidMotion(
+                "motion must be one period of a Motion, for example rocking.pulses.sine(a, f, cycles=1); got None"
+            )
+        if one_period.vertical is not None:
+            raise InvalidMotion("motion must not have a vertical component for a stroboscopic map")
+        self.body, self.motion = one_body(body), one_period
         self.bodies = self.body.alone()
         self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
         if model is not None:
@@ -55,105 +57,115 @@ class PeriodicForcing:
             self.model = model
         self.chattering = chattering_scheme(chattering)
         self.forcing_period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
-        if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
-            raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
-        self._ground = repeated(self.motion, self.body.gravity)
-        run = Setup(self.bodies, self.model, self.chattering, self.forcing_period).run(self.motion, ground=self._ground)
-        self._records, self._settings = run.records, run.settings
-        self._settings["stop"], self._settings["no_end_time"] = np.inf, True
-        if np.any(self._records["yielding"]):
-            raise InvalidBlock("a tendon that yields remembers; maps know what position and velocity tell")
-        if np.any(self._records["variable_restitution"] & (self._records["seed"] >= 0)):
-            raise InvalidOption(
-                "a map takes a state to the same one each time, but this body draws its restitution at each impact: "
-                "give it a number, or one that falls with the speed"
+        if not np.max(np.abs(self.motion.coefficients[:, 0])) < _LIFTING_ACCELERATION * self.body.gravity:
+            raise InvalidMotion(
+                f"the accelerations of the motion must be below {_LIFTING_ACCELERATION:g} g for a stroboscopic map"
             )
-        rows = build_step_rows(self._ground, self._records[0])
+        self._ground = build_repeated_ground(self.motion, self.body.gravity)
+        run = Setup(self.bodies, self.model, self.chattering, self.forcing_period).run(self.motion, ground=self._ground)
+        self._body_records, self._settings = run.records, run.settings
+        self._settings["stop"], self._settings["no_end_time"] = np.inf, True
+        if np.any(self._body_records["yielding"]):
+            raise InvalidBlock(
+                "yielding tendons have internal state, which stroboscopic maps do not support: remove the tendon"
+            )
+        if np.any(self._body_records["variable_restitution"] & (self._body_records["seed"] >= 0)):
+            raise InvalidOption(
+                "stroboscopic maps do not support restitution drawn at random at each impact: specify a number, or a "
+                "restitution that decreases with the speed"
+            )
+        rows = build_step_rows(self._ground, self._body_records[0])
         self._steps = rows if self.model == "linear" else rows[:, :0]
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {described(self.body)} under {described(self.motion)}; {self.model} model>"
+        inputs = f"{describe_input(self.body)} under {describe_input(self.motion)}"
+        return f"<{type(self).__name__}: {inputs}; {self.model} model>"
 
-    def _rules(self, *, record: bool) -> state.Record:
+    def _copy_settings(self, *, record: bool) -> state.Record:
         settings = self._settings.copy()
         settings["record"] = record
         return settings
 
-    def _setting(self) -> PeriodicProblem:
+    def _create_problem(self) -> PeriodicProblem:
         return PeriodicProblem(
-            self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps
+            self._ground, self._body_records[0], self._copy_settings(record=False), state.new_table(0), self._steps
         )
 
-    def _marching(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
-        """Return the arguments of the derivative kernels besides the states: the problem and workspace."""
-        trail = Trail(self._ground, self._records[0], self._rules(record=True), NO_NODES)
+    def _create_derivative_arguments(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
+        """Create the problem and the workspace of the derivative kernels."""
+        trail = Trail(self._ground, self._body_records[0], self._copy_settings(record=True), NO_NODES)
         return trail, state.new_scratch(), state.new_record(state.VARIATION), state.new_table(512)
 
-    def checked_starts(self, given: ArrayLike, name: str) -> Floats:
-        """Return initial states, shape (n, 2): finite numbers, in front of the stops."""
-        states = checks.numbers(given, name, InvalidOption)
-        self._states(states, name)
-        sensible(states, name)
+    def _check_starts(self, starts: ArrayLike, name: str) -> Floats:
+        """Return initial states, shape (n, 2), after checking that they are finite and in front of the stops."""
+        states = checks.numbers(starts, name, InvalidOption)
+        self._to_records(states, name)
+        check_magnitudes(states, name)
         return states.reshape(-1, 2)
 
-    def _states(self, states: ArrayLike, name: str = "states", velocities: str = "") -> tuple[Floats, state.Records]:
-        """Return states, flattened and as records; errors call them, or their positions, ``name``."""
-        given = self._pairs(states, name, self.body.coordinate.name)
-        flat = given.reshape(-1, 2)
-        (at, speed), record, (low, high) = flat.T, self._records[0], self.body.stops
-        if record["next_side"][0] == 0:  # a stop: there is no ground on its other side
-            into = (at == low) & (speed < 0.0) | (bool(record["two_stops"]) & (at == high) & (speed > 0.0))
-            if np.any(into):
-                x, v = float(at[into][0]), float(speed[into][0])
+    def _to_records(
+        self, states: ArrayLike, name: str = "states", velocities: str = ""
+    ) -> tuple[Floats, state.Records]:
+        """Return states as an array and as records; ``name`` and ``velocities`` are the argument names for errors."""
+        pairs = self._check_pairs(states, name, self.body.coordinate.name)
+        flat = pairs.reshape(-1, 2)
+        (coordinate, velocity), record, (low, high) = flat.T, self._body_records[0], self.body.stops
+        if record["next_side"][0] == 0:  # a stop, which the body cannot pass
+            leads_into_stop = (coordinate == low) & (velocity < 0.0) | (
+                bool(record["two_stops"]) & (coordinate == high) & (velocity > 0.0)
+            )
+            if np.any(leads_into_stop):
+                x, v = float(coordinate[leads_into_stop][0]), float(velocity[leads_into_stop][0])
                 raise InvalidOption(
-                    f"{{}} must not lead into a stop, as {v:g} m/s at {x:g} m does; change its sign, or begin in front "
+                    f"{{}} must not lead into a stop; got {v:g} m/s at {x:g} m: change its sign, or begin in front "
                     "of the stop", velocities or name, value=v,
                 )  # fmt: skip
-        made = state.new_states(len(flat), 0)
-        set_start(made, self._records, self.bodies, at, speed, name)
-        made["peak"] = self._no_peak
-        return given, made
+        records = state.new_states(len(flat), 0)
+        set_start(records, self._body_records, self.bodies, coordinate, velocity, name)
+        records["peak"] = self._initial_peak
+        return pairs, records
 
     @property
-    def _no_peak(self) -> float:
-        """Initial peak that disables the search for peaks: the rotation of a fallen body, less rounding error."""
-        fallen = float(self._records["overturn_angle"][0])
-        return fallen if np.isinf(fallen) else fallen * _ALMOST
+    def _initial_peak(self) -> float:
+        """Initial peak that disables the search for peaks: the overturning angle less rounding error."""
+        overturn_angle = float(self._body_records["overturn_angle"][0])
+        return overturn_angle if np.isinf(overturn_angle) else overturn_angle * _BELOW_ONE
 
-    def _pairs(self, values: ArrayLike, name: str, first: str) -> Floats:
-        """Return pairs of numbers, shape (..., 2)."""
-        given = checks.numbers(values, name, InvalidOption)
-        if given.ndim == 0 or given.shape[-1] != 2:
+    def _check_pairs(self, values: ArrayLike, name: str, coordinate: str) -> Floats:
+        """Return pairs of numbers as an array, shape (..., 2)."""
+        pairs = checks.numbers(values, name, InvalidOption)
+        if pairs.ndim == 0 or pairs.shape[-1] != 2:
             raise InvalidOption(
-                f"{{}} must hold pairs ({first}, velocity) along the last axis, not have the shape {given.shape}", name
+                f"{{}} must contain pairs ({coordinate}, velocity) along the last axis; got shape {pairs.shape}",
+                name,
             )
-        return given
+        return pairs
 
-    def _coordinates(self, u: Floats, v: Floats, side: Integers) -> Floats:
+    def _to_coordinates(self, u: Floats, v: Floats, side: Integers) -> Floats:
         """Convert states in the frames of their sides to coordinates and velocities."""
-        at = np.where(side < 0, -1 - side, side)
-        sign = 1.0 - 2.0 * at
-        stops = np.array(self.body.stops)[at]
-        found = np.stack([stops + sign * u, sign * v], axis=-1)
-        found[side < 0] = np.stack([stops, np.zeros_like(stops)], axis=-1)[side < 0]
-        return found + 0.0
+        stop = np.where(side < 0, -1 - side, side)
+        sign = 1.0 - 2.0 * stop
+        stops = np.array(self.body.stops)[stop]
+        coordinates = np.stack([stops + sign * u, sign * v], axis=-1)
+        coordinates[side < 0] = np.stack([stops, np.zeros_like(stops)], axis=-1)[side < 0]
+        return coordinates + 0.0
 
-    def _known(self, made: state.Records) -> Floats:
-        """Return coordinates and velocities of states, NaN where they are unknown."""
-        found = self._coordinates(made["u"], made["v"], made["side"])
-        found[np.isin(made["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))] = np.nan
-        return found
+    def _from_records(self, records: state.Records) -> Floats:
+        """Convert records to coordinates and velocities, NaN after overturning or too many steps."""
+        coordinates = self._to_coordinates(records["u"], records["v"], records["side"])
+        coordinates[np.isin(records["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))] = np.nan
+        return coordinates
 
     @property
     def _is_two_sided(self) -> bool:
         """Whether the coordinate changes its sign, or there is a second stop."""
-        record = self._records[0]
+        record = self._body_records[0]
         return bool(record["two_stops"] or record["next_side"][0] == 1)
 
     @property
-    def _loses_nothing(self) -> bool:
-        """Whether two successive impacts lose no speed, so that nothing near a rest comes to rest."""
-        return bool(np.prod(self._records[0]["restitution"]) >= 1.0)
+    def _conserves_energy(self) -> bool:
+        """Whether two successive impacts lose no speed, so that states near a rest never rest."""
+        return bool(np.prod(self._body_records[0]["restitution"]) >= 1.0)
 
 
 class Scale(NamedTuple):
@@ -163,14 +175,14 @@ class Scale(NamedTuple):
     velocity: float
 
 
-def scale_of(strobe: PeriodicForcing) -> Scale:
+def compute_scale(strobe: PeriodicForcing) -> Scale:
     """Compute the natural scales of coordinate and velocity of a body under a motion."""
-    record, period = strobe._records[0], strobe.forcing_period
+    record, period = strobe._body_records[0], strobe.forcing_period
     if not isinstance(strobe.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
         return Scale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
     pull = float(np.max(np.abs(record["threshold_slope"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
-    speed = period * max(mean_size(strobe.motion), pull, 1e-300)
+    speed = period * max(estimate_mean_acceleration(strobe.motion), pull, 1e-300)
     rate = math.sqrt(abs(float(record["stiffness"][0])))
     if record["two_stops"]:
         width = float(record["overturn_angle"])
@@ -178,41 +190,40 @@ def scale_of(strobe: PeriodicForcing) -> Scale:
     return Scale(speed / max(rate, 1.0 / period), speed)
 
 
-def mean_size(motion: Motion) -> float:
+def estimate_mean_acceleration(motion: Motion) -> float:
     """Estimate the mean absolute acceleration."""
     times = np.linspace(motion.breakpoints[0], motion.breakpoints[-1], 257)
     return float(np.mean(np.abs(motion.acceleration(times))))
 
 
-def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
+def build_repeated_ground(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
     """Create the ground of two periods of a motion, followed by an acceleration that lifts any body."""
-    breaks = motion.breakpoints - motion.breakpoints[0]
-    period, columns = breaks[-1], motion.coefficients.shape[1]
-    beyond = np.zeros((2, columns))
-    beyond[:, 0] = _BEYOND_ALL * gravity, -_BEYOND_ALL * gravity
-    breakpoints = np.concatenate([breaks, period + breaks[1:], [3.0 * period, 4.0 * period]])
-    coefficients = np.concatenate([motion.coefficients, sign * motion.coefficients, beyond])
+    times = motion.breakpoints - motion.breakpoints[0]
+    period, columns = times[-1], motion.coefficients.shape[1]
+    lifting_rows = np.zeros((2, columns))
+    lifting_rows[:, 0] = _LIFTING_ACCELERATION * gravity, -_LIFTING_ACCELERATION * gravity
+    breakpoints = np.concatenate([times, period + times[1:], [3.0 * period, 4.0 * period]])
+    coefficients = np.concatenate([motion.coefficients, sign * motion.coefficients, lifting_rows])
     breakpoints.flags.writeable = coefficients.flags.writeable = False  # as in a motion: kernels are compiled for these
     return build_ground(breakpoints, coefficients, 1.0 / gravity, motion.error)
 
 
-def parts_of(count: int, periods: int) -> Sequence[slice]:
-    """Divide states into ranges, one per call of a kernel, over a number of periods."""
-    # About half a second.
-    return [*split_range(count, min(TOGETHER, max(1, 100_000 // periods)))]
+def split_states(count: int, periods: int) -> Sequence[slice]:
+    """Divide states into ranges, one per call of a kernel of about half a second."""
+    return [*split_range(count, min(STATES_PER_CALL, max(1, 100_000 // periods)))]
 
 
-def sensible(values: Floats, name: str) -> None:
-    """Raise an error for coordinates or velocities that are not finite or absurdly large."""
+def check_magnitudes(values: Floats, name: str) -> None:
+    """Raise an error for coordinates or velocities that are not finite or too large."""
     if not values.size or not np.all(np.abs(values) <= FASTEST):
-        raise InvalidOption(f"{{}} must be finite numbers of at most {FASTEST:g} in size", name)
+        raise InvalidOption(f"{{}} must be finite numbers between -{FASTEST:g} and {FASTEST:g}", name)
 
 
-def described(what: Body | Motion) -> str:
+def describe_input(subject: Body | Motion) -> str:
     """Describe a body or a motion with its parameters in one line."""
-    if isinstance(what, Motion):
-        return ", ".join(part for part in (what.label, what.description.numbers) if part)
-    return f"{what.description}, {in_line(what.sides)}"
+    if isinstance(subject, Motion):
+        return ", ".join(part for part in (subject.label, subject.description.numbers) if part)
+    return f"{subject.description}, {in_line(subject.sides)}"
 
 
 class StroboscopicMap(PeriodicForcing):
@@ -253,46 +264,48 @@ class StroboscopicMap(PeriodicForcing):
         InvalidOption
             If the states have another shape, or a state is behind a stop.
         """
-        found, _, _ = self.advance(states, n_periods)
-        return found
+        final_states, _, _ = self.advance(states, n_periods)
+        return final_states
 
     def orbit(self, states: ArrayLike, n_periods: int) -> Floats:
         """Return states after 0, 1, ... periods, shape (..., n_periods + 1, 2), as the map does."""
-        given, made = self._states(states)
+        pairs, records = self._to_records(states)
         count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)
-        rows = np.full((len(made), count, 3), np.nan)
-        self._iterate(made, count, rows)
+        rows = np.full((len(records), count, 3), np.nan)
+        self._iterate(records, count, rows)
         known = ~np.isnan(rows[..., 0])
-        found = self._coordinates(rows[..., 0], rows[..., 1], np.where(known, rows[..., 2], 0.0).astype(np.int64))
-        whole = np.concatenate([given.reshape(-1, 1, 2), found], axis=1)
-        return whole.reshape(*given.shape[:-1], count + 1, 2)
+        later_states = self._to_coordinates(
+            rows[..., 0], rows[..., 1], np.where(known, rows[..., 2], 0.0).astype(np.int64)
+        )
+        orbit = np.concatenate([pairs.reshape(-1, 1, 2), later_states], axis=1)
+        return orbit.reshape(*pairs.shape[:-1], count + 1, 2)
 
     def advance(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
         """Return states after a number of periods, the `PeriodOutcome` of each, and the numbers of resolved impacts."""
-        given, made = self._states(states)
-        self._iterate(made, checks.integer(n_periods, "n_periods", InvalidOption, minimum=1))
-        outcomes, impacts = (np.array(made[name]).reshape(given.shape[:-1]) for name in ("ending", "impacts"))
-        return self._known(made).reshape(given.shape), outcomes, impacts
+        pairs, records = self._to_records(states)
+        self._iterate(records, checks.integer(n_periods, "n_periods", InvalidOption, minimum=1))
+        outcomes, impacts = (np.array(records[name]).reshape(pairs.shape[:-1]) for name in ("ending", "impacts"))
+        return self._from_records(records).reshape(pairs.shape), outcomes, impacts
 
     def derivative(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, Floats]:
         """Return states after a number of periods and their derivatives by the initial states, shape (..., 2, 2).
 
-        Derivatives are exactly zero if the body comes to rest on the way or is held at rest at the start, NaN after
+        Derivatives are exactly zero if the body comes to rest in between or is held at rest at the start, NaN after
         overturning, and infinite at a grazing impact. On a stop that does not hold the body, they apply to states in
         front of the stop. Arcs contribute solutions of the variational equation, impacts saltation matrices.
         """
-        given, made = self._states(states)
-        total = np.broadcast_to(np.eye(2), (len(made), 2, 2)).copy()
-        change, ended = np.empty_like(total), np.zeros(len(made), dtype=np.bool_)
+        pairs, records = self._to_records(states)
+        product = np.broadcast_to(np.eye(2), (len(records), 2, 2)).copy()
+        change, ended = np.empty_like(product), np.zeros(len(records), dtype=np.bool_)
         for _ in range(checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)):
-            signs, before = _signs(made["side"]), made.copy()
-            self._iterate(made)
-            differentiate(*self._marching(), state.expose_fields(before), change)
-            ended |= np.isin(made["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))
-            total = (signs * _signs(made["side"]))[:, None, None] * change @ total
-        found = self._coordinates(made["u"], made["v"], made["side"])
-        found[ended] = total[ended] = np.nan
-        return found.reshape(given.shape), total.reshape(*given.shape, 2)
+            signs, initial_states = _compute_signs(records["side"]), records.copy()
+            self._iterate(records)
+            differentiate(*self._create_derivative_arguments(), state.expose_fields(initial_states), change)
+            ended |= np.isin(records["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))
+            product = (signs * _compute_signs(records["side"]))[:, None, None] * change @ product
+        final_states = self._to_coordinates(records["u"], records["v"], records["side"])
+        final_states[ended] = product[ended] = np.nan
+        return final_states.reshape(pairs.shape), product.reshape(*pairs.shape, 2)
 
     def from_impacts(self, impacts: ArrayLike) -> Floats:
         """Return the states at the end of the period in which bodies leave impacts, shape (..., 2).
@@ -302,31 +315,33 @@ class StroboscopicMap(PeriodicForcing):
         body overturns earlier. Raise `InvalidOption` if the impacts have another shape, or a velocity does not point
         away from its stop.
         """
-        given = self._pairs(impacts, "impacts", "phase in s")
-        flat = given.reshape(-1, 2)
-        made = state.new_states(len(flat), 0)
+        pairs = self._check_pairs(impacts, "impacts", "phase in s")
+        flat = pairs.reshape(-1, 2)
+        records = state.new_states(len(flat), 0)
         phase = np.mod(np.where(np.isfinite(flat[:, 0]), flat[:, 0], np.nan), self.forcing_period)
         starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
-        made["piece"] = np.searchsorted(starts, phase, side="right") - 1
-        made["offset"] = phase - starts[made["piece"]]
-        made["side"] = np.where(flat[:, 1] < 0.0, 1, 0)
-        made["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
+        records["piece"] = np.searchsorted(starts, phase, side="right") - 1
+        records["offset"] = phase - starts[records["piece"]]
+        records["side"] = np.where(flat[:, 1] < 0.0, 1, 0)
+        records["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
         if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
-            raise InvalidOption("every velocity in {} must lead away from the stop that was hit", "impacts")
-        made["peak"] = self._no_peak
-        self._iterate(made)
-        return self._known(made).reshape(given.shape)
+            raise InvalidOption("every velocity in {} must point away from the stop of the impact", "impacts")
+        records["peak"] = self._initial_peak
+        self._iterate(records)
+        return self._from_records(records).reshape(pairs.shape)
 
-    def _iterate(self, made: state.Records, n_periods: int = 1, rows: Floats | None = None) -> None:
-        setting = self._setting()
-        orbits = np.empty((len(made), 0, 3)) if rows is None else rows
-        traps, counts = np.empty((0, TRAP)), np.zeros((2, len(made)), dtype=np.int64)
+    def _iterate(self, records: state.Records, n_periods: int = 1, rows: Floats | None = None) -> None:
+        problem = self._create_problem()
+        orbits = np.empty((len(records), 0, 3)) if rows is None else rows
+        traps, counts = np.empty((0, TRAP)), np.zeros((2, len(records)), dtype=np.int64)
 
-        def follow(part: slice) -> None:
-            found, taken = counts[:, part]
-            iterate(setting, state.new_scratch(), made[part], n_periods, orbits[part], traps, found, taken)
+        def advance_part(part: slice) -> None:
+            trap_rows, period_counts = counts[:, part]
+            iterate(
+                problem, state.new_scratch(), records[part], n_periods, orbits[part], traps, trap_rows, period_counts
+            )
 
-        for _ in map_in_threads(follow, parts_of(len(made), n_periods)):
+        for _ in map_in_threads(advance_part, split_states(len(records), n_periods)):
             pass
 
 
@@ -339,45 +354,46 @@ class HalfMap(StroboscopicMap):
         middle = int(np.argmin(np.abs(motion.breakpoints - motion.breakpoints[0] - 0.5 * self.forcing_period)))
         half = Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
         self.forcing_period *= 0.5
-        self._ground = repeated(half, self.body.gravity, -1.0)
+        self._ground = build_repeated_ground(half, self.body.gravity, -1.0)
         self._steps = np.ascontiguousarray(self._steps[:, :middle])  # as kernels require
 
-    def mirrored(self, state: Floats, halves: int) -> tuple[Floats, Floats]:
+    def map_to_mirror_image(self, state: Floats, n_halves: int) -> tuple[Floats, Floats]:
         """Return the mirror image after an odd number of half periods, and its derivative; NaN where it overturns."""
-        total, at = np.eye(2), state
-        for _ in range(halves):
-            if not np.all(np.isfinite(at)):  # a march from there would use all its turns
+        product, mirror_image = np.eye(2), state
+        for _ in range(n_halves):
+            if not np.all(np.isfinite(mirror_image)):  # a NaN state would use up the step budget
                 break
-            after, change = self.derivative(at)
-            at, total = 0.0 - after, -change @ total
-        return at, total
+            image, change = self.derivative(mirror_image)
+            mirror_image, product = 0.0 - image, -change @ product
+        return mirror_image, product
 
 
-def is_mirrored(strobe: StroboscopicMap) -> bool:
+def has_mirror_symmetry(strobe: StroboscopicMap) -> bool:
     """Whether the mirror image of every trajectory of a body is a trajectory half a period later."""
     motion = strobe.motion
-    if not (strobe.bodies.is_symmetric and are_halved(motion)[0]):
+    if not (strobe.bodies.is_symmetric and have_opposite_breakpoints(motion)[0]):
         return False
     times = motion.breakpoints[0] + strobe.forcing_period * (np.arange(200) + 0.5) / 400.0
     sums = motion.acceleration(times) + motion.acceleration(times + 0.5 * strobe.forcing_period)
     return bool(np.max(np.abs(sums)) <= 1e-12 * motion.pga)
 
 
-def are_halved(motion: Motion) -> Flags:
+def have_opposite_breakpoints(motion: Motion) -> Flags:
     """Whether there is another breakpoint half a period later, for each breakpoint but the last."""
     starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
-    return distances(np.mod(starts + 0.5 * period, period), starts, period) <= 1e-14 * period
+    return compute_distances(np.mod(starts + 0.5 * period, period), starts, period) <= 1e-14 * period
 
 
-def distances(times: Floats, marks: Floats, period: float) -> Floats:
+def compute_distances(times: Floats, marks: Floats, period: float) -> Floats:
     """Compute the distance from each time to the nearest mark, within a period that repeats."""
     marks = np.sort(marks)
-    after = np.searchsorted(marks, times)
-    away = np.abs(times - marks[[after - 1, after % len(marks)]])
-    return np.asarray(np.min(np.minimum(away, period - away), axis=0))
+    next_mark = np.searchsorted(marks, times)
+    gaps = np.abs(times - marks[[next_mark - 1, next_mark % len(marks)]])
+    return np.asarray(np.min(np.minimum(gaps, period - gaps), axis=0))
 
 
-def _signs(side: NDArray[np.int64]) -> Floats:
+def _compute_signs(side: NDArray[np.int64]) -> Floats:
+    """Compute the signs of rotations on the sides of states."""
     return np.where(side > 0, -1.0, 1.0)
 
 

@@ -19,60 +19,72 @@ from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.dynamics.branches import Bifurcation
-from rocking.dynamics.maps import HalfMap, PeriodOutcome, StroboscopicMap, is_mirrored, scale_of
-from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at, peak_of, response_of
+from rocking.dynamics.maps import HalfMap, PeriodOutcome, StroboscopicMap, compute_scale, has_mirror_symmetry
+from rocking.dynamics.orbits import (
+    MAX_ORBIT_DISTANCE,
+    PeriodicOrbit,
+    compute_multipliers,
+    compute_peak,
+    create_orbit,
+    simulate_periods,
+)
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 from rocking.response import Response
 
 #: Number of points that interpolate a crossing of branches.
-_CROSSING: Final = 4
+_N_CROSSING_POINTS: Final = 4
 
-#: Residual of a point, relative to the scale and the size of the derivative, and its maximum.
+#: Residual of a point, relative to the scale and the size of the derivative, and its absolute maximum.
 _RESIDUAL: Final = 1e-12
-_LARGEST_RESIDUAL: Final = 1e-6
+_MAX_RESIDUAL: Final = 1e-6
 
 #: Largest step of differences by the parameter, relative to its range.
-DIFFERENCE: Final = 1e-6
+MAX_DIFFERENCE: Final = 1e-6
 
 #: Normal of the plane of constant parameter.
-AT_VALUE: Final = np.array([0.0, 0.0, 1.0])
+PARAMETER_AXIS: Final = np.array([0.0, 0.0, 1.0])
 
 
-class Kind(NamedTuple):
-    """Constants of a branch: whether the body rests (for ever), its number of impacts, and whether it overturns.
+class OrbitKind(NamedTuple):
+    """Properties of orbits that are constant along a branch."""
 
-    Unknown for a body that took too many steps.
-    """
-
+    #: Whether every period contains a rest.
     rests: bool
-    for_ever: bool
+    #: Whether the body is always at rest.
+    rests_forever: bool
+    #: Number of impacts in one period; 0 with a rest.
     impacts: int
+    #: Whether the body overturns.
     overturns: bool
+    #: Whether the response is unknown because it requires too many steps.
     unknown: bool
 
 
-class Tests(NamedTuple):
-    """Test functions that change sign at bifurcations: det(R' - 1), det(R' + 1), and the parameter of the tangent."""
+class TestFunctions(NamedTuple):
+    """Test functions that change sign at bifurcations."""
 
-    at_one: float
-    at_minus_one: float
-    onwards: float
+    #: det(R' - 1), which vanishes if a multiplier is 1.
+    multiplier_one: float
+    #: det(R' + 1), which vanishes if a multiplier is -1.
+    multiplier_minus_one: float
+    #: Component of the tangent along the parameter.
+    parameter_rate: float
 
 
-class Solved(NamedTuple):
+class BranchPoint(NamedTuple):
     """Point of a branch, derivatives of its equations and of the map, and number of Newton steps."""
 
     z: Floats
     jacobian: Floats
-    change: Floats
+    derivative: Floats
     steps: int
 
-    def tests(self, tangent: Floats) -> Tests:
-        """Compute the test functions."""
-        less, plus = (float(np.linalg.det(self.change + sign * np.eye(2))) for sign in (-1.0, 1.0))
-        return Tests(less, plus, float(tangent[2]))
+    def compute_tests(self, tangent: Floats) -> TestFunctions:
+        """Compute the test functions for a tangent."""
+        minus, plus = (float(np.linalg.det(self.derivative + sign * np.eye(2))) for sign in (-1.0, 1.0))
+        return TestFunctions(minus, plus, float(tangent[2]))
 
 
 @dataclass(eq=False)
@@ -84,18 +96,18 @@ class OrbitEquations:
     chattering: ChatteringScheme
     period: int
     sizes: Floats
-    kind: Kind
+    kind: OrbitKind
     #: Range of the parameter, beyond which the family need not be defined.
     bounds: tuple[float, float]
     #: Breakpoint at which a period starts; an impact on it makes the equations non-smooth.
     shift: int = 0
-    difference: float = DIFFERENCE
-    #: Whether they are those of the map to the mirror image half a period later.
-    by_half: bool = False
+    difference: float = MAX_DIFFERENCE
+    #: Whether the equations use the map to the mirror image half a period later.
+    uses_half_map: bool = False
 
     def __post_init__(self) -> None:
-        self.strobe = lru_cache(maxsize=64)(self._strobe)
-        self.half = lru_cache(maxsize=64)(self._half)
+        self.create_map = lru_cache(maxsize=64)(self._create_map)
+        self.create_half_map = lru_cache(maxsize=64)(self._create_half_map)
 
     @classmethod
     def from_orbit(
@@ -108,184 +120,194 @@ class OrbitEquations:
                 "{} must be a function of the parameter that returns a body and one period of a motion", "family"
             )
         strobe = StroboscopicMap(*pair, orbit.model, orbit.chattering)
-        scale = scale_of(strobe)
+        scale = compute_scale(strobe)
         if not np.all(np.abs(strobe(orbit.state, orbit.period) - orbit.state) / scale < 1e-8):
             raise InvalidOption(
-                f"the orbit is none of what {{}} makes at {{}} = {value:g}", "family", "value", value=value
+                f"the orbit does not belong to {{}} at {{}} = {value:g}", "family", "value", value=value
             )
-        sizes, kind = np.array([*scale, bounds[1] - bounds[0]]), kind_of(strobe, orbit.state, orbit.period)
-        made = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, bounds)  # type: ignore[arg-type]
-        made.by_half = orbit.symmetric and not orbit.rests and made.stays_mirrored(value)
-        return made
+        sizes, kind = np.array([*scale, bounds[1] - bounds[0]]), determine_kind(strobe, orbit.state, orbit.period)
+        equations = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, bounds)  # type: ignore[arg-type]
+        equations.uses_half_map = orbit.symmetric and not orbit.rests and equations.is_mirrored_throughout(value)
+        return equations
 
-    def _strobe(self, value: float) -> StroboscopicMap:
+    def _create_map(self, value: float) -> StroboscopicMap:
         body, motion = self.family(value)
         if k := self.shift:
-            breaks, rows = motion.breakpoints, np.roll(motion.coefficients, -k, axis=0)
-            later = np.concatenate([breaks[k:] - breaks[k], breaks[1 : k + 1] + (breaks[-1] - breaks[k])])
-            motion = Motion(later, rows, motion.name, motion.description, error=motion.error)
+            times, rows = motion.breakpoints, np.roll(motion.coefficients, -k, axis=0)
+            breakpoints = np.concatenate([times[k:] - times[k], times[1 : k + 1] + (times[-1] - times[k])])
+            motion = Motion(breakpoints, rows, motion.name, motion.description, error=motion.error)
         return StroboscopicMap(body, motion, self.model, self.chattering)
 
-    def _half(self, value: float) -> HalfMap:
-        strobe = self.strobe(value)
-        if not is_mirrored(strobe):
+    def _create_half_map(self, value: float) -> HalfMap:
+        strobe = self.create_map(value)
+        if not has_mirror_symmetry(strobe):
             raise InvalidOption(f"the family has no mirror images at {{}} = {value:g}", "value", value=value)
         return HalfMap(strobe)
 
-    def stays_mirrored(self, value: float) -> bool:
+    def is_mirrored_throughout(self, value: float) -> bool:
         """Whether the family has mirror images at a value, and over the whole range of the parameter."""
-        for each in (value, *np.linspace(*self.bounds, 5).tolist()):
-            with suppress(RockingError):  # no body or motion there: the branch ends before
-                if not is_mirrored(self.strobe(each)):
+        for sample in (value, *np.linspace(*self.bounds, 5).tolist()):
+            with suppress(RockingError):  # no body or motion exists at this value
+                if not has_mirror_symmetry(self.create_map(sample)):
                     return False
         return True
 
-    def physical(self, z: Floats) -> tuple[Floats, float]:
-        """Convert z to state and parameter, exactly a limit within rounding error."""
+    def to_physical(self, z: Floats) -> tuple[Floats, float]:
+        """Convert z to state and parameter, which equals a bound if it differs only by rounding error."""
         value = float(z[2] * self.sizes[2])
-        at_limit = (each for each in self.bounds if math.isclose(value, each, rel_tol=2.0**-50))
-        return z[:2] * self.sizes[:2], next(at_limit, value)
+        reached_bounds = (bound for bound in self.bounds if math.isclose(value, bound, rel_tol=2.0**-50))
+        return z[:2] * self.sizes[:2], next(reached_bounds, value)
 
-    def returned(self, state: Floats, value: float) -> tuple[Floats, Floats]:
+    def map_state(self, state: Floats, value: float) -> tuple[Floats, Floats]:
         """Return the state after the period (or its mirror image after half of it) and the derivative, or NaN."""
         try:
-            if self.by_half:
-                return self.half(value).mirrored(state, self.period)
-            return self.strobe(value).derivative(state, self.period)
+            if self.uses_half_map:
+                return self.create_half_map(value).map_to_mirror_image(state, self.period)
+            return self.create_map(value).derivative(state, self.period)
         except RockingError:  # behind a stop, or no body or motion for the parameter
             return np.full(2, np.nan), np.full((2, 2), np.nan)
 
-    def at(self, z: Floats) -> tuple[Floats, Floats]:
-        """Compute the residual and its derivative by z."""
-        state, value = self.physical(z)
-        after, change = self.returned(state, value)
+    def compute_residual(self, z: Floats) -> tuple[Floats, Floats]:
+        """Compute the residual and its derivative with respect to z."""
+        state, value = self.to_physical(z)
+        image, derivative = self.map_state(state, value)
         h, (low, high) = self.difference * self.sizes[2], self.bounds
-        less = low if value - h < low <= value else value - h
-        more = high if value <= high < value + h else value + h
-        by_value = (self.returned(state, more)[0] - self.returned(state, less)[0]) / (more - less)
-        scaled = change / self.sizes[:2, None] * self.sizes[:2]
-        by_value = by_value * self.sizes[2] / self.sizes[:2]
-        return (after - state) / self.sizes[:2], np.column_stack([scaled - np.eye(2), by_value])
+        lower = low if value - h < low <= value else value - h
+        upper = high if value <= high < value + h else value + h
+        value_derivative = (self.map_state(state, upper)[0] - self.map_state(state, lower)[0]) / (upper - lower)
+        scaled_derivative = derivative / self.sizes[:2, None] * self.sizes[:2]
+        value_derivative = value_derivative * self.sizes[2] / self.sizes[:2]
+        return (image - state) / self.sizes[:2], np.column_stack([scaled_derivative - np.eye(2), value_derivative])
 
-    def solved(self, guess: Floats, normal: Floats) -> Solved | None:
-        """Return the point in the plane through a guess; None if Newton's method does not converge."""
+    def solve(self, guess: Floats, normal: Floats) -> BranchPoint | None:
+        """Find a point in the plane through a guess by Newton's method; None without convergence."""
         z = guess.copy()
-        for count in range(10):
-            residual, jacobian = self.at(z)
+        for n_steps in range(10):
+            residual, jacobian = self.compute_residual(z)
             if not np.all(np.isfinite(jacobian)):
                 return None
-            allowed = _RESIDUAL * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
-            sharp = np.max(np.abs(residual)) < min(allowed, _LARGEST_RESIDUAL)
+            tolerance = _RESIDUAL * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
+            is_accurate = np.max(np.abs(residual)) < min(tolerance, _MAX_RESIDUAL)
             try:
                 step = np.linalg.solve(np.vstack([jacobian, normal]), -np.append(residual, normal @ (z - guess)))
             except np.linalg.LinAlgError:
                 return None
             z = z + step
-            if sharp:  # The derivative at the previous point may be from beyond a grazing impact.
-                return Solved(z, jacobian, self.returned(*self.physical(z))[1], count)
+            if is_accurate:  # The derivative at the previous point may be from beyond a grazing impact.
+                return BranchPoint(z, jacobian, self.map_state(*self.to_physical(z))[1], n_steps)
         return None
 
-    def kind_at(self, z: Floats) -> Kind:
-        """Return the kind of the response from a state."""
-        state, value = self.physical(z)
-        return kind_of(self.strobe(value), state, self.period)
+    def find_kind(self, z: Floats) -> OrbitKind:
+        """Determine the kind of the orbit at a point."""
+        state, value = self.to_physical(z)
+        return determine_kind(self.create_map(value), state, self.period)
 
-    def response(self, z: Floats) -> Response:
-        """Simulate one period from the start in use."""
-        state, value = self.physical(z)
-        return response_of(self.strobe(value), state, self.period)
+    def simulate_period(self, z: Floats) -> Response:
+        """Simulate one period from the current start."""
+        state, value = self.to_physical(z)
+        return simulate_periods(self.create_map(value), state, self.period)
 
-    def state(self, z: Floats, shift: int = 0) -> Floats:
+    def compute_state(self, z: Floats, shift: int = 0) -> Floats:
         """Return the state of the same response at another breakpoint of the original motion."""
-        state, value = self.physical(z)
+        state, value = self.to_physical(z)
         if shift == self.shift:
             return state
         _, motion = self.family(value)
         time = float(np.mod(motion.breakpoints[shift] - motion.breakpoints[self.shift], motion.duration))
-        return self.response(z).states(time)[:2]
+        return self.simulate_period(z).states(time)[:2]
 
-    def point(self, z: Floats, response: Response) -> tuple[float, Floats, NDArray[np.complex128], float]:
+    def evaluate_point(self, z: Floats, response: Response) -> tuple[float, Floats, NDArray[np.complex128], float]:
         """Return parameter, state, multipliers and largest absolute coordinate at a point."""
-        state, value = self.physical(z)
-        strobe = self.strobe(value)
-        multipliers = multipliers_at(strobe, strobe.derivative(state, self.period)[1])
-        return value, self.state(z), multipliers, peak_of(response)
+        state, value = self.to_physical(z)
+        strobe = self.create_map(value)
+        multipliers = compute_multipliers(strobe, strobe.derivative(state, self.period)[1])
+        return value, self.compute_state(z), multipliers, compute_peak(response)
 
     def is_parent(self, z: Floats) -> bool:
         """Whether a point belongs to symmetric orbits, or to those of half the period, where this branch starts."""
-        state, value = self.physical(z)
-        if self.kind.rests or self.by_half:
+        state, value = self.to_physical(z)
+        if self.kind.rests or self.uses_half_map:
             return False
         if self.period % 2 == 0:
-            after = self.strobe(value)(state, self.period // 2)
-        elif is_mirrored(self.strobe(value)):
-            after, _ = self.half(value).mirrored(state, self.period)
+            image = self.create_map(value)(state, self.period // 2)
+        elif has_mirror_symmetry(self.create_map(value)):
+            image, _ = self.create_half_map(value).map_to_mirror_image(state, self.period)
         else:
             return False
-        return bool(np.max(np.abs(after - state) / self.sizes[:2]) < SAME)
+        return bool(np.max(np.abs(image - state) / self.sizes[:2]) < MAX_ORBIT_DISTANCE)
 
-    def bifurcation(self, kind: str, z: Floats, values: Sequence[float]) -> Bifurcation:
+    def create_bifurcation(self, kind: str, z: Floats, values: Sequence[float]) -> Bifurcation:
         """Create the bifurcation near a point, between scaled values of the parameter."""
-        bracket = sorted(float(each * self.sizes[2]) for each in values)
-        value = self.physical(z)[1]
+        bracket = sorted(float(scaled * self.sizes[2]) for scaled in values)
+        value = self.to_physical(z)[1]
         strobe = StroboscopicMap(*self.family(value), self.model, self.chattering)
-        return Bifurcation(kind, value, (bracket[0], bracket[-1]), orbit_at(strobe, self.state(z), self.period))
+        return Bifurcation(
+            kind, value, (bracket[0], bracket[-1]), create_orbit(strobe, self.compute_state(z), self.period)
+        )
 
-    def located(self, kind: str, z: Floats, tangent: Floats, length: float, number: int) -> Bifurcation | None:
+    def locate_bifurcation(
+        self, kind: str, z: Floats, tangent: Floats, length: float, test_index: int
+    ) -> Bifurcation | None:
         """Find a root of a test function along a line from a point; None if there is none."""
         from scipy.optimize import brentq
 
-        found: dict[float, tuple[Solved, float]] = {}
+        evaluated: dict[float, tuple[BranchPoint, float]] = {}
 
-        def tested(at: float) -> float:
-            solved = self.solved(z + at * tangent, tangent)
-            if solved is None:
-                raise _Missed
-            found[at] = solved, solved.tests(tangent_of(solved.jacobian, tangent))[number]
-            return found[at][1]
+        def evaluate_test(distance: float) -> float:
+            point = self.solve(z + distance * tangent, tangent)
+            if point is None:
+                raise _PointNotFound
+            evaluated[distance] = point, point.compute_tests(compute_tangent(point.jacobian, tangent))[test_index]
+            return evaluated[distance][1]
 
         try:
-            root = brentq(tested, 0.0, length, xtol=1e-16, rtol=1e-15)
+            root = brentq(evaluate_test, 0.0, length, xtol=1e-16, rtol=1e-15)
         except ValueError:
             return None
-        except _Missed:
-            if len({test > 0.0 for _, test in found.values()}) < 2:
+        except _PointNotFound:
+            if len({test > 0.0 for _, test in evaluated.values()}) < 2:
                 return None
             # The equations are singular where branches cross.
-            points = sorted(found.values(), key=lambda each: abs(each[1]))[:_CROSSING]
-            value = at_zero([test for _, test in points], [each.z[2] for each, _ in points])
-            crossing = self.bifurcation(kind, points[0][0].z, [z[2], (z + length * tangent)[2]])
+            points = sorted(evaluated.values(), key=lambda pair: abs(pair[1]))[:_N_CROSSING_POINTS]
+            value = interpolate_at_zero([test for _, test in points], [pair.z[2] for pair, _ in points])
+            crossing = self.create_bifurcation(kind, points[0][0].z, [z[2], (z + length * tangent)[2]])
             return crossing._replace(value=float(value * self.sizes[2]))
-        first, second = (found[at][0].z for at in sorted(found, key=lambda at: abs(at - root))[:2])
-        return self.bifurcation(kind, first, [first[2], second[2]])
+        first, second = (
+            evaluated[distance][0].z for distance in sorted(evaluated, key=lambda distance: abs(distance - root))[:2]
+        )
+        return self.create_bifurcation(kind, first, [first[2], second[2]])
 
 
-class _Missed(Exception):
-    """Absence of an expected point of the branch."""
+class _PointNotFound(Exception):
+    """No point of the branch was found."""
 
 
-def tangent_of(jacobian: Floats, like: Floats) -> Floats:
-    """Return the unit tangent of a branch, oriented like another tangent."""
-    along = np.cross(jacobian[0], jacobian[1])
-    size = float(np.linalg.norm(along))
+def compute_tangent(jacobian: Floats, reference: Floats) -> Floats:
+    """Compute the unit tangent of a branch, oriented like a reference."""
+    tangent = np.cross(jacobian[0], jacobian[1])
+    size = float(np.linalg.norm(tangent))
     if size == 0.0:
-        return like
-    along /= size
-    return along if along @ like >= 0.0 else -along
+        return reference
+    tangent /= size
+    return tangent if tangent @ reference >= 0.0 else -tangent
 
 
-def kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
-    """Return the kind of the response of a body over a number of periods."""
+def determine_kind(strobe: StroboscopicMap, state: Floats, period: int) -> OrbitKind:
+    """Determine the kind of the response of a body over a number of periods."""
     _, outcome, impacts = strobe.advance(state, period)
-    _, change = strobe.derivative(state, period)
-    rests, for_ever = not np.any(change), bool(outcome == PeriodOutcome.RESTS_FOR_EVER and not impacts)
-    number = 0 if rests else int(impacts)
-    return Kind(
-        rests, for_ever, number, bool(outcome == PeriodOutcome.OVERTURNED), bool(outcome == PeriodOutcome.UNFINISHED)
+    _, derivative = strobe.derivative(state, period)
+    rests, rests_forever = not np.any(derivative), bool(outcome == PeriodOutcome.RESTS_FOR_EVER and not impacts)
+    n_impacts = 0 if rests else int(impacts)
+    return OrbitKind(
+        rests,
+        rests_forever,
+        n_impacts,
+        bool(outcome == PeriodOutcome.OVERTURNED),
+        bool(outcome == PeriodOutcome.UNFINISHED),
     )
 
 
-def at_zero(x: Sequence[float], y: Sequence[float]) -> float:
+def interpolate_at_zero(x: Sequence[float], y: Sequence[float]) -> float:
     """Interpolate the polynomial through points at zero."""
     weights = [math.prod(b / (b - a) for b in x if b != a) for a in x]
     return float(np.dot(weights, y))

@@ -16,8 +16,8 @@ from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
 from rocking.core.result import Result, Row, format_rows
 from rocking.core.tables import Column, add_unit, escape_dollars, format_count, to_plain
-from rocking.dynamics.bodies import LinearBody, in_positions
-from rocking.dynamics.maps import StroboscopicMap, is_mirrored, mean_size, scale_of
+from rocking.dynamics.bodies import LinearBody, convert_to_positions
+from rocking.dynamics.maps import StroboscopicMap, compute_scale, estimate_mean_acceleration, has_mirror_symmetry
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -29,18 +29,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Largest scaled distance between two states of the same orbit.
-SAME: Final = 1e-7
+MAX_ORBIT_DISTANCE: Final = 1e-7
 
-#: Rounding error of a multiplier near 1 or of the product of two, and of two possibly equal ones (its square root).
+#: Rounding error of a multiplier near 1 or of the product of two, and of two nearly equal multipliers.
 _NEUTRAL: Final = 1e-9
 _NEUTRAL_PAIR: Final = 1e-6
 
-#: Number of periods after which every `_EVERY`-th start is added again, now close to an attractor.
-_LATER, _EVERY = 60, 8
+#: Number of periods after which states of every `_LATER_STRIDE`-th start are further starts, close to attractors.
+_N_LATER_PERIODS, _LATER_STRIDE = 60, 8
 
-#: Start speeds: smallest and largest gain relative to the impulse of a period, and largest speed of an overturning
-#: block.
-_LEAST_GAIN, _MOST_GAIN, _BLOCK_SPEED = 0.5, 20.0, 2.0
+#: Smallest and largest initial speed relative to the impulse of a period, and largest of a block that may overturn.
+_MIN_GAIN, _MAX_GAIN, _MAX_BLOCK_SPEED = 0.5, 20.0, 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,7 +84,7 @@ class PeriodicOrbit(Result):
     @property
     def is_stable(self) -> bool:
         """Whether all multipliers are within the unit circle, by more than rounding error."""
-        return bool(np.all(sizes_of(self.multipliers) < 1.0))
+        return bool(np.all(compute_moduli(self.multipliers) < 1.0))
 
     @property
     def duration(self) -> float:
@@ -100,40 +99,42 @@ class PeriodicOrbit(Result):
     @cached_property
     def response(self) -> Response:
         """Return the simulation of one period of the orbit, with its impacts and rests."""
-        return response_of(self._map, self.state, self.period)
+        return simulate_periods(self._map, self.state, self.period)
 
     @cached_property
     def _map(self) -> StroboscopicMap:
         return StroboscopicMap(self.body, self.motion, self.model, self.chattering)
 
     @property
-    def _kind(self) -> str:
-        grows = np.any(sizes_of(self.multipliers) > 1.0)
+    def _description(self) -> str:
+        grows = np.any(compute_moduli(self.multipliers) > 1.0)
         stable = "stable" if self.is_stable else "unstable" if grows else "neutral"
         if self.rests and not self.impacts:
-            how = "always at rest"
+            events = "always at rest"
         elif math.isinf(self.impacts):
-            how = "with complete chattering"
+            events = "with complete chattering"
         else:
-            how = f"with {format_count(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
-        return f"{stable}{' symmetric' if self.symmetric else ''} orbit of {format_count(self.period, 'period')} {how}"
+            events = f"with {format_count(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
+        return (
+            f"{stable}{' symmetric' if self.symmetric else ''} orbit of {format_count(self.period, 'period')} {events}"
+        )
 
     @property
     def _multipliers(self) -> str:
         """Format the multipliers with three digits."""
-        signs = ("-" if each.imag < 0.0 else "+" for each in self.multipliers)
+        signs = ("-" if multiplier.imag < 0.0 else "+" for multiplier in self.multipliers)
         return ", ".join(
-            f"{each.real:.3g}" + (f" {sign} {abs(each.imag):.3g}i" if each.imag else "")
-            for each, sign in zip(self.multipliers, signs, strict=True)
+            f"{multiplier.real:.3g}" + (f" {sign} {abs(multiplier.imag):.3g}i" if multiplier.imag else "")
+            for multiplier, sign in zip(self.multipliers, signs, strict=True)
         )
 
     def _headline(self) -> str:
-        return f"{self._kind}, multipliers {self._multipliers}"
+        return f"{self._description}, multipliers {self._multipliers}"
 
     def summary(self) -> str:
         coordinate, (x, v) = self.body.coordinate, self.state
         rows = [
-            Row("orbit", self._kind),
+            Row("orbit", self._description),
             Row("body", self.body.description),
             Row("motion", f"{self.motion.label}, one period of {self._map.forcing_period:.6g} s"),
             Row(coordinate.name, f"{x:.12g}", coordinate.unit, " at the start of a period"),
@@ -158,14 +159,14 @@ class PeriodicOrbit(Result):
             "rests": self.rests,
             "symmetric": self.symmetric,
             "stable": self.is_stable,
-            "multipliers": [[float(each.real), float(each.imag)] for each in self.multipliers],
+            "multipliers": [[float(multiplier.real), float(multiplier.imag)] for multiplier in self.multipliers],
         }
 
     def _columns(self, table: str) -> list[Column]:
         if table == "impacts":
             return self.response._columns("impacts")
         coordinate = self.body.coordinate
-        times = self._map.forcing_period * np.arange(self.period) if table == "states" else self._times()
+        times = self._map.forcing_period * np.arange(self.period) if table == "states" else self._compute_times()
         states = self.states if table == "states" else self.response.states(times)[:, :2]
         return [
             Column("time", times, "s"),
@@ -173,17 +174,17 @@ class PeriodicOrbit(Result):
             Column("velocity", states[:, 1], f"{coordinate.unit}/s"),
         ]
 
-    def _times(self) -> Floats:
-        """Return evenly spaced times for a figure, with the last before and the first after every impact."""
-        even = np.linspace(0.0, self.response.duration, 400 * self.period + 1)
-        at = self.response.impacts["time"]
-        found: Floats = np.unique(np.concatenate([even, at, np.nextafter(at, 0.0)]))
-        return found
+    def _compute_times(self) -> Floats:
+        """Compute evenly spaced times for a figure, and times just before and after every impact."""
+        even_times = np.linspace(0.0, self.response.duration, 400 * self.period + 1)
+        impact_times = self.response.impacts["time"]
+        times: Floats = np.unique(np.concatenate([even_times, impact_times, np.nextafter(impact_times, 0.0)]))
+        return times
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.orbits import orbit_figure
 
-        times, coordinate = self._times(), self.body.coordinate
+        times, coordinate = self._compute_times(), self.body.coordinate
         states = self.response.states(times)
         return orbit_figure(
             time=times / self._map.forcing_period,
@@ -192,69 +193,70 @@ class PeriodicOrbit(Result):
             impact_times=self.response.impacts["time"] / self._map.forcing_period,
             states=self.states,
             labels=(f"{coordinate.name} ({coordinate.unit})", f"velocity ({coordinate.unit}/s)"),
-            title=title or escape_dollars(f"{self.body.description}, {self._kind}"),
+            title=title or escape_dollars(f"{self.body.description}, {self._description}"),
             ax=ax,
             figsize=figsize,
         )
 
 
-def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Response:
+def simulate_periods(strobe: StroboscopicMap, state: Floats, periods: int) -> Response:
     """Simulate a body from a state over a number of periods."""
     motion, duration = strobe.motion, periods * strobe.forcing_period
     # The motion after the end determines how long a chattering sequence lasts.
     starts = strobe.forcing_period * np.arange(periods + 1)
     breakpoints = np.append((starts[:, None] + motion.breakpoints[:-1]).ravel(), strobe.forcing_period * (periods + 1))
-    many = Motion(
+    repeated = Motion(
         breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
     )
     start = float(state[0]), float(state[1])
-    found = response_to(strobe.body, many, strobe.model, strobe.chattering, duration, start, "initial_position")
-    return in_positions(found) if isinstance(strobe.body, LinearBody) else found
+    response = response_to(strobe.body, repeated, strobe.model, strobe.chattering, duration, start, "initial_position")
+    return convert_to_positions(response) if isinstance(strobe.body, LinearBody) else response
 
 
-def peak_of(response: Response) -> float:
+def compute_peak(response: Response) -> float:
     """Compute the largest absolute coordinate of a response, from 64 points per impact and the impacts themselves."""
     times = np.linspace(0.0, response.duration, 64 * max(1, len(response.impacts)) + 1)
-    at = np.concatenate([times, response.impacts["time"]])
-    return max(response.peak_rotation, float(np.max(np.abs(response.states(at)[:, 0]))))
+    all_times = np.concatenate([times, response.impacts["time"]])
+    return max(response.peak_rotation, float(np.max(np.abs(response.states(all_times)[:, 0]))))
 
 
-def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrbit:
+def create_orbit(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrbit:
     """Create the periodic orbit of a state that recurs after a number of periods."""
-    _, change = strobe.derivative(state, period)
+    _, derivative = strobe.derivative(state, period)
     symmetric = False
-    if period % 2 and is_mirrored(strobe):  # its own mirror image half a period later
-        after = response_of(strobe, state, period).states(0.5 * period * strobe.forcing_period)[:2]
-        symmetric = bool(np.all(np.abs(after + state) < 1e-9 * np.array(scale_of(strobe))))
+    if period % 2 and has_mirror_symmetry(strobe):  # an orbit may be its own mirror image half a period later
+        half_period_state = simulate_periods(strobe, state, period).states(0.5 * period * strobe.forcing_period)[:2]
+        symmetric = bool(np.all(np.abs(half_period_state + state) < 1e-9 * np.array(compute_scale(strobe))))
     return PeriodicOrbit(
         strobe.body, strobe.motion, strobe.model, strobe.chattering, state, period,
-        impacts_of(strobe, state, period, change), multipliers_at(strobe, change), symmetric, not np.any(change),
+        count_orbit_impacts(strobe, state, period, derivative), compute_multipliers(strobe, derivative), symmetric,
+        not np.any(derivative),
     )  # fmt: skip
 
 
-def impacts_of(strobe: StroboscopicMap, state: Floats, period: int, change: Floats) -> float:
+def count_orbit_impacts(strobe: StroboscopicMap, state: Floats, period: int, derivative: Floats) -> float:
     """Count the impacts over a number of periods; infinity with complete chattering."""
     impacts = float(strobe.advance(state, period)[2])
     chatters = impacts > 0.0 and strobe.chattering.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
-    return math.inf if chatters and not np.any(change) else impacts
+    return math.inf if chatters and not np.any(derivative) else impacts
 
 
-def multipliers_at(strobe: StroboscopicMap, change: Floats) -> NDArray[np.complex128]:
+def compute_multipliers(strobe: StroboscopicMap, derivative: Floats) -> NDArray[np.complex128]:
     """Compute the Floquet multipliers of an orbit from the derivative of the map, the largest first.
 
-    If impacts lose no energy, the multipliers at rest are one, because neighbouring states bounce for ever.
+    If impacts lose no energy, the multipliers at rest are one, because neighbouring states never rest.
     """
-    record = strobe._records[0]
-    if strobe._loses_nothing and not np.any(change):
+    record = strobe._body_records[0]
+    if strobe._conserves_energy and not np.any(derivative):
         return np.ones(2, dtype=np.complex128)
-    if strobe._loses_nothing and not (record["variable_restitution"] or np.any(record["damping"])):
-        # Otherwise rounding errors of many impacts suggest that the orbit attracts.
-        change = change / np.sqrt(np.abs(np.linalg.det(change)))
-    found = np.linalg.eigvals(change).astype(np.complex128)
-    return found[np.lexsort((-found.imag, -np.abs(found)))] + 0.0
+    if strobe._conserves_energy and not (record["variable_restitution"] or np.any(record["damping"])):
+        # Otherwise rounding errors of many impacts would make the orbit seem attracting.
+        derivative = derivative / np.sqrt(np.abs(np.linalg.det(derivative)))
+    multipliers = np.linalg.eigvals(derivative).astype(np.complex128)
+    return multipliers[np.lexsort((-multipliers.imag, -np.abs(multipliers)))] + 0.0
 
 
-def sizes_of(multipliers: NDArray[np.complex128]) -> Floats:
+def compute_moduli(multipliers: NDArray[np.complex128]) -> Floats:
     """Compute absolute multipliers (pairs along the last axis), exactly 1 within rounding error."""
     sizes = np.abs(multipliers)
     is_pair = np.abs(np.prod(sizes, axis=-1, keepdims=True) - 1.0) < _NEUTRAL
@@ -302,7 +304,7 @@ def periodic_orbits(
 
     References
     ----------
-    J. M. T. Thompson and H. B. Stewart, "Nonlinear Dynamics and Chaos", 2nd edition, Wiley (2002), chapter 15.
+    :cite:t:`thompson2002`, "Nonlinear dynamics and chaos", chapter 15.
 
     Examples
     --------
@@ -314,134 +316,140 @@ def periodic_orbits(
     <PeriodicOrbit: stable orbit of 1 period with 1 impact, multipliers -0.0342 + 0.499i, -0.0342 - 0.499i>
     <PeriodicOrbit: stable orbit of 1 period with complete chattering, multipliers 0, 0>
     """
-    count = checks.integer(period, "period", InvalidOption, minimum=1)
-    search = _Search(StroboscopicMap(body, motion, model, chattering), count)
+    n_periods = checks.integer(period, "period", InvalidOption, minimum=1)
+    search = _OrbitSearch(StroboscopicMap(body, motion, model, chattering), n_periods)
     distinct = np.empty((0, 2))
-    for state in search.converged(search.starts(starts), count):
-        if not len(distinct) or np.min(search.size(distinct - state)) > SAME:
+    for state in search.find_recurrent(search.create_starts(starts), n_periods):
+        if not len(distinct) or np.min(search.compute_sizes(distinct - state)) > MAX_ORBIT_DISTANCE:
             distinct = np.vstack([distinct, state])
-    kept: list[PeriodicOrbit] = []
-    for each in map(search.orbit, distinct):
-        shifts = [np.roll(each.states, k, axis=0) for k in range(each.period)]
-        same = (other for other in kept if other.period == each.period)
-        if not any(np.max(search.size(shift - other.states)) < SAME for other in same for shift in shifts):
-            kept.append(each)
-    return sorted(kept, key=lambda each: (each.period, each.impacts, *each.state))
+    orbits: list[PeriodicOrbit] = []
+    for orbit in map(search.create_least_orbit, distinct):
+        shifts = [np.roll(orbit.states, k, axis=0) for k in range(orbit.period)]
+        candidates = (known for known in orbits if known.period == orbit.period)
+        if not any(
+            np.max(search.compute_sizes(shift - known.states)) < MAX_ORBIT_DISTANCE
+            for known in candidates
+            for shift in shifts
+        ):
+            orbits.append(orbit)
+    return sorted(orbits, key=lambda orbit: (orbit.period, orbit.impacts, *orbit.state))
 
 
-class _Search:
+class _OrbitSearch:
     """Search for states that recur after a number of periods."""
 
-    def __init__(self, strobe: StroboscopicMap, count: int) -> None:
-        self.strobe, self.count = strobe, count
-        self.scale = scale_of(strobe)
+    def __init__(self, strobe: StroboscopicMap, n_periods: int) -> None:
+        self.strobe, self.n_periods = strobe, n_periods
+        self.scale = compute_scale(strobe)
 
-    def starts(self, given: ArrayLike | int | None) -> Floats:
-        """Return the given initial states, or about as many as requested."""
-        if given is not None and np.ndim(given) > 0:
-            return self.strobe.checked_starts(given, "starts")
-        wanted = 1024 if given is None else checks.integer(given, "starts", InvalidOption, minimum=1)
+    def create_starts(self, requested: ArrayLike | int | None) -> Floats:
+        """Return the requested initial states, or create about the requested number."""
+        if requested is not None and np.ndim(requested) > 0:
+            return self.strobe._check_starts(requested, "starts")
+        n_starts = 1024 if requested is None else checks.integer(requested, "starts", InvalidOption, minimum=1)
         strobe, (low, high) = self.strobe, self.strobe.body.stops
-        both = strobe._is_two_sided
-        speed = self._fastest()
-        side = max(2, round(math.sqrt(wanted / (2 if both else 1))))
-        phases = strobe.forcing_period * (np.arange(side) + 0.5) / side
-        speeds = speed * ((np.arange(side) + 0.5) / side) ** 1.5
+        is_two_sided = strobe._is_two_sided
+        max_speed = self._estimate_max_speed()
+        n_points = max(2, round(math.sqrt(n_starts / (2 if is_two_sided else 1))))
+        phases = strobe.forcing_period * (np.arange(n_points) + 0.5) / n_points
+        speeds = max_speed * ((np.arange(n_points) + 0.5) / n_points) ** 1.5
         impacts = np.stack(np.meshgrid(phases, speeds), axis=-1).reshape(-1, 2)
-        if both:
+        if is_two_sided:
             impacts = np.concatenate([impacts, impacts * [1.0, -1.0]])
-        few = np.linspace(-0.9, 0.9, max(2, side // 4))
-        width = high - low if strobe._records[0]["two_stops"] else self.scale.coordinate
-        at = 0.5 * (low + high) + 0.5 * width * few if both else low + width * (1.0 + few)
-        between = np.stack(np.meshgrid(at, speed * few), axis=-1).reshape(-1, 2)
+        fractions = np.linspace(-0.9, 0.9, max(2, n_points // 4))
+        width = high - low if strobe._body_records[0]["two_stops"] else self.scale.coordinate
+        coordinates = 0.5 * (low + high) + 0.5 * width * fractions if is_two_sided else low + width * (1.0 + fractions)
+        between = np.stack(np.meshgrid(coordinates, max_speed * fractions), axis=-1).reshape(-1, 2)
         rests = np.array([[stop, 0.0] for stop in {low, high}])
         states = np.concatenate([rests, between, strobe.from_impacts(impacts)])
-        states = states[self._possible(states)]
-        later = strobe(states[::_EVERY], _LATER * self.count)
-        return np.concatenate([states, later[self._possible(later)]])
+        states = states[self._are_admissible(states)]
+        later = strobe(states[::_LATER_STRIDE], _N_LATER_PERIODS * self.n_periods)
+        return np.concatenate([states, later[self._are_admissible(later)]])
 
-    def _fastest(self) -> float:
-        """Return a speed that impacts of an orbit of this period hardly exceed."""
+    def _estimate_max_speed(self) -> float:
+        """Estimate the largest impact speed of orbits of this period."""
         strobe = self.strobe
         restitution = float(np.max(strobe.bodies.restitution))
         gain = restitution / max(1.0 - restitution, 1e-300)
-        push = self.count * strobe.forcing_period * mean_size(strobe.motion)
-        speed = min(max(gain, _LEAST_GAIN), _MOST_GAIN) * push or self.scale.velocity
-        record = strobe._records[0]
+        push = self.n_periods * strobe.forcing_period * estimate_mean_acceleration(strobe.motion)
+        speed = min(max(gain, _MIN_GAIN), _MAX_GAIN) * push or self.scale.velocity
+        record = strobe._body_records[0]
         if not math.isinf(min(strobe.body.balance)):
-            return min(speed, _BLOCK_SPEED * self.scale.velocity + push)
-        if float(record["stiffness"][0]) == 0.0:  # The flight time of a ball is proportional to its speed.
+            return min(speed, _MAX_BLOCK_SPEED * self.scale.velocity + push)
+        if float(record["stiffness"][0]) == 0.0:  # the flight time of a ball is proportional to its speed
             pull = float(record["threshold_slope"][0] * record["threshold"][0])
-            return min(speed, 0.5 * self.count * strobe.forcing_period * pull + push)
+            return min(speed, 0.5 * self.n_periods * strobe.forcing_period * pull + push)
         return speed
 
-    def _possible(self, states: Floats) -> Flags:
+    def _are_admissible(self, states: Floats) -> Flags:
         """Whether each state is admissible."""
-        record, (low, high) = self.strobe._records[0], self.strobe.body.stops
+        record, (low, high) = self.strobe._body_records[0], self.strobe.body.stops
         x, v = states.T
-        fine: Flags = np.all(np.isfinite(states), axis=-1)
+        admissible: Flags = np.all(np.isfinite(states), axis=-1)
         if self.strobe._is_two_sided and not record["two_stops"]:
-            return np.asarray(fine & (np.abs(x) < record["overturn_angle"]))
+            return np.asarray(admissible & (np.abs(x) < record["overturn_angle"]))
         if record["two_stops"]:
-            fine &= (x <= high) & ~((x == high) & (v > 0.0))
-        return np.asarray(fine & (x >= low) & ~((x == low) & (v < 0.0)))
+            admissible &= (x <= high) & ~((x == high) & (v > 0.0))
+        return np.asarray(admissible & (x >= low) & ~((x == low) & (v < 0.0)))
 
-    def mapped(self, states: Floats, count: int) -> Floats:
-        """Return rows of states, mapped states and derivatives, shape (n, 8); NaN for inadmissible states."""
-        rows, fine = np.full((len(states), 8), np.nan), self._possible(states)
-        after, change = self.strobe.derivative(states[fine], count)
-        rows[:, :2], rows[fine, 2:4], rows[fine, 4:] = states, after, change.reshape(-1, 4)
+    def map_with_derivatives(self, states: Floats, n_periods: int) -> Floats:
+        """Compute rows of states, their images and derivatives, shape (n, 8); NaN for inadmissible states."""
+        rows, admissible = np.full((len(states), 8), np.nan), self._are_admissible(states)
+        images, derivatives = self.strobe.derivative(states[admissible], n_periods)
+        rows[:, :2], rows[admissible, 2:4], rows[admissible, 4:] = states, images, derivatives.reshape(-1, 4)
         return rows
 
-    def residuals(self, rows: Floats) -> tuple[Floats, Flags]:
-        """Return scaled distances between states and mapped states, and whether they are only rounding errors."""
-        size = self.size(rows[:, 2:4] - rows[:, :2])
-        allowed = 1e-11 * np.maximum(1.0, np.max(np.abs(rows[:, 4:]), axis=1))
-        # Larger residuals are not accepted as orbits, however large the derivative.
-        return size, size < np.minimum(allowed, 1e-6)
+    def compute_residuals(self, rows: Floats) -> tuple[Floats, Flags]:
+        """Compute scaled distances between states and their images, and whether they are only rounding errors."""
+        residual = self.compute_sizes(rows[:, 2:4] - rows[:, :2])
+        tolerance = 1e-11 * np.maximum(1.0, np.max(np.abs(rows[:, 4:]), axis=1))
+        # Larger residuals are never accepted, even with a large derivative.
+        return residual, residual < np.minimum(tolerance, 1e-6)
 
-    def converged(self, states: Floats, count: int) -> Floats:
-        """Return the recurrent states to which Newton's method converges."""
-        rows, done = self.mapped(states, count), np.zeros(len(states), dtype=bool)
+    def find_recurrent(self, states: Floats, n_periods: int) -> Floats:
+        """Find the recurrent states to which Newton's method converges."""
+        rows, done = self.map_with_derivatives(states, n_periods), np.zeros(len(states), dtype=bool)
         for _ in range(40):
-            residual, sharp = self.residuals(rows)
-            open_ = np.flatnonzero(~(done & sharp) & np.isfinite(residual))
-            if not len(open_):
+            residual, accurate = self.compute_residuals(rows)
+            active = np.flatnonzero(~(done & accurate) & np.isfinite(residual))
+            if not len(active):
                 break
-            done |= sharp  # One more step after the first that is accurate to rounding.
-            new, step, better = rows[open_], _newton_step(rows[open_]), np.zeros(len(open_), dtype=bool)
+            done |= accurate  # one more step follows the first that is accurate to rounding
+            new, steps, better = rows[active], _compute_newton_steps(rows[active]), np.zeros(len(active), dtype=bool)
             # A step that does not reduce the residual is halved.
             for halving in range(5):
-                left = np.flatnonzero(~better)
-                tried = self.mapped(rows[open_[left], :2] + 0.5**halving * step[left], count)
+                remaining = np.flatnonzero(~better)
+                candidates = self.map_with_derivatives(
+                    rows[active[remaining], :2] + 0.5**halving * steps[remaining], n_periods
+                )
                 # A step that is already accurate to rounding need not reduce the residual.
-                better[left] = near = self.residuals(tried)[0] < residual[open_[left]]
-                new[left[near]] = tried[near]
-            stuck = ~better & ~sharp[open_]
+                better[remaining] = reduced = self.compute_residuals(candidates)[0] < residual[active[remaining]]
+                new[remaining[reduced]] = candidates[reduced]
+            stuck = ~better & ~accurate[active]
             if np.any(stuck):  # The map itself leads to an attractor.
-                new[stuck] = self.mapped(new[stuck, 2:4], count)
-            rows[open_] = new
-        return rows[self.residuals(rows)[1], :2]
+                new[stuck] = self.map_with_derivatives(new[stuck, 2:4], n_periods)
+            rows[active] = new
+        return rows[self.compute_residuals(rows)[1], :2]
 
-    def size(self, differences: Floats) -> Floats:
+    def compute_sizes(self, differences: Floats) -> Floats:
         """Compute the scaled sizes of differences between states."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(np.max(np.abs(differences) / self.scale, axis=-1))
 
-    def orbit(self, state: Floats) -> PeriodicOrbit:
+    def create_least_orbit(self, state: Floats) -> PeriodicOrbit:
         """Create the orbit of a state, with its least period."""
-        for count in range(1, self.count):
-            if self.count % count == 0:
-                after = self.strobe(state, count)
-                if self.size(after - state) < math.sqrt(SAME):
-                    found = self.converged(state[None], count)
-                    if len(found) and self.size(found[0] - state) < SAME:
-                        return orbit_at(self.strobe, found[0], count)
-        return orbit_at(self.strobe, state, self.count)
+        for divisor in range(1, self.n_periods):
+            if self.n_periods % divisor == 0:
+                image = self.strobe(state, divisor)
+                if self.compute_sizes(image - state) < math.sqrt(MAX_ORBIT_DISTANCE):
+                    recurrent = self.find_recurrent(state[None], divisor)
+                    if len(recurrent) and self.compute_sizes(recurrent[0] - state) < MAX_ORBIT_DISTANCE:
+                        return create_orbit(self.strobe, recurrent[0], divisor)
+        return create_orbit(self.strobe, state, self.n_periods)
 
 
-def _newton_step(rows: Floats) -> Floats:
-    """Compute Newton steps towards fixed points, or steps of the map where Newton's step does not exist."""
+def _compute_newton_steps(rows: Floats) -> Floats:
+    """Compute Newton steps towards fixed points, or steps of the map if the equations are singular."""
     jacobian, residual = rows[:, 4:].reshape(-1, 2, 2) - np.eye(2), rows[:, 2:4] - rows[:, :2]
     with np.errstate(all="ignore"):
         (a, b), (c, d) = jacobian.transpose(1, 2, 0)

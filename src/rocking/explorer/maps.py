@@ -15,7 +15,7 @@ from rocking.analysis.overturning import modes_of
 from rocking.block import Blocks
 from rocking.block.sides import housner_restitution
 from rocking.chattering.duration import critical_amplitude
-from rocking.chattering.maps import UpliftOutcome, last_exceedance, outcomes_of
+from rocking.chattering.maps import UpliftOutcome, classify_uplifts, find_last_exceedance
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
@@ -136,8 +136,8 @@ def simulate_grid(grid: MapGrid) -> Generator[MapPart]:
             has_thresholds = (thresholds == threshold_pair).all(axis=1)
             scaled_thresholds = _scale_thresholds(grid, threshold_pair / task.factor, task.factor)
             if scaled_thresholds not in exceedances:
-                exceedances[scaled_thresholds] = last_exceedance(grid.motion, *scaled_thresholds)
-            outcome[has_thresholds] = outcomes_of(results[has_thresholds], exceedances[scaled_thresholds])
+                exceedances[scaled_thresholds] = find_last_exceedance(grid.motion, *scaled_thresholds)
+            outcome[has_thresholds] = classify_uplifts(results[has_thresholds], exceedances[scaled_thresholds])
         rest_duration = (results["first_rest"] - results["first_uplift"]) * time_scale[indices]
         quantities = {
             "outcome": outcome,

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from rocking import pulses
 from rocking.core.arrays import Floats
-from rocking.dynamics.bifurcation import period_of, states_after
-from rocking.dynamics.maps import PeriodOutcome, StroboscopicMap, scale_of, stroboscopic_map
-from rocking.dynamics.orbits import multipliers_at
+from rocking.dynamics.bifurcation import find_period, record_states
+from rocking.dynamics.maps import PeriodOutcome, StroboscopicMap, compute_scale, stroboscopic_map
+from rocking.dynamics.orbits import compute_multipliers
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible
 from rocking.explorer.maps import AXES, Axis, change_pulse, read_range
@@ -30,7 +30,7 @@ from rocking.simulation.simulate import simulate
 TRANSIENT_PERIODS: Final = 300
 STORED_STATES: Final = 64
 
-#: Longest period that `period_of` detects in the stored states.
+#: Longest period that `find_period` detects in the stored states.
 MAX_PERIOD: Final = STORED_STATES // 2
 
 #: Periods after which a case counts as aperiodic, and states that are then drawn.
@@ -120,7 +120,7 @@ def create_map(case: Case, sine: Sine) -> StroboscopicMap:
 def settle(strobe: StroboscopicMap, start: ArrayLike, periods: int, stored: int = STORED_STATES) -> SteadyState:
     """Return the steady state, or overturning, that follows a state within a number of periods."""
     initial, count = np.asarray(start, dtype=float), min(stored, periods)
-    last_states = states_after(strobe, initial[None], periods - count, count)[0][0]
+    last_states = record_states(strobe, initial[None], periods - count, count)[0][0]
     if np.isnan(last_states[-1, 0]):
         orbit = strobe.orbit(initial, periods)
         duration = int(np.argmax(np.isnan(orbit[:, 0])))
@@ -134,7 +134,7 @@ def settle(strobe: StroboscopicMap, start: ArrayLike, periods: int, stored: int 
             duration,
             (orbit[first_period], duration - first_period),
         )
-    period = period_of(last_states[-STORED_STATES:], scale_of(strobe))
+    period = find_period(last_states[-STORED_STATES:], compute_scale(strobe))
     _, outcome, _ = strobe.advance(last_states[-1])
     has_rest = period > 0 and not np.any(strobe.derivative(last_states[-1], period)[1])
     drawn_periods = period or MAX_PERIOD
@@ -224,7 +224,7 @@ def _describe_stability(case: Case, sine: Sine, steady_state: SteadyState, strob
     if steady_state.has_rest:
         return phrase("orbit.forgets", begins=beginning)
     _, jacobian = strobe.derivative(steady_state.states[-1], steady_state.period)
-    first_multiplier, second_multiplier = (complex(multiplier) for multiplier in multipliers_at(strobe, jacobian))
+    first_multiplier, second_multiplier = (complex(multiplier) for multiplier in compute_multipliers(strobe, jacobian))
     if first_multiplier.imag:
         pair = phrase("orbit.complex_pair", real=first_multiplier.real, imaginary=abs(first_multiplier.imag))
     else:

@@ -67,8 +67,8 @@ def iterate(
 ) -> None:
     """Take each state through at most ``periods`` periods, until it enters a trap, overturns or rests forever.
 
-    ``ending`` is then its `PeriodOutcome`, ``trap_rows[k]`` the row of its trap in ``traps``, shape (n, `TRAP`), or -1, and
-    ``period_counts[k]`` the number of periods. Row n of ``orbit[k]``, if any, is (u, v, side) after n + 1 periods,
+    ``ending`` is then its `PeriodOutcome`, ``trap_rows[k]`` the row of its trap in ``traps``, shape (n, `TRAP`), or -1,
+    and ``period_counts[k]`` the number of periods. Row n of ``orbit[k]``, if any, is (u, v, side) after n + 1 periods,
     unchanged after the last known state.
     """
     for k in range(states.shape[0]):
@@ -300,8 +300,8 @@ def measure_stretches(
     A row contains the logarithms of the stretch along a direction that follows the derivatives, and so becomes the one
     that grows fastest, and across it: the diagonal of R where the derivative times Q is Q' R. Both are -inf in a period
     with a rest, after which the direction is arbitrary. Rows end before the period of overturning or permanent rest;
-    ``ending`` is the `PeriodOutcome`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space. Returns
-    the number of impacts.
+    ``ending`` is the `PeriodOutcome`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space.
+    Returns the number of impacts.
     """
     M = frame[:2]
     impacts = 0
