@@ -102,12 +102,7 @@ class RockingError(Exception):
     """
 
     def __init__(
-        self,
-        message: str,
-        *arguments: str,
-        path: str | None = None,
-        line: int | None = None,
-        value: object = None,
+        self, message: str, *arguments: str, path: str | None = None, line: int | None = None, value: object = None
     ) -> None:
         super().__init__(message, *arguments)
         self.message = Message(message, arguments)

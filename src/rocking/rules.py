@@ -401,13 +401,7 @@ def _least_ratio(
     return demand, capacity
 
 
-def check(
-    block: Block,
-    motions: Motions,
-    *,
-    rules: Iterable[str] | None = None,
-    model: Model = "nonlinear",
-) -> Check:
+def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None, model: Model = "nonlinear") -> Check:
     """Apply rules of thumb to a block under motions, and compare with simulations.
 
     Parameters

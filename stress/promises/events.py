@@ -144,13 +144,7 @@ def after_a_subnormal_speed(rng: np.random.Generator) -> Question:
 
 
 def _of_arc(
-    motion: rocking.Motion,
-    side: Side,
-    true: list[Any],
-    until: float,
-    margin: float,
-    known: float,
-    **initial: float,
+    motion: rocking.Motion, side: Side, true: list[Any], until: float, margin: float, known: float, **initial: float
 ) -> Question:
     """When an arc on side + comes down, the motion being one or two constant pieces."""
     p, alpha = side.p, side.alpha

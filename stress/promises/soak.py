@@ -115,10 +115,5 @@ def table(found: Found) -> str:
 
 
 PROMISE = Promise(
-    name="soak",
-    says="memory and descriptors stay, however long it runs",
-    parts=6,
-    small=3,
-    judge=judge,
-    table=table,
+    name="soak", says="memory and descriptors stay, however long it runs", parts=6, small=3, judge=judge, table=table
 )

@@ -167,11 +167,7 @@ class ResponseRose(DatasetResult):
     """
 
     TABLES = MappingProxyType(
-        {
-            "responses": ("overturned", "peak_over_slenderness"),
-            "shares": ("overturned_share",),
-            "levels": ("anywhere",),
-        }
+        {"responses": ("overturned", "peak_over_slenderness"), "shares": ("overturned_share",), "levels": ("anywhere",)}
     )
     POOLED = ("pair", "azimuth")
 

@@ -212,11 +212,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         looked_at = _Levels(data.level)
         what = "record" if "record" in data.coords else "motion"
         rows = [
-            [
-                label,
-                *([b] if many else []),
-                looked_at.overturning(self.bands(block=b, motion=m)),
-            ]
+            [label, *([b] if many else []), looked_at.overturning(self.bands(block=b, motion=m))]
             for m, label in enumerate(labels_of(data, what, with_history=False))
             for b in range(data.sizes["block"])
         ]

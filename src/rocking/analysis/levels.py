@@ -327,11 +327,7 @@ class Boundaries:
 
 
 def boundaries(
-    levels: Floats,
-    outcome: Integers,
-    outcome_of: Callable[[Integers, Floats], Integers],
-    *,
-    rtol: float,
+    levels: Floats, outcome: Integers, outcome_of: Callable[[Integers, Floats], Integers], *, rtol: float
 ) -> Boundaries:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 

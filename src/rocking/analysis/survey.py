@@ -239,12 +239,7 @@ def _short(factor: float) -> str:
 
 
 def survey(
-    block: Body,
-    motions: Motions,
-    *,
-    friction: float | None = None,
-    precision: float = PRECISION,
-    **options: Any,
+    block: Body, motions: Motions, *, friction: float | None = None, precision: float = PRECISION, **options: Any
 ) -> Survey:
     """Simulate a block under many motions.
 

@@ -267,11 +267,7 @@ def even_sides(
 
 
 def sides_on_pivots(
-    distances: tuple[float, float],
-    height: float,
-    gyration_squared: float,
-    gravity: float,
-    restitution: object,
+    distances: tuple[float, float], height: float, gyration_squared: float, gravity: float, restitution: object
 ) -> tuple[Side, Side]:
     """Return the sides of a body, from its pivot distances, the height of its centre of mass, m, and k^2, m^2."""
     plus, minus = distances

@@ -372,13 +372,7 @@ class Block(Rocking):
         return cls.__new__(cls)._fill(sides, g, text)
 
     @classmethod
-    def one_sided(
-        cls,
-        *restraints: Any,
-        lean: float = 0.0,
-        restitution: Any = None,
-        **sizes: Any,
-    ) -> Any:
+    def one_sided(cls, *restraints: Any, lean: float = 0.0, restitution: Any = None, **sizes: Any) -> Any:
         """Create a rectangular block that rocks to side + only, such as a facade against transverse walls.
 
         Parameters

@@ -11,15 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.block import Block
-from rocking.calibration.space import (
-    EVERYTHING_IS_KNOWN,
-    HIGHEST,
-    PARAMETERS,
-    Range,
-    is_known,
-    unit_of,
-    value_range,
-)
+from rocking.calibration.space import EVERYTHING_IS_KNOWN, HIGHEST, PARAMETERS, Range, is_known, unit_of, value_range
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model

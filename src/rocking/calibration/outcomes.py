@@ -158,12 +158,7 @@ class Calibration(Result):
         return chances_of(self.weights @ fell, self.diagnostics.effective, self.outlier_probability)
 
     def cross_validate(
-        self,
-        *,
-        groups: Sequence[object] | None = None,
-        folds: int = 10,
-        repeats: int = 1,
-        seed: int = 0,
+        self, *, groups: Sequence[object] | None = None, folds: int = 10, repeats: int = 1, seed: int = 0
     ) -> Validation:
         """Predict every test from fits without it.
 

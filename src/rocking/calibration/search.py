@@ -318,12 +318,7 @@ def r_hat(runs: Floats) -> float:
 
 
 def posterior(
-    evidence: Evidence,
-    count: int,
-    rounds: int,
-    rng: np.random.Generator,
-    *,
-    exponent: float = 1.0,
+    evidence: Evidence, count: int, rounds: int, rng: np.random.Generator, *, exponent: float = 1.0
 ) -> Floats:
     """Draw populations from the posterior, shape (count, 2 k), or from a tempered one if an exponent is set.
 

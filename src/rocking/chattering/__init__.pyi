@@ -8,12 +8,7 @@ from .duration import (
     is_complete,
     sequence,
 )
-from .expansions import (
-    asymptotic_table,
-    first_impact_speed,
-    first_interval,
-    series_coefficients,
-)
+from .expansions import asymptotic_table, first_impact_speed, first_interval, series_coefficients
 from .maps import ChatteringEpisodes, ChatteringMap, UpliftOutcome, chattering_episodes, chattering_map
 from .report import ChatteringReport, CriticalReport, chattering_report, critical_report
 

@@ -101,10 +101,7 @@ _VARIABLE_ATTRIBUTES: Final[dict[str, dict[str, Any]]] = {
 }
 
 
-def chattering_map(
-    family: Family,
-    parameters: Mapping[str, ArrayLike],
-) -> ChatteringMap:
+def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> ChatteringMap:
     """Simulate a family of inputs on a grid, and determine where chattering after the first uplift is complete.
 
     Parameters
@@ -164,9 +161,7 @@ def chattering_map(
     for entry in inputs:
         if not (isinstance(entry, SimulationInput) and isinstance(entry.motion, Motion)):
             raise InvalidOption(
-                "{} must return a SimulationInput of a block and a Motion for each pair",
-                "family",
-                value=entry,
+                "{} must return a SimulationInput of a block and a Motion for each pair", "family", value=entry
             )
     points: list[_MapPoint] = []
     with Progress("mapping", len(inputs)) as bar:

@@ -12,12 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.chattering.duration import chattering_time, critical_amplitude, sequence
-from rocking.chattering.expansions import (
-    MAX_ORDER,
-    asymptotic_table,
-    first_impact_speed,
-    first_interval,
-)
+from rocking.chattering.expansions import MAX_ORDER, asymptotic_table, first_impact_speed, first_interval
 from rocking.core import checks
 from rocking.core.result import Result, format_some_rows
 from rocking.core.tables import Column, format_count

@@ -54,8 +54,7 @@ class _Start(StartOptions):
         float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
     ] = None
     precision: Annotated[
-        float,
-        Parameter(help="Relative precision of the record: the outcome is also counted in 11 motions within it."),
+        float, Parameter(help="Relative precision of the record: the outcome is also counted in 11 motions within it.")
     ] = PRECISION
 
 

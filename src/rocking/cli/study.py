@@ -11,15 +11,7 @@ from typing import Annotated, Final
 from cyclopts import App, Parameter
 
 from rocking.cli.options import MEASURE, WHOLE, IntensityOptions, parse_limit_states
-from rocking.cli.output import (
-    OUTPUT,
-    PrintOptions,
-    QuietOptions,
-    left_out,
-    output_folder,
-    print_result,
-    write_results,
-)
+from rocking.cli.output import OUTPUT, PrintOptions, QuietOptions, left_out, output_folder, print_result, write_results
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.result import Result

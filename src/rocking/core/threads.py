@@ -98,10 +98,7 @@ def count_cores() -> int:
 
 
 def map_in_threads(
-    function: Callable[[Item], Output],
-    items: Iterable[Item],
-    *,
-    cancelled: threading.Event | None = None,
+    function: Callable[[Item], Output], items: Iterable[Item], *, cancelled: threading.Event | None = None
 ) -> Iterator[Output]:
     """Yield the results of some work on each item, in order, from the number of threads in `set_options`.
 

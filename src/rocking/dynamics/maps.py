@@ -136,8 +136,7 @@ class PeriodicForcing:
         pairs = checks.numbers(values, name, InvalidOption)
         if pairs.ndim == 0 or pairs.shape[-1] != 2:
             raise InvalidOption(
-                f"{{}} must contain pairs ({coordinate}, velocity) along the last axis; got shape {pairs.shape}",
-                name,
+                f"{{}} must contain pairs ({coordinate}, velocity) along the last axis; got shape {pairs.shape}", name
             )
         return pairs
 

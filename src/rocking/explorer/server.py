@@ -151,11 +151,7 @@ class App:
     """Application; ``opening`` contains the texts of the initial case, ``framed_by`` the pages that may frame it."""
 
     def __init__(
-        self,
-        explorer: Explorer,
-        opening: Mapping[str, str],
-        study: StudyView | None = None,
-        framed_by: str = "'none'",
+        self, explorer: Explorer, opening: Mapping[str, str], study: StudyView | None = None, framed_by: str = "'none'"
     ) -> None:
         self.explorer = explorer
         self.opening = dict(opening)

@@ -42,8 +42,7 @@ GROUP = np.dtype(
 #: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
 #: instead of its gain. ``curve`` max |u''| bounds the distance of the rotation above or below both ends of the step.
 STEP_CONSTANTS = np.dtype(
-    [(name, *_SIDES) for name in ("stiffness", "pull", "push", "first", "second", "third", "curve")],
-    align=True,
+    [(name, *_SIDES) for name in ("stiffness", "pull", "push", "first", "second", "third", "curve")], align=True
 )
 
 MaybeLine = TypeVar("MaybeLine", Line, None, Line | None)

@@ -25,16 +25,7 @@ from rocking.kernels.ground import (
 )
 from rocking.kernels.lane_steps import GROUP, STEP_CONSTANTS, WIDTH, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.march import march
-from rocking.kernels.state import (
-    TO_THE_END,
-    Ending,
-    Record,
-    Records,
-    expose_fields,
-    new_record,
-    new_records,
-    new_table,
-)
+from rocking.kernels.state import TO_THE_END, Ending, Record, Records, expose_fields, new_record, new_records, new_table
 
 #: Largest sqrt(|lam W|) h in lanes, where W is the weight divided by the weight at rest: of a step, of a substep of the
 #: nonlinear model, and of a substep of the linear model under varying weight.

@@ -18,12 +18,7 @@ _ROUNDING_FACTOR = 1.0 + 2.0**-50
 
 @kernel
 def write_peak_displacements(
-    breakpoints: Floats,
-    coefficients: Floats,
-    frequencies: Floats,
-    damping: float,
-    work: Floats,
-    peaks: Floats,
+    breakpoints: Floats, coefficients: Floats, frequencies: Floats, damping: float, work: Floats, peaks: Floats
 ) -> None:
     """Write the largest |u| (m) of u'' + 2 z w u' + w^2 u = -a(t) from rest into ``peaks``, for each w (rad/s).
 
@@ -38,12 +33,7 @@ def write_peak_displacements(
 
 @shared
 def _find_peak(
-    breakpoints: Floats,
-    coefficients: Floats,
-    frequency: float,
-    damping: float,
-    force: Floats,
-    series: Floats,
+    breakpoints: Floats, coefficients: Floats, frequency: float, damping: float, force: Floats, series: Floats
 ) -> float:
     """Compute the peak displacement of one oscillator; ``force`` and ``series`` are scratch space."""
     series[:] = 0.0

@@ -50,10 +50,7 @@ def write_overturned_fractions(
 
 @kernel
 def write_log_sums(
-    factors: NDArray[np.float64],
-    powers: NDArray[np.float64],
-    exponents: NDArray[np.float64],
-    sums: NDArray[np.float64],
+    factors: NDArray[np.float64], powers: NDArray[np.float64], exponents: NDArray[np.float64], sums: NDArray[np.float64]
 ) -> None:
     """Write the logarithm of the sum over j of exp(factors[c] @ powers[:, j]) into ``sums``, for each c.
 

@@ -113,12 +113,7 @@ class Motion(Processable):
 
     @classmethod
     def from_samples(
-        cls,
-        acceleration: ArrayLike,
-        dt: float,
-        *,
-        name: str = "samples",
-        description: Description | None = None,
+        cls, acceleration: ArrayLike, dt: float, *, name: str = "samples", description: Description | None = None
     ) -> Motion:
         """Create a motion that is linear between evenly spaced samples.
 
@@ -158,12 +153,7 @@ class Motion(Processable):
 
     @classmethod
     def from_points(
-        cls,
-        times: ArrayLike,
-        acceleration: ArrayLike,
-        *,
-        name: str = "points",
-        description: Description | None = None,
+        cls, times: ArrayLike, acceleration: ArrayLike, *, name: str = "points", description: Description | None = None
     ) -> Motion:
         """Create a motion that is linear between points at uneven times, s, like `from_samples`.
 

@@ -349,10 +349,7 @@ def simulate_many(
 
 
 def outcomes_of(
-    product: Product,
-    setup: Setup,
-    names: Iterable[str] = tuple(VARIABLES),
-    near: float = 1.0,
+    product: Product, setup: Setup, names: Iterable[str] = tuple(VARIABLES), near: float = 1.0
 ) -> dict[str, NDArray[np.generic]]:
     """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME`."""
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}

@@ -50,10 +50,7 @@ class Rose(DatasetResult):
 
     TABLES = MappingProxyType(
         {
-            "rose": (
-                *("acceleration", "alpha", "p", "restitution", "radius", "rise"),
-                *("coupling", "aside", "gap"),
-            ),
+            "rose": (*("acceleration", "alpha", "p", "restitution", "radius", "rise"), *("coupling", "aside", "gap")),
             "support": ("east", "north"),
         }
     )

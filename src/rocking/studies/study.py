@@ -151,12 +151,7 @@ class Study:
         """Return the progress; may be called while another process runs the study."""
         return Status(len(self._store.done()), len(self._store.grid), int(np.prod(self._store.grid.shape)))
 
-    def run(
-        self,
-        executor: Executor | Any = None,
-        *,
-        part: str | None = None,
-    ) -> RunReport:
+    def run(self, executor: Executor | Any = None, *, part: str | None = None) -> RunReport:
         """Compute every unit that is not done.
 
         Parameters
