@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.levels import values_of
+from rocking.analysis.levels import compute_intensities
 from rocking.analysis.survey import Check
 from rocking.block import Block, Blocks, one_block
 from rocking.core import checks
@@ -34,7 +34,7 @@ __all__ = ["RULES", "Check", "Rating", "asce_43_05", "check", "housner", "ishiya
 
 #: Ratios of rotation to slenderness for the comparison with a spectrum, from stiff oscillators to a rocking period of
 #: 30/p.
-_SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linspace(0.5, 0.999, 26))
+_ROTATION_SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linspace(0.5, 0.999, 26))
 
 #: Ratio of damping to -ln e^2 (Makris and Konstantinidis 2003).
 _DAMPING: Final = 0.34
@@ -88,13 +88,13 @@ Rule = Callable[[Blocks | Block | Iterable[Block], Motion], Rating]
 #: Demand and capacity of the sides of blocks, shape (n, 2).
 Comparison = Callable[[Blocks, Motion], tuple[Any, Floats]]
 
-_rules: dict[str, Rule] = {}
+_rules_by_name: dict[str, Rule] = {}
 
 #: Rules by name.
-RULES: Final[Mapping[str, Rule]] = MappingProxyType(_rules)
+RULES: Final[Mapping[str, Rule]] = MappingProxyType(_rules_by_name)
 
 #: Common sections of the docstrings of all rules.
-_DOCUMENTATION: Final = """{}
+_DOCSTRING: Final = """{}
 
     Parameters
     ----------
@@ -121,21 +121,21 @@ def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
     def rule_of(comparison: Comparison) -> Rule:
         @wraps(comparison, assigned=("__module__", "__name__", "__qualname__"))
         def rule(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
-            demand, capacity = np.broadcast_arrays(*comparison(_free(blocks), list_motions([motion])[0]))
+            demand, capacity = np.broadcast_arrays(*comparison(_combine_free_blocks(blocks), list_motions([motion])[0]))
             weaker = np.arange(len(demand)), np.argmax(demand / capacity, axis=1)
             return Rating(name, demand[weaker], capacity[weaker], unit)
 
         name = comparison.__name__
         first, _, rest = (comparison.__doc__ or "").partition("\n\n")
-        rule.__doc__ = _DOCUMENTATION.format(first, rest.rstrip(), name, example)
+        rule.__doc__ = _DOCSTRING.format(first, rest.rstrip(), name, example)
         del rule.__wrapped__  # the comparison has other arguments than the rule
-        _rules[name] = rule
+        _rules_by_name[name] = rule
         return rule
 
     return rule_of
 
 
-def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
+def _combine_free_blocks(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
     """Combine blocks, or raise an error if they have restraints."""
     many = Blocks.from_bodies(blocks)
     for each in many if many.terms else ():
@@ -273,7 +273,7 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     ASCE (2005). Seismic Design Criteria for Structures, Systems, and Components in Nuclear Facilities. ASCE/SEI 43-05,
     Appendix A, section A.2.
     """
-    return _least_ratio(blocks, motion, _reserve_energy)
+    return _find_min_ratio(blocks, motion, _create_energy_oscillator)
 
 
 @_rule("m", "1.070")
@@ -318,7 +318,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
             f"priestley needs a restitution above {lowest:.2g}, from where on its damping is below critical, not "
             f"{blocks.restitution.min():g}; leave that rule out"
         )
-    return _least_ratio(blocks, motion, _free_rocking)
+    return _find_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 
 
 def rate(
@@ -353,7 +353,7 @@ def rate(
     """
     wanted = [*RULES] if rules is None else checks.items(rules, "rules", InvalidOption)
     names = [checks.choice(name, "rules", InvalidOption, [*RULES]) for name in wanted]
-    many = _free(blocks)
+    many = _combine_free_blocks(blocks)
     return {name: RULES[name](many, motion) for name in names}
 
 
@@ -366,7 +366,9 @@ class _Oscillator(NamedTuple):
     per_acceleration: Floats
 
 
-def _reserve_energy(p: float, alpha: float, restitution: float, gravity: float, share: float = 1.0) -> _Oscillator:
+def _create_energy_oscillator(
+    p: float, alpha: float, restitution: float, gravity: float, share: float = 1.0
+) -> _Oscillator:
     """ASCE/SEI 43-05, Appendix A.2, at one ratio of rotation to slenderness, by default the balance point."""
     rotation = np.array([share * alpha])
     # cos(t) + a sin(t) - 1 without cancellation near 1.
@@ -377,15 +379,15 @@ def _reserve_energy(p: float, alpha: float, restitution: float, gravity: float, 
     return _Oscillator(periods, damping, 2.0 * gravity * raised / rotation, np.ones_like(rotation))
 
 
-def _free_rocking(p: float, alpha: float, restitution: float, gravity: float) -> _Oscillator:
+def _create_free_rocking_oscillator(p: float, alpha: float, restitution: float, gravity: float) -> _Oscillator:
     """Priestley, Evison and Carr (1978)."""
-    periods = 4.0 / p * np.arccosh(1.0 / (1.0 - _SHARES))
-    displacements = 0.75 * gravity / p**2 * (math.sin(alpha) - np.sin(alpha * (1.0 - _SHARES)))
+    periods = 4.0 / p * np.arccosh(1.0 / (1.0 - _ROTATION_SHARES))
+    displacements = 0.75 * gravity / p**2 * (math.sin(alpha) - np.sin(alpha * (1.0 - _ROTATION_SHARES)))
     damping = -2.0 * _DAMPING * math.log(restitution)
     return _Oscillator(periods, damping, displacements, (periods / (2.0 * np.pi)) ** 2)
 
 
-def _least_ratio(
+def _find_min_ratio(
     blocks: Blocks, motion: Motion, oscillator_of: Callable[[float, float, float, float], _Oscillator]
 ) -> tuple[Floats, Floats]:
     """Demand and capacity of the sides of blocks at the rotation with the smallest ratio."""
@@ -455,7 +457,7 @@ def check(
     named_motions = index_motions(motions)
     names = None if rules is None else checks.items(rules, "rules", InvalidOption)
     # Raise errors before the simulations.
-    values_of([*named_motions.values()], Measure("pga"))
+    compute_intensities([*named_motions.values()], Measure("pga"))
     ratios = [
         {name: float(rating.ratio[0]) for name, rating in rate(block, motion, names).items()}
         for motion in named_motions.values()
@@ -464,12 +466,12 @@ def check(
     with Progress("checking", total=len(named_motions)) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, model=model))
-            margins.append(_margin(responses[-1], block, motion, model))
+            margins.append(_compute_margin(responses[-1], block, motion, model))
             bar.advance()
     return Check(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
 
 
-def _margin(response: Response, block: Block, motion: Motion, model: Model) -> float:
+def _compute_margin(response: Response, block: Block, motion: Motion, model: Model) -> float:
     """Reciprocal of the lowest factor on the motion that overturns the block, consistent with the response."""
     scaled = incremental_dynamic_analysis(block, motion, model=model, rtol=_TOLERANCE)
     margin = motion.pga / float(scaled.data.overturning_level[0, 0])

@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 from rocking.analysis.levels import (
     MIRROR_NOTE,
     Boundaries,
-    boundaries,
-    described,
-    labels_of,
+    compose_motion_labels,
+    compute_intensities,
+    compute_units,
+    describe_blocks,
+    describe_undecided,
+    find_boundaries,
     simulate_levels,
-    undecided_text,
-    units_of,
-    values_of,
 )
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
@@ -118,18 +118,18 @@ def incremental_dynamic_analysis(
     """
     many, how, shaken = bodies_of(blocks), Measure.parse(measure), list_motions(motions)
     slenderness = slenderness_of(many)
-    values = values_of(shaken, how)
+    values = compute_intensities(shaken, how)
     if never_rests(many):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
     width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model}
-    first = _lowest_uplift(many, shaken, values, how, model)
+    first = _find_lowest_uplift(many, shaken, values, how, model)
     if levels is None:
-        table = _until_overturned(many, shaken, how, first, options)
+        table = _simulate_until_overturned(many, shaken, how, first, options)
     else:
         wanted = checks.increasing_numbers(levels, "levels", InvalidOption)
         table = simulate_levels(many, shaken, how, wanted, **options)
-    factors = units_of(many, how, model)[None, :] / values[:, None]
+    factors = compute_units(many, how, model)[None, :] / values[:, None]
 
     def overturned(column: Integers, level: Floats) -> Integers:
         verdicts = np.empty(column.size, dtype=np.int64)
@@ -145,11 +145,11 @@ def incremental_dynamic_analysis(
 
     grid = table.overturned.transpose("level", "motion", "block").values
     flat = grid.reshape(len(grid), -1).astype(np.int64)
-    edges = boundaries(table.level.values, flat, overturned, rtol=width)
-    found = _dataset(table, flat, edges, slenderness, how)
-    about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
+    edges = find_boundaries(table.level.values, flat, overturned, rtol=width)
+    found = _create_bands_dataset(table, flat, edges, slenderness, how)
+    about = {"blocks": describe_blocks(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
     scales = (table.level.values[:, None, None] * factors)[..., None]
-    about["undecided"] = undecided_text(Setup(many, model, Certified()), shaken, scales, grid[..., None])
+    about["undecided"] = describe_undecided(Setup(many, model, Certified()), shaken, scales, grid[..., None])
     return IncrementalDynamicAnalysis(found.assign_attrs(about))
 
 
@@ -209,7 +209,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
     def summary(self) -> str:
         data = self.data
         many = data.sizes["block"] > 1
-        looked_at = _Levels(data.level)
+        looked_at = _LevelDescription(data.level)
         what = "record" if "record" in data.coords else "motion"
         rows = [
             [
@@ -217,7 +217,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
                 *([b] if many else []),
                 looked_at.overturning(self.bands(block=b, motion=m)),
             ]
-            for m, label in enumerate(labels_of(data, what, with_history=False))
+            for m, label in enumerate(compose_motion_labels(data, what, with_history=False))
             for b in range(data.sizes["block"])
         ]
         blocks = data.blocks if not many else format_count(data.sizes["block"], "block")
@@ -268,7 +268,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         ends = np.array([levels[0], levels[-1]])
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
         motions = []
-        for m, label in enumerate(labels_of(data, with_history=False)):
+        for m, label in enumerate(compose_motion_labels(data, with_history=False)):
             bands = data.level.scale * np.array(self.bands(block=block, motion=m)).reshape(-1, 2)
             bands = np.where(np.isnan(bands), ends, bands)
             motions.append(ScaledMotion(label, levels, peaks[m], bands))
@@ -282,17 +282,19 @@ class IncrementalDynamicAnalysis(DatasetResult):
         )
 
 
-def _lowest_uplift(blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
+def _find_lowest_uplift(
+    blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model
+) -> float:
     """Return the lowest level at which a motion, scaled with its vertical component, lifts a block."""
     thresholds, own = thresholds_of(blocks, model)
     factors = np.array([compute_uplift_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
-    lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
+    lowest = float(np.min(factors * values[:, None] / compute_units(blocks, measure, model)))
     if math.isinf(lowest):
         raise InvalidOption("no motion lifts a block at any level: none pushes towards a side as its weight allows")
     return lowest
 
 
-def _until_overturned(
+def _simulate_until_overturned(
     blocks: Bodies, motions: Sequence[Motion], measure: Measure, first: float, options: dict[str, Any]
 ) -> xr.Dataset:
     """Yield chunks of levels up to three times the level by which every motion has overturned each block."""
@@ -311,7 +313,9 @@ def _until_overturned(
     return table.isel(level=slice(0, beyond[0] + 1 if beyond.size else None))
 
 
-def _dataset(table: xr.Dataset, flat: Integers, edges: Boundaries, alpha: Floats, measure: Measure) -> xr.Dataset:
+def _create_bands_dataset(
+    table: xr.Dataset, flat: Integers, edges: Boundaries, alpha: Floats, measure: Measure
+) -> xr.Dataset:
     """Pair the levels of outcome changes in a (level, column) grid, NaN for bands beyond it."""
     import xarray as xr
 
@@ -341,7 +345,7 @@ def _dataset(table: xr.Dataset, flat: Integers, edges: Boundaries, alpha: Floats
     )
 
 
-class _Levels:
+class _LevelDescription:
     """Description of simulated levels and of bands of them."""
 
     def __init__(self, level: xr.DataArray) -> None:

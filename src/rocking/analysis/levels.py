@@ -32,18 +32,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def numbered(labels: Sequence[object]) -> Integers:
+def number_labels(labels: Sequence[object]) -> Integers:
     """Replace labels by integers in the order of first appearance."""
     places: dict[object, int] = {}
     return np.array([places.setdefault(label, len(places)) for label in labels], dtype=np.int64)
 
 
-def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> Integers:
+def number_groups(labels: object, name: str, count: int, each: str = "outcome") -> Integers:
     """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
     given = checks.items(labels, name, InvalidOption)
     if len(given) != count or not all(isinstance(label, Hashable) for label in given):
         raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {each}", name, value=labels)
-    return numbered([(k,) if _is_missing(label) else label for k, label in enumerate(given)])
+    return number_labels([(k,) if _is_missing(label) else label for k, label in enumerate(given)])
 
 
 def _is_missing(label: object) -> bool:
@@ -52,7 +52,7 @@ def _is_missing(label: object) -> bool:
     return is_none or label == "" or (isinstance(label, float) and math.isnan(label))
 
 
-def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True) -> list[str]:
+def compose_motion_labels(data: xr.Dataset, of: str = "motion", *, with_history: bool = True) -> list[str]:
     """Names of motions or records, with vertical components and processing."""
     names = data[of].values
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
@@ -63,9 +63,9 @@ def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True
     ]
 
 
-def motions_text(data: xr.Dataset) -> str:
+def describe_motions(data: xr.Dataset) -> str:
     """Return the name or number of motions, and the numbers of scaled or processed ones."""
-    labels = labels_of(data)
+    labels = compose_motion_labels(data)
     changed = sum(bool(done) for done in data.histories)
     if len(labels) == 1:
         return labels[0]
@@ -73,7 +73,7 @@ def motions_text(data: xr.Dataset) -> str:
     return f"{len(labels)} motions" + (f", {which} scaled or processed" if changed else "")
 
 
-def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+def split_curves(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     """Return names and selections of all slenderness-restitution combinations, or one curve for an ensemble."""
     if "block" in data.dims:
         return [(data.blocks, data)]
@@ -92,24 +92,24 @@ MIRROR_NOTE: Final = "the sides differ, so motions that are reversed (scaled by 
 BY_STATION: Final = "station"
 
 
-def described(blocks: Bodies | Body | Sequence[Body]) -> str:
+def describe_blocks(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Describe a block by its sizes or parameters, several by their number."""
-    only = single_block(blocks)
+    only = find_single_block(blocks)
     if only is None:
         return format_count(len(bodies_of(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
         return only.description
-    return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
+    return f"block with p = {_format_sides(blocks.p[0])} rad/s, alpha = {_format_sides(blocks.alpha[0])} rad"
 
 
-def pooled(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
+def describe_pooled_blocks(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
     """Describe blocks with pooled outcomes, and whether their weights differ."""
-    if single_block(blocks) is not None:
-        return described(blocks)
-    return f"{described(blocks)}, {'all of equal weight' if weights is None else 'weighted'}"
+    if find_single_block(blocks) is not None:
+        return describe_blocks(blocks)
+    return f"{describe_blocks(blocks)}, {'all of equal weight' if weights is None else 'weighted'}"
 
 
-def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
+def normalise_weights(weights: ArrayLike | None, count: int) -> Floats:
     """Weights of blocks with mean 1, equal by default."""
     if weights is None:
         return np.ones(count)
@@ -120,25 +120,25 @@ def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
     return np.asarray(given * (count / given.sum()))
 
 
-def single_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
+def find_single_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
     """Return the block as described, if there is only one."""
     if not isinstance(blocks, Sequence | Bodies):
         return blocks
     return blocks[0] if len(blocks) == 1 else None
 
 
-def _pair(sides: Floats) -> str:
+def _format_sides(sides: Floats) -> str:
     return f"{sides[0]:.4g}" if sides[0] == sides[1] else f"({sides[0]:.4g}, {sides[1]:.4g})"
 
 
-def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
+def compute_intensities(motions: Sequence[Motion], measure: Measure) -> Floats:
     """Return the measure of each motion, in SI units."""
     return np.array([measure.positive(motion, motion.name) for motion in motions])
 
 
-def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
+def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integers:
     """Cluster numbers of motions with equal labels ("station": of one record) or equal up to a factor."""
-    families, origins = families_of(motions), [motion.description.origin or Origin() for motion in motions]
+    families, origins = number_families(motions), [motion.description.origin or Origin() for motion in motions]
     stations = [f"{one.event}, {one.station}" if one.station else "" for one in origins]
     if labels is None:
         of_records = {family: station for family, station in zip(families, stations, strict=True) if station}
@@ -154,18 +154,18 @@ def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
     from scipy.sparse.csgraph import connected_components
 
     count = len(motions)
-    given = groups_of(labels, "clusters", count, "motion")
+    given = number_groups(labels, "clusters", count, "motion")
     links = coo_array((np.ones(count), (families, count + given)), shape=(2 * count, 2 * count))
-    return numbered(connected_components(links, directed=False)[1][families].tolist())
+    return number_labels(connected_components(links, directed=False)[1][families].tolist())
 
 
-def motions_in_words(clusters: Integers, labels: object) -> str:
+def describe_sample(clusters: Integers, labels: object) -> str:
     """Return the number of motions and, if they have labels, of clusters."""
     text = format_count(len(clusters), "motion")
     return text if labels is None else f"{text} in {format_count(len(np.unique(clusters)), 'cluster')}"
 
 
-def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
+def number_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
     """Family numbers of motions that are equal up to a factor, also a negative one if ``reversed_too``."""
     # Invariants of scale and sign. Only motions with equal invariants are compared in full.
     alike = np.empty((len(motions), 2))
@@ -183,7 +183,7 @@ def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Inte
     return families
 
 
-def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:
+def compute_units(blocks: Bodies, measure: Measure, model: Model) -> Floats:
     """Return the unit of the measure for each block (SI): the block's own unit, or 1."""
     if not measure.in_block_units:
         return np.ones(len(blocks))
@@ -197,7 +197,7 @@ def simulate_levels(
     """Simulate every block under every motion at every level, with the dimension ``level``."""
     import xarray as xr
 
-    units = units_of(blocks, measure, model)
+    units = compute_units(blocks, measure, model)
     groups = [np.flatnonzero(units == unit) for unit in np.unique(units)]
     parts = []
     for group in groups:
@@ -210,18 +210,18 @@ def simulate_levels(
     return ordered.assign_coords(body_coordinates(blocks))
 
 
-def ratios_of(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: Floats | float) -> Floats:
+def compute_ratios(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: Floats | float) -> Floats:
     """Ratio of peak rotation to slenderness: infinite for overturning, NaN for abandoned simulations."""
     return np.asarray(np.where(unfinished, np.nan, np.where(overturned, np.inf, peak / slenderness)))
 
 
-def passed(ratio: Floats, limit: float, name: str) -> Floats:
+def exceeds_limit(ratio: Floats, limit: float, name: str) -> Floats:
     """Whether the ratio of peak rotation to slenderness exceeds a limit (infinite: overturning), 1 or 0."""
-    limit = checked_limit(limit, name)
+    limit = check_limit(limit, name)
     return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
 
 
-def checked_limit(limit: float, name: str) -> float:
+def check_limit(limit: float, name: str) -> float:
     """Validate a limit of the ratio of peak rotation to slenderness."""
     what = f"the limit {name!r} (rotation over slenderness)"
     least = checks.real(limit, what, InvalidOption)
@@ -230,19 +230,19 @@ def checked_limit(limit: float, name: str) -> float:
     return least
 
 
-def by_limit_state(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+def check_state_mapping(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """Return values by limit state, at least one."""
     for state in checks.mapping(values, name, InvalidOption, "{'overturning': inf}"):
         checks.text(state, f"name of a limit state in {name}", InvalidOption)
     return values
 
 
-def checked_limit_states(limit_states: Mapping[str, float] | None) -> Mapping[str, float]:
+def check_limit_states(limit_states: Mapping[str, float] | None) -> Mapping[str, float]:
     """Return limits of the ratio of peak rotation to slenderness by limit state; by default overturning (infinite)."""
-    return {"overturning": math.inf} if limit_states is None else by_limit_state(limit_states, "limit_states")
+    return {"overturning": math.inf} if limit_states is None else check_state_mapping(limit_states, "limit_states")
 
 
-def outcomes_of(
+def create_outcome_table(
     table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limit_states: Mapping[str, float]
 ) -> pd.DataFrame:
     """Table of all simulations (level, motion, block, polarity) with the limits that they exceed."""
@@ -264,20 +264,20 @@ def outcomes_of(
             "overturned": table.overturned.values.ravel(),
             "unfinished": table.unfinished.values.ravel(),
             **{
-                f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool)
+                f"exceeded_{name}": exceeds_limit(ratio, limit, name).ravel().astype(bool)
                 for name, limit in limit_states.items()
             },
         }
     )
 
 
-def weights_of(weights: ArrayLike | None, count: int) -> Floats:
+def normalise_positive_weights(weights: ArrayLike | None, count: int) -> Floats:
     """Normalise weights to mean 1 over blocks of positive weight, so that zero weights do not change the count."""
-    shares = normalised_weights(weights, count)
+    shares = normalise_weights(weights, count)
     return np.asarray(shares / shares[shares > 0.0].mean())
 
 
-def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
+def describe_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
     """Append the polarities to a description if both were requested."""
     if polarity != "both":
         return ""
@@ -290,7 +290,7 @@ def note_missing(unfinished: Flags) -> None:
         note(f"{text}, and each counts as half overturned")
 
 
-def undecided_text(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags) -> str:
+def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags) -> str:
     """Describe how many outcomes of a sample change when motions are scaled by 1 +- 3e-6.
 
     Factors of the motions and outcomes are over (level, motion, block, polarity).
@@ -326,7 +326,7 @@ class Boundaries:
         return bisection.find_middles(self.low, self.high)
 
 
-def boundaries(
+def find_boundaries(
     levels: Floats,
     outcome: Integers,
     outcome_of: Callable[[Integers, Floats], Integers],
@@ -341,25 +341,25 @@ def boundaries(
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
     here = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
     origin = np.arange(len(here.level))
-    left = _halvings(here, rtol)
+    left = _count_bisections(here, rtol)
     with Progress("refining", left) as bar:
         while (wide := bisection.is_wide(here.low, here.high, rtol)).any():
             found = here.below.copy()
             found[wide] = outcome_of(here.column[wide], here.level[wide])
-            here, origin = _halved(here, wide, found, origin)
+            here, origin = _bisect_brackets(here, wide, found, origin)
             # A third outcome adds brackets, which the bar waits for.
-            before, left = left, min(left, _halvings(here, rtol))
+            before, left = left, min(left, _count_bisections(here, rtol))
             bar.advance(before - left)
     order = np.lexsort((here.low, here.column))
     return Boundaries(*(values[order] for values in vars(here).values()))
 
 
-def _halvings(here: Boundaries, rtol: float) -> int:
+def _count_bisections(here: Boundaries, rtol: float) -> int:
     """Count the remaining bisections of the present brackets."""
     return int(np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (rtol * here.high)))).sum())
 
 
-def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
+def _bisect_brackets(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
     """Bisect wide brackets, and split those with a third outcome."""
     few = np.bincount(origin)[origin] < 64
     third = wide & few & (found != here.below) & (found != here.above)

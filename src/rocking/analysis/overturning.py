@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.analysis.levels import Boundaries, boundaries
+from rocking.analysis.levels import Boundaries, find_boundaries
 from rocking.block import Block, Blocks, one_block
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
@@ -61,7 +61,7 @@ class OverturningMode(IntEnum):
     ROCKS = -1
 
 
-_NAMES: Final = {
+_MODE_NAMES: Final = {
     OverturningMode.UNFINISHED: "not finished",
     OverturningMode.OVERTURNS_AFTER_REST: "overturns after a rest",
     OverturningMode.NO_UPLIFT: "no uplift",
@@ -75,7 +75,7 @@ _NAMES: Final = {
 PULSES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
 #: Largest relative difference of two motions of one shape, as in samples at a constant step.
-_SAME: Final = 0.02
+_SHAPE_TOLERANCE: Final = 0.02
 
 
 def overturning_map(
@@ -160,11 +160,11 @@ def overturning_map(
             "a block with {} 1 never comes to rest; an overturning map needs one below 1", "restitution"
         )
     slowest = min(side.p for side in block.sides)
-    made, own = _pulse_function(pulse, parameters), slowest / (2.0 * math.pi)
-    unit = _called(made, 1.0, own)
+    made, own = _create_pulse_function(pulse, parameters), slowest / (2.0 * math.pi)
+    unit = _call_pulse(made, 1.0, own)
     for ratio in {float(ratios[0]), float(ratios[-1])}:
         stronger = 1.0 + ratio
-        other = _called(made, stronger, ratio * own)
+        other = _call_pulse(made, stronger, ratio * own)
         pairs = (unit, other), (unit.vertical, other.vertical)
         if not all(_is_alike(first, second, stronger, ratio) for first, second in pairs):
             raise InvalidOption(
@@ -189,13 +189,15 @@ def overturning_map(
         for task, outcomes in simulate_each(here, unit, threshold * level):
             ends[task.bodies] = outcomes
             done(len(outcomes))
-        return np.where(ends["unfinished"], OverturningMode.UNFINISHED, modes_of(ends, unit.end)), ends["peak_rotation"]
+        return np.where(ends["unfinished"], OverturningMode.UNFINISHED, classify_modes(ends, unit.end)), ends[
+            "peak_rotation"
+        ]
 
     row, column = (index.ravel() for index in np.indices((levels.size, ratios.size)))
     with Progress("mapping", row.size) as bar:
         modes, peaks = followed(column, levels[row], bar.advance)
     modes, peaks = modes.reshape(levels.size, -1), peaks.reshape(levels.size, -1)
-    edges = boundaries(levels, modes, lambda *at: followed(*at)[0], rtol=width)
+    edges = find_boundaries(levels, modes, lambda *at: followed(*at)[0], rtol=width)
     attributes = {
         "program": f"rocking {VERSION}",
         "model": model,
@@ -206,7 +208,7 @@ def overturning_map(
         "pulse_name": unit.name,
         "rtol": width,
     }
-    return OverturningMap(_dataset(levels, ratios, modes, peaks, edges, attributes))
+    return OverturningMap(_create_map_dataset(levels, ratios, modes, peaks, edges, attributes))
 
 
 def mode_name(mode: int) -> str:
@@ -228,11 +230,11 @@ def mode_name(mode: int) -> str:
     ('rests before the pulse is over', 'overturns without impact', 'overturns after 1 impact')
     """
     if mode <= 0:
-        return _NAMES[int(mode)]
+        return _MODE_NAMES[int(mode)]
     return f"overturns after {mode} impact{'s' if mode > 1 else ''}"
 
 
-def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
+def classify_modes(ends: NDArray[np.void], duration: float) -> Integers:
     """Modes of blocks under a motion of given duration (s), from the engine's results."""
     rested = (ends["uplifts"] > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= duration))
     modes = np.where(
@@ -242,7 +244,7 @@ def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
     return np.where(ends["overturned"], overturns, modes)
 
 
-def _overturns(modes: Integers) -> Flags:
+def _is_overturning(modes: Integers) -> Flags:
     found: Flags = (modes >= 0) | (modes == OverturningMode.OVERTURNS_AFTER_REST)
     return found
 
@@ -287,7 +289,7 @@ class OverturningMap(DatasetResult):
             (mode_name(int(mode)), f"{percent:.1f} %" if percent >= 0.1 else "below 0.1 %")
             for mode, percent in zip(modes, percents, strict=True)
         ]
-        rows = [(float(ratio), self._lowest(k)) for k, ratio in enumerate(self.data.frequency)]
+        rows = [(float(ratio), self._describe_lowest(k)) for k, ratio in enumerate(self.data.frequency)]
         return "\n\n".join(
             [
                 f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model",
@@ -301,12 +303,12 @@ class OverturningMap(DatasetResult):
             ]
         )
 
-    def _lowest(self, k: int) -> str:
+    def _describe_lowest(self, k: int) -> str:
         """Describe the lowest amplitude of the grid's range that overturns at a frequency."""
         lowest, amplitudes = float(self.data.overturning_amplitude[k]), self.data.amplitude.values
         if not math.isnan(lowest):
             return format_cell(lowest)
-        is_open_below = _overturns(self.data.mode.values[0, k])
+        is_open_below = _is_overturning(self.data.mode.values[0, k])
         return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -353,7 +355,7 @@ class OverturningMap(DatasetResult):
         return f"alpha = {alpha} rad, restitution = {restitution}"
 
 
-def _pulse_function(
+def _create_pulse_function(
     pulse: str | Callable[[float, float], Motion], parameters: dict[str, Any]
 ) -> Callable[[float, float], Motion]:
     """Return a function of amplitude (m/s^2, peak for named pulses) and frequency (Hz) that creates a pulse."""
@@ -376,7 +378,7 @@ def _pulse_function(
     return named_pulse
 
 
-def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
+def _call_pulse(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
     motion = check_motion(pulse(amplitude, frequency))
     if motion is None:
         raise InvalidMotion(
@@ -389,22 +391,22 @@ def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio:
     """Whether one component equals the other up to a factor and a ratio of durations, or both are missing."""
     if first is None or second is None:
         return first is second
-    if abs(ratio * second.duration - first.duration) > _SAME * first.duration:
+    if abs(ratio * second.duration - first.duration) > _SHAPE_TOLERANCE * first.duration:
         return False
     phases = (np.arange(400) + 0.5) / 400
     one, other = first.acceleration(phases * first.duration), second.acceleration(phases * second.duration) / factor
-    return bool(np.abs(other - one).mean() <= _SAME * np.abs(one).max())
+    return bool(np.abs(other - one).mean() <= _SHAPE_TOLERANCE * np.abs(one).max())
 
 
-def _dataset(
+def _create_map_dataset(
     levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, edges: Boundaries, attributes: dict[str, Any]
 ) -> xr.Dataset:
     import xarray as xr
 
     lowest = np.full(ratios.size, np.inf)
-    overturns = _overturns(edges.above) & ~_overturns(edges.below)
+    overturns = _is_overturning(edges.above) & ~_is_overturning(edges.below)
     np.minimum.at(lowest, edges.column[overturns], edges.level[overturns])
-    lowest[np.isinf(lowest) | _overturns(modes[0])] = np.nan
+    lowest[np.isinf(lowest) | _is_overturning(modes[0])] = np.nan
     meaning = (
         "-5: not finished, -4: overturns after a rest, -3: no uplift, -2: rests before the pulse is over, -1: rocks, "
         "n >= 0: overturns after n impacts"

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.analysis.curve import FragilityCurve, extremes, in_units
+from rocking.analysis.curve import FragilityCurve, find_extremes, format_intensity
 from rocking.analysis.hazard import (
     HazardCurve,
-    hazard_line,
-    log_parts,
-    log_rate_within,
-    log_standing,
-    share_density,
-    shares_beyond,
+    compute_log_parts,
+    compute_log_rate_within,
+    compute_log_survival,
+    compute_share_density,
+    compute_shares_beyond,
+    create_hazard_line,
 )
 from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
 from rocking.core import checks
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Probabilities of exceedance for the intensities in the table of a survival, and for the limits of its figure.
-_CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
-_SHOWN: Final = (0.01, 0.999)
+_PROBABILITIES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
+_FIGURE_RANGE: Final = (0.01, 0.999)
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Rate:
 
     def in_words(self) -> str:
         """Return the period and its interval as "once in ... years", with the significant digits."""
-        period, between = self._period_digits()
+        period, between = self._format_period()
         return f"once in {period} year{'' if period == '1' else 's'} ({between})"
 
     def probability(self, years: float) -> float:
@@ -91,20 +91,20 @@ class Rate:
     @property
     def return_period(self) -> float:
         """Mean time between exceedances, years."""
-        return _period(self.annual_rate)
+        return _compute_period(self.annual_rate)
 
     @property
     def return_interval(self) -> tuple[float, float]:
         """Confidence interval of the return period, years."""
         low, high = self.interval
-        return _period(high), _period(low)
+        return _compute_period(high), _compute_period(low)
 
-    def _period_digits(self) -> tuple[str, str]:
+    def _format_period(self) -> tuple[str, str]:
         low, high = self.bounds
-        return format_digits(self.return_period, self.return_interval, (_period(high), _period(low)))
+        return format_digits(self.return_period, self.return_interval, (_compute_period(high), _compute_period(low)))
 
 
-def _period(rate: float) -> float:
+def _compute_period(rate: float) -> float:
     with np.errstate(over="ignore"):
         return float(np.divide(1.0, rate)) if rate > 0.0 else math.inf
 
@@ -159,7 +159,7 @@ class Risk(Result):
                 [
                     one.limit_state,
                     *format_digits(one.annual_rate, one.interval, one.bounds),
-                    *one._period_digits(),
+                    *one._format_period(),
                     *format_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
                 ]
             )
@@ -168,7 +168,7 @@ class Risk(Result):
             "limit state", "annual rate", between, "once in (years)", between,
             f"probability in {format_count(years, 'year')}", between,
         ]  # fmt: skip
-        notes = [note for one in self.rates for note in beyond_notes(one)]
+        notes = [note for one in self.rates for note in describe_extrapolated_shares(one)]
         if any(one.interval[0] == 0.0 or math.isinf(one.interval[1]) for one in self.rates):
             notes.append("intervals are those of the fragility, whose summary says why they have no end")
         return "\n".join([format_table(header, rows), *notes])
@@ -203,9 +203,9 @@ class Risk(Result):
         at = np.geomspace(1e-2 * low, 1e2 * high, 800)
         return risk_figure(
             intensity=self.hazard.measure.scale * at,
-            hazard=hazard_line(self.hazard, at),
+            hazard=create_hazard_line(self.hazard, at),
             lines=[
-                RiskLine(f"{one.limit_state}: {one.in_words()}", share_density(curve.fitted, self.hazard, at))
+                RiskLine(f"{one.limit_state}: {one.in_words()}", compute_share_density(curve.fitted, self.hazard, at))
                 for one, curve in zip(self.rates, self.curves, strict=True)
             ],
             intensity_label=self.hazard.measure.label,
@@ -219,7 +219,7 @@ class Risk(Result):
         return f"{self.description}; {self.hazard.name}; {rates}"
 
 
-def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
+def compute_risk(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
     """Integrate fragility curves of a measure over a hazard curve."""
     if not isinstance(hazard, HazardCurve):
         raise InvalidOption(
@@ -228,10 +228,10 @@ def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Meas
             value=hazard,
         )
     check_measure(hazard, measure)
-    return Risk(tuple(_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
+    return Risk(tuple(_compute_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
 
 
-def beyond_notes(rate: Rate) -> list[str]:
+def describe_extrapolated_shares(rate: Rate) -> list[str]:
     """Describe the share of a rate from extrapolations of the hazard curve."""
     return [
         f"{rate.limit_state}: {100 * share:.{0 if share > 0.1 else 1}f} % of the rate is from {what} the hazard curve"
@@ -249,17 +249,17 @@ def check_measure(hazard: HazardCurve, measure: Measure) -> None:
         )
 
 
-def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
-    parts = log_parts(curve.fitted, hazard)[0]
+def _compute_rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
+    parts = compute_log_parts(curve.fitted, hazard)[0]
     total = np.logaddexp.reduce(parts)
 
     def logarithm(fits: Probit) -> Floats:
-        return np.asarray(np.logaddexp.reduce(log_parts(fits, hazard), axis=1)[:, None])
+        return np.asarray(np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1)[:, None])
 
-    low, high = extremes(curve.region, logarithm)
+    low, high = find_extremes(curve.region, logarithm)
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
-    below, above = shares_beyond(curve.fitted, hazard)
+    below, above = compute_shares_beyond(curve.fitted, hazard)
     # Motions above the last point add no more than its rate. If most of the rate is theirs, only this bound is known.
     least = (1.0 - above) * rate + float(hazard.rate[-1]) if above > 0.5 else 0.0
     bounds = least, max(least, float(hazard.rate[0]))
@@ -316,7 +316,7 @@ class Survival(Result):
     @property
     def intensity(self) -> Floats:
         """Intensities (SI) that exceed the limit with probabilities of 0.05, 0.16, 0.5, 0.84 and 0.95."""
-        return np.array([self.curve.intensity_of(chance) for chance in _CHANCES])
+        return np.array([self.curve.intensity_of(chance) for chance in _PROBABILITIES])
 
     @property
     def unlikely(self) -> float:
@@ -359,9 +359,9 @@ class Survival(Result):
             return math.nan
         hazard, years = self.hazard, self.years
         if self.several_blocks:
-            _, high = extremes(self.curve.region, lambda fits: log_standing(fits, hazard, years))
+            _, high = find_extremes(self.curve.region, lambda fits: compute_log_survival(fits, hazard, years))
             return math.exp(min(float(high[0]), 0.0))
-        low, _ = extremes(self.curve.region, lambda fits: log_rate_within(fits, hazard))
+        low, _ = find_extremes(self.curve.region, lambda fits: compute_log_rate_within(fits, hazard))
         return math.exp(-math.exp(float(low[0])) * years)
 
     @property
@@ -373,8 +373,8 @@ class Survival(Result):
         measure, share = self.measure, f"{100.0 * self.confidence:g} %"
         header = [measure.label, "probability", "at most a year", "at most once in (years)"]
         columns: list[list[Any]] = [
-            [format_within(x, self._known, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
-            [*_CHANCES],
+            [format_within(x, self._known_range, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
+            [*_PROBABILITIES],
             [f"{rate:.2g}" for rate in self.largest_rate],
             [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
         ]
@@ -385,32 +385,40 @@ class Survival(Result):
             known = np.where(rates < lowest, 0.0, np.minimum(rates, highest))
             columns += [
                 [format_within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
-                [f"{chance:.2g}" for chance in np.exp(-self.years * known * _CHANCES)],
+                [f"{chance:.2g}" for chance in np.exp(-self.years * known * _PROBABILITIES)],
             ]
         return "\n".join(
             [
                 f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
-                f"most likely never {self._never}: one such motion would have exceeded the limit with {share}",
+                f"most likely never {self._never_text}: one such motion would have exceeded the limit with {share}",
                 f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
                 f"exceeded with {share}" + (", if each met another of the blocks" if self.several_blocks else ""),
                 "",
                 format_table(header, [*map(list, zip(*columns, strict=True))]),
-                *([] if self.rate is None else ["", self._verdict(self.rate), *beyond_notes(self.rate)]),
+                *(
+                    []
+                    if self.rate is None
+                    else ["", self._describe_survival(self.rate), *describe_extrapolated_shares(self.rate)]
+                ),
             ]
         )
 
     @property
-    def _known(self) -> tuple[float, float]:
+    def _known_range(self) -> tuple[float, float]:
         """Lowest and highest intensity (SI) of the data and of the hazard curve."""
         known = np.concatenate([self.curve.intensity, [] if self.hazard is None else self.hazard.intensity])
         return float(known.min()), float(known.max())
 
     @property
-    def _never(self) -> str:
-        text = in_units(min(self.unlikely, self._known[1]), self.measure)
-        return f"some intensity above {text}, beyond the data" if self.unlikely > self._known[1] else f"{text} or more"
+    def _never_text(self) -> str:
+        text = format_intensity(min(self.unlikely, self._known_range[1]), self.measure)
+        return (
+            f"some intensity above {text}, beyond the data"
+            if self.unlikely > self._known_range[1]
+            else f"{text} or more"
+        )
 
-    def _verdict(self, rate: Rate) -> str:
+    def _describe_survival(self, rate: Rate) -> str:
         """Describe the probability of the survival under the hazard curve."""
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
@@ -444,7 +452,7 @@ class Survival(Result):
             "years": self.years,
             "confidence": self.confidence,
             f"most_likely_never_{column}": self.unlikely,
-            "probability_of_exceedance": [*_CHANCES],
+            "probability_of_exceedance": [*_PROBABILITIES],
             column: self.intensity,
             "largest_annual_rate": self.largest_rate,
         }
@@ -464,19 +472,19 @@ class Survival(Result):
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import survival_figure
 
-        ends = [end for end in map(self.curve.intensity_of, _SHOWN) if 0.0 < end < math.inf]
-        if len(ends) < len(_SHOWN):  # the ends of a very wide curve are not finite numbers
+        ends = [end for end in map(self.curve.intensity_of, _FIGURE_RANGE) if 0.0 < end < math.inf]
+        if len(ends) < len(_FIGURE_RANGE):  # the ends of a very wide curve are not finite numbers
             ends = [self.curve.intensity.min(), self.curve.intensity.max()]
         if self.hazard is not None:
             ends += self.hazard.intensity[[0, -1]].tolist()
         at = np.geomspace(min(ends), max(ends), 200)
-        at = at[self.curve.probability(at) > _SHOWN[0] * 0.1]
+        at = at[self.curve.probability(at) > _FIGURE_RANGE[0] * 0.1]
         return survival_figure(
             intensity=self.measure.scale * at,
             largest=self.curve.largest_rate(at, self.years, self.confidence),
             largest_label=f"at most, with {format_count(self.years, 'year')} without {self.curve.limit_state} "
             f"({100.0 * self.confidence:g} %)",
-            hazard=None if self.hazard is None else hazard_line(self.hazard, at),
+            hazard=None if self.hazard is None else create_hazard_line(self.hazard, at),
             intensity_label=self.measure.label,
             title=title or escape_dollars(self.description),
             ax=ax,
@@ -484,10 +492,14 @@ class Survival(Result):
         )
 
     def _headline(self) -> str:
-        return f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; most likely never {self._never}"
+        return (
+            f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; most likely never {self._never_text}"
+        )
 
 
-def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:
+def compute_mean_survival(
+    outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float
+) -> float:
     """Mean survival probability of blocks, each with a curve fitted to its own outcomes."""
     table = outcomes.sort_values("block", kind="stable")
     blocks = table.drop_duplicates("block")
@@ -497,6 +509,6 @@ def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard
     )
     fits = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, 1.0 - missing))
     # For a curve that does not rise, the rate below the hazard curve is unbounded and therefore omitted.
-    rising = np.logaddexp.reduce(log_parts(fits, hazard), axis=1)
-    rates = np.exp(np.where(fits.slope > 0.0, rising, log_rate_within(fits, hazard)[:, 0]))
+    rising = np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1)
+    rates = np.exp(np.where(fits.slope > 0.0, rising, compute_log_rate_within(fits, hazard)[:, 0]))
     return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.levels import curves_of, labels_of, motions_text, normalised_weights, pooled, ratios_of
+from rocking.analysis.levels import (
+    compose_motion_labels,
+    compute_ratios,
+    describe_motions,
+    describe_pooled_blocks,
+    normalise_weights,
+    split_curves,
+)
 from rocking.block import Blocks
 from rocking.block.bodies import rates_of
 from rocking.block.body import Bodies, Body
@@ -34,9 +41,9 @@ if TYPE_CHECKING:
 Abscissa = Literal["p", "period", "size"]
 
 
-_HALF: Final = np.array([0.5])
+_MEDIAN_SHARE: Final = np.array([0.5])
 
-_SIMULATED: Final = ("peak_rotation", "overturned", "unfinished")
+_OUTCOME_NAMES: Final = ("peak_rotation", "overturned", "unfinished")
 
 _AXES: Final = ("p", "period", "size", "alpha", "restitution", "fractile")
 
@@ -123,13 +130,15 @@ def rocking_spectrum(
         names, shape = (*(name for name in axes if name != "p"), "p"), [*map(len, axes.values())]
         table = simulate_many(gathered, shaken, **options)
         peak, overturned, unfinished = (
-            np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in _SIMULATED
+            np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in _OUTCOME_NAMES
         )
-        ratio = ratios_of(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
-        found = names, fractiles_of(ratio, shares), overturned_share(ratio)
-        return RockingSpectrum(_dataset(table, names, (peak, overturned, ratio), found, axes, shares, gathered.gravity))
-    weight = normalised_weights(weights, len(gathered))
-    median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
+        ratio = compute_ratios(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
+        found = names, compute_fractiles(ratio, shares), compute_overturned_share(ratio)
+        return RockingSpectrum(
+            _create_spectrum_dataset(table, names, (peak, overturned, ratio), found, axes, shares, gathered.gravity)
+        )
+    weight = normalise_weights(weights, len(gathered))
+    median = float(compute_weighted_fractiles(gathered.p.mean(axis=1), weight, _MEDIAN_SHARE)[0])
     rates = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
         rates = checks.positive_numbers(rates_of(p, size, gathered.gravity), "p", InvalidOption)
@@ -138,16 +147,20 @@ def rocking_spectrum(
     resized = gathered.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(rates / median, n))
     table = simulate_many(resized, shaken, **options)
     peak, overturned, unfinished = (
-        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED
+        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _OUTCOME_NAMES
     )
-    ratio = ratios_of(peak, overturned, unfinished, gathered.alpha.min(axis=1)[:, None])
+    ratio = compute_ratios(peak, overturned, unfinished, gathered.alpha.min(axis=1)[:, None])
     flat, each = ratio.reshape(-1, count), np.tile(weight, len(ratio))
-    found = ("p",), weighted_fractiles(flat, each, shares), overturned_share(flat, each)
-    data = _dataset(table, ("block", "p"), (peak, overturned, ratio), found, {"p": rates}, shares, gathered.gravity)
-    return RockingSpectrum(data.assign_coords(weight=("block", weight)).assign_attrs(blocks=pooled(gathered, weights)))
+    found = ("p",), compute_weighted_fractiles(flat, each, shares), compute_overturned_share(flat, each)
+    data = _create_spectrum_dataset(
+        table, ("block", "p"), (peak, overturned, ratio), found, {"p": rates}, shares, gathered.gravity
+    )
+    return RockingSpectrum(
+        data.assign_coords(weight=("block", weight)).assign_attrs(blocks=describe_pooled_blocks(gathered, weights))
+    )
 
 
-def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
+def compute_fractiles(peaks: Floats, shares: Floats) -> Floats:
     """Interpolate fractiles (k, ...) of peaks (n, ...) without NaN, infinite if either neighbour is."""
     ordered = np.sort(peaks, axis=0)  # NaN last
     known = np.maximum(np.count_nonzero(~np.isnan(peaks), axis=0), 1)
@@ -163,7 +176,7 @@ def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
     return between
 
 
-def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
+def compute_weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
     """Return the lowest values (n, ...) not exceeded by k shares of the weight, without NaN, shape (k, ...)."""
     order = np.argsort(values, axis=0, kind="stable")
     ordered = np.take_along_axis(values, order, axis=0)
@@ -173,7 +186,7 @@ def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Float
     return np.asarray(np.take_along_axis(ordered, np.argmax(enough, axis=1), axis=0))
 
 
-def overturned_share(peaks: Floats, weights: Floats | None = None) -> Floats:
+def compute_overturned_share(peaks: Floats, weights: Floats | None = None) -> Floats:
     """Return the share of infinite peaks (n, ...) along the first axis, without NaN."""
     known, fell = ~np.isnan(peaks), np.isinf(peaks)
     if weights is not None and known.all():
@@ -212,8 +225,8 @@ class RockingSpectrum(DatasetResult):
 
     def summary(self) -> str:
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
-        parts = [f"peak rotation over slenderness, {motions_text(self.data)}, {self.data.model} model"]
-        for title, one in curves_of(self.data):
+        parts = [f"peak rotation over slenderness, {describe_motions(self.data)}, {self.data.model} model"]
+        for title, one in split_curves(self.data):
             fractiles = one.fractile_over_alpha.transpose("p", "fractile").values
             rows = [
                 [
@@ -234,7 +247,7 @@ class RockingSpectrum(DatasetResult):
         return {
             "motions": data.motion.values,
             **({"verticals": data.vertical.values} if "vertical" in data.coords else {}),
-            **({"blocks": data.sizes["block"], "weights": data.weight.values} if self._of_ensemble else {}),
+            **({"blocks": data.sizes["block"], "weights": data.weight.values} if self._is_ensemble else {}),
             "model": data.model,
             "chattering": data.chattering,
             **{add_unit(name, data[name].units): data[name].values for name in _AXES if name in data.coords},
@@ -261,23 +274,23 @@ class RockingSpectrum(DatasetResult):
         checks.choice(against, "against", InvalidOption, get_args(Abscissa))
         # Lines are drawn in the order of the abscissa, whatever the order of p.
         data = self.data.sortby("p") if "p" in self.data.dims else self.data
-        named_curves = curves_of(data)
+        named_curves = split_curves(data)
         alone = len(named_curves) == 1
         curves = [
             SpectrumCurves(
                 "" if alone else name,
-                self._peaks_of_motions(one),
+                self._select_peaks(one),
                 one.fractile_over_alpha.transpose("fractile", "p").values,
                 one.overturned_share.values,
             )
             for name, one in named_curves
         ]
-        shown = [motions_text(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
+        shown = [describe_motions(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
         return spectrum_figure(
             x=data[against].values,
             curves=curves,
             fractiles=self.data.fractile.values.tolist(),
-            motions=labels_of(self.data),
+            motions=compose_motion_labels(self.data),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
             title=title or escape_dollars(", ".join(shown)),
             ax=ax,
@@ -285,18 +298,18 @@ class RockingSpectrum(DatasetResult):
         )
 
     @property
-    def _of_ensemble(self) -> bool:
+    def _is_ensemble(self) -> bool:
         return "block" in self.data.dims
 
-    def _peaks_of_motions(self, one: xr.Dataset) -> Floats:
+    def _select_peaks(self, one: xr.Dataset) -> Floats:
         """Peaks under each motion, shape (motions, p), or their medians for an ensemble."""
-        if not self._of_ensemble:
+        if not self._is_ensemble:
             return np.asarray(one.peak_over_alpha.transpose("motion", "p").values)
         peaks = one.peak_over_alpha.transpose("block", "motion", "p").values
-        return np.asarray(weighted_fractiles(peaks, one.weight.values, _HALF)[0])
+        return np.asarray(compute_weighted_fractiles(peaks, one.weight.values, _MEDIAN_SHARE)[0])
 
 
-def _dataset(
+def _create_spectrum_dataset(
     table: xr.Dataset,
     names: tuple[str, ...],
     peaks: tuple[Floats, Floats, Floats],

@@ -25,7 +25,7 @@ from rocking.simulation.ensemble import body_coordinates, verticals_of
 from rocking.simulation.simulate import simulate
 
 #: Columns of the printed table. Files contain all columns.
-_SHOWN: Final = {
+_TABLE_COLUMNS: Final = {
     "record": "record",
     add_unit("pga", "g"): "PGA, g",
     "peak_over_{}": "peak/{}",
@@ -34,7 +34,7 @@ _SHOWN: Final = {
     "verdict": "verdict",
 }
 
-_SLIDING: Final = add_unit("sliding_time", "s")
+_SLIDING_TIME: Final = add_unit("sliding_time", "s")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,11 +58,11 @@ class BlockUnderRecords(Result):
     def _columns(self, table: str) -> list[Column]:
         return records_to_columns(self.rows(), self.skipped)
 
-    def _labels(self) -> list[dict[str, Any]]:
+    def _create_labels(self) -> list[dict[str, Any]]:
         """First columns of each row: record, motion, block."""
         columns = body_coordinates(self.block.alone())
         numbers = {add_unit(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
-        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
+        labels = create_record_columns(self.records, [require_motion(response) for response in self.responses])
         return [{**label, "block": self.block.description, **numbers} for label in labels]
 
     def _headline(self) -> str:
@@ -92,18 +92,18 @@ class Survey(BlockUnderRecords):
 
     def rows(self) -> list[dict[str, Any]]:
         friction, rows = self.friction, []
-        for label, response in zip(self._labels(), self.responses, strict=True):
-            sliding = {} if friction is None else {"friction": friction, _SLIDING: response.sliding_time(friction)}
-            rows.append(label | _row(response, self.precision) | sliding)
+        for label, response in zip(self._create_labels(), self.responses, strict=True):
+            sliding = {} if friction is None else {"friction": friction, _SLIDING_TIME: response.sliding_time(friction)}
+            rows.append(label | _create_row(response, self.precision) | sliding)
         return rows
 
     def summary(self) -> str:
         limit = self.block.coordinate.limit
         known = [{f"peak_over_{limit}": float(ratio_text(response))} for response in self.responses]
         rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
-        shown = {name.format(limit): title.format(limit) for name, title in _SHOWN.items()}
+        shown = {name.format(limit): title.format(limit) for name, title in _TABLE_COLUMNS.items()}
         if self.friction is not None:
-            shown |= {_SLIDING: f"with friction {self.friction:g} slides at, s"}
+            shown |= {_SLIDING_TIME: f"with friction {self.friction:g} slides at, s"}
         if any(row["processing"] for row in rows):
             shown = shown | {"processing": "done to the record"}
         table = format_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
@@ -159,25 +159,26 @@ class Check(BlockUnderRecords):
         return [
             {
                 **label,
-                add_unit("pga", "g"): round_decimal(motion_of(response).pga / STANDARD_GRAVITY),
-                add_unit("pgv", "m/s"): motion_of(response).pgv,
+                add_unit("pga", "g"): round_decimal(require_motion(response).pga / STANDARD_GRAVITY),
+                add_unit("pgv", "m/s"): require_motion(response).pgv,
                 **ratios,
                 "simulated": margin,
                 "lowest_factor": 1.0 / margin,
                 "peak_over_slenderness": response.peak_over_slenderness,
                 "overturned": response.overturned,
                 "falls_under_less": less,
-                "verdict": in_brief(response, PRECISION) + (f"; overturns at x {_short(1.0 / margin)}" if less else ""),
+                "verdict": in_brief(response, PRECISION)
+                + (f"; overturns at x {_format_factor(1.0 / margin)}" if less else ""),
             }
             for label, response, ratios, margin, less in zip(
-                self._labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
+                self._create_labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
             )
         ]
 
     def summary(self) -> str:
         rules = [*self.ratios[0]]
         shown = {"record": "record", add_unit("pga", "g"): "PGA, g", add_unit("pgv", "m/s"): "PGV, m/s"}
-        shown |= {rule: title_of(rule) for rule in rules}
+        shown |= {rule: format_rule_name(rule) for rule in rules}
         shown |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
         known = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
         rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
@@ -191,21 +192,21 @@ class Check(BlockUnderRecords):
                 "the motion that was found to overturn the block, in steps of 5 %",
                 "",
                 table,
-                *(["", *self._disagreements(rules)] if rules else []),
-                *(f"note: {note}" for note in self._notes()),
+                *(["", *self._count_disagreements(rules)] if rules else []),
+                *(f"note: {note}" for note in self._list_notes()),
             ]
         )
 
     def to_dict(self) -> dict[str, Any]:
-        return super().to_dict() | {"notes": self._notes()}
+        return super().to_dict() | {"notes": self._list_notes()}
 
-    def _notes(self) -> list[str]:
+    def _list_notes(self) -> list[str]:
         return [] if self.block.alone().is_symmetric else [MIRROR_NOTE]
 
     def _headline(self) -> str:
         return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
 
-    def _disagreements(self, rules: list[str]) -> list[str]:
+    def _count_disagreements(self, rules: list[str]) -> list[str]:
         """Count the errors of each rule, without records for which no single number can be right."""
         lines, less = [], self.falls_under_less
         kept = [
@@ -217,7 +218,9 @@ class Check(BlockUnderRecords):
             unsafe = sum(ratios[rule] < 1.0 and fell for ratios, fell in kept)
             wary = sum(ratios[rule] >= 1.0 and not fell for ratios, fell in kept)
             right = len(kept) - unsafe - wary
-            lines.append(f"{title_of(rule)}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(kept)}")
+            lines.append(
+                f"{format_rule_name(rule)}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(kept)}"
+            )
         if any(less):
             lines.append(
                 f"not counted: {sum(less)} of {len(less)}, where the block stands under the motion as it is, but falls "
@@ -228,12 +231,12 @@ class Check(BlockUnderRecords):
         return lines
 
 
-def title_of(rule: str) -> str:
+def format_rule_name(rule: str) -> str:
     """Return the usual name of a rule of thumb."""
     return "ASCE 43-05" if rule == "asce_43_05" else rule.capitalize()
 
 
-def _short(factor: float) -> str:
+def _format_factor(factor: float) -> str:
     """Format a factor below 1, with more digits near 1."""
     return f"{factor:.2f}" if factor < 0.985 else f"{factor:.4f}"
 
@@ -294,12 +297,14 @@ def survey(
     with Progress("simulating", total=len(named_motions)) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, **options))
-            _row(responses[-1], precision)  # the response caches the expensive results while the progress bar is shown
+            _create_row(
+                responses[-1], precision
+            )  # the response caches the expensive results while the progress bar is shown
             bar.advance()
     return Survey(block, tuple(named_motions), tuple(responses), friction, precision)
 
 
-def folder_names(records: Sequence[str]) -> list[str]:
+def create_folder_names(records: Sequence[str]) -> list[str]:
     """Return a unique folder name for each record."""
     names: dict[str, None] = {}
     for record in records:
@@ -310,7 +315,7 @@ def folder_names(records: Sequence[str]) -> list[str]:
     return list(names)
 
 
-def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
+def create_record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
     """Return the name of each record as requested, and of its motion as in other analyses."""
     names, verticals = list_motion_names(motions), verticals_of(motions)
     return [
@@ -319,14 +324,14 @@ def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[di
     ]
 
 
-def motion_of(response: Response) -> Motion:
+def require_motion(response: Response) -> Motion:
     """Return the motion of a response that has one."""
     assert response.motion is not None
     return response.motion
 
 
-def _row(response: Response, precision: float) -> dict[str, Any]:
-    motion = motion_of(response)
+def _create_row(response: Response, precision: float) -> dict[str, Any]:
+    motion = require_motion(response)
     near, further = response.perturbed(), response.perturbed(*steps_within(precision))
     return {
         add_unit("duration", "s"): motion.duration,

@@ -9,13 +9,23 @@ import numpy as np
 
 from rocking.core.arrays import Flags, Floats, select_evenly
 from rocking.core.tables import escape_dollars
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, page_for, scale_by_ratio, styles_of
+from rocking.plot.canvas import (
+    ABOVE,
+    CURVES,
+    GROUND,
+    INK,
+    FigureOptions,
+    add_labels,
+    choose_styles,
+    open_page,
+    set_logarithmic,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_DOT: Final[dict[str, Any]] = {"markersize": 4.0, "markerfacecolor": "none"}
+_GROUP_MARKER: Final[dict[str, Any]] = {"markersize": 4.0, "markerfacecolor": "none"}
 
 
 class FragilityLine(NamedTuple):
@@ -39,20 +49,20 @@ def fragility_figure(
     intensity_label: str,
     band_label: str,
     probability_label: str = "probability",
-    **place: Unpack[Place],
+    **place: Unpack[FigureOptions],
 ) -> Figure:
     """Draw fitted fragility curves with their confidence bands and the observed fractions."""
-    with page_for((5.6, 4.2), **place) as page:
+    with open_page((5.6, 4.2), **place) as page:
         (axes,) = page.panels()
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
             axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
             axes.plot(line.intensity, line.probability, linewidth=1.5, label=escape_dollars(line.label), **style)
             # Every limit state has its own marker.
-            axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
+            axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_GROUP_MARKER)
         is_bounded = any(np.any(line.lower < line.upper) for line in lines)
         axes.fill_between([], [], color=GROUND, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
-        axes.plot([], [], "o", color=GROUND, label="dot: share of outcomes at about its intensity", **_DOT)
+        axes.plot([], [], "o", color=GROUND, label="dot: share of outcomes at about its intensity", **_GROUP_MARKER)
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid(True)
         add_labels(axes, intensity_label, probability_label)
@@ -60,10 +70,10 @@ def fragility_figure(
 
 
 def dispersions_figure(
-    *, names: Sequence[str], dispersion: Floats, low: Floats, high: Floats, **place: Unpack[Place]
+    *, names: Sequence[str], dispersion: Floats, low: Floats, high: Floats, **place: Unpack[FigureOptions]
 ) -> Figure:
     """Draw the dispersion of the overturning intensity, with its interval, for each named measure."""
-    with page_for((5.6, 0.8 + 0.32 * len(names)), **place) as page:
+    with open_page((5.6, 0.8 + 0.32 * len(names)), **place) as page:
         (axes,) = page.panels()
         row = np.arange(len(names))
         axes.hlines(row, low, high, color=INK, linewidth=1.0)
@@ -78,10 +88,10 @@ def dispersions_figure(
 
 
 #: Fractions of a rate are shown from this part of the largest fraction on.
-_LEAST = 1e-3
+_MIN_SHARE = 1e-3
 
 #: Range of the shown rates: factors on the lowest and highest rate of the hazard curve.
-_MARGIN = 10.0
+_RATE_MARGIN = 10.0
 
 
 class HazardLine(NamedTuple):
@@ -99,10 +109,15 @@ class RiskLine(NamedTuple):
 
 
 def risk_figure(
-    *, intensity: Floats, hazard: HazardLine, lines: Sequence[RiskLine], intensity_label: str, **place: Unpack[Place]
+    *,
+    intensity: Floats,
+    hazard: HazardLine,
+    lines: Sequence[RiskLine],
+    intensity_label: str,
+    **place: Unpack[FigureOptions],
 ) -> Figure:
     """Draw a hazard curve, and below it the contributions to each limit state's rate."""
-    with page_for((5.6, 5.2), **place) as page:
+    with open_page((5.6, 5.2), **place) as page:
         *curves, shares = page.panels("A;B", sharex=True)
         for axes in curves:
             _draw_hazard(axes, intensity, hazard)
@@ -110,12 +125,12 @@ def risk_figure(
             style = CURVES[k % len(CURVES)]
             shares.plot(intensity, line.share, linewidth=1.5, label=escape_dollars(line.label), **style)
             shares.fill_between(intensity, 0.0, line.share, color=style["color"], alpha=0.12, linewidth=0.0)
-        shown = _inside(intensity, hazard.known)
+        shown = _is_inside(intensity, hazard.known)
         for line in lines:
-            shown |= line.share > _LEAST * line.share.max()
+            shown |= line.share > _MIN_SHARE * line.share.max()
         for axes in curves:
             axes.set_ylim(0.5 * float(hazard.rate[shown].min()), 2.0 * float(hazard.rate[shown].max()))
-        scale_by_ratio(shares, intensity[shown])
+        set_logarithmic(shares, intensity[shown])
         shares.set(xlim=(float(intensity[shown][0]), float(intensity[shown][-1])))
         shares.set_ylim(bottom=0.0)
         shares.grid(True)
@@ -130,32 +145,32 @@ def survival_figure(
     largest_label: str,
     hazard: HazardLine | None,
     intensity_label: str,
-    **place: Unpack[Place],
+    **place: Unpack[FigureOptions],
 ) -> Figure:
     """Draw a hazard curve and the largest annual rates consistent with a standing block."""
-    with page_for((5.6, 3.6), **place) as page:
+    with open_page((5.6, 3.6), **place) as page:
         (axes,) = page.panels()
-        scale_by_ratio(axes, intensity)
+        set_logarithmic(axes, intensity)
         if hazard is not None:
             _draw_hazard(axes, intensity, hazard)
             above: dict[str, Any] = {"color": ABOVE, "alpha": 0.2, "label": "more often than the block allows"}
             axes.fill_between(intensity, largest, np.maximum(largest, hazard.rate), linewidth=0.0, **above)
         axes.plot(intensity, largest, label=largest_label, linewidth=1.5, **CURVES[1])
         rate = largest[largest < np.inf] if hazard is None else hazard.rate
-        lowest, highest = 0.5 * min(float(largest.min()), float(rate.min())), _MARGIN * float(rate.max())
+        lowest, highest = 0.5 * min(float(largest.min()), float(rate.min())), _RATE_MARGIN * float(rate.max())
         axes.set(yscale="log", xlim=(intensity[0], intensity[-1]), ylim=(lowest, min(highest, 10.0)))
         axes.grid(True)
         add_labels(axes, intensity_label, "exceeded, times a year")
     return page.figure
 
 
-def _inside(intensity: Floats, known: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _is_inside(intensity: Floats, known: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     return np.asarray((intensity >= known[0]) & (intensity <= known[1]))
 
 
 def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
     """Draw a hazard curve, dotted where it is extrapolated."""
-    inside = _inside(intensity, hazard.known)
+    inside = _is_inside(intensity, hazard.known)
     label = "hazard curve (dotted: extended)" if not inside.all() else "hazard curve"
     axes.plot(intensity, hazard.rate, color=GROUND, linewidth=1.0, linestyle=":")
     axes.plot(intensity[inside], hazard.rate[inside], color=GROUND, linewidth=2.0, label=label)
@@ -165,14 +180,14 @@ def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
 
 
 #: Maximum number of curves that are drawn with all fractiles, and with every motion.
-_WITH_ALL_FRACTILES: Final = 2
-_WITH_ALL_MOTIONS: Final = 4
+_MAX_CURVES_WITH_FRACTILES: Final = 2
+_MAX_CURVES_WITH_MOTIONS: Final = 4
 
 #: Maximum number of curves in the legend.
-_NAMED: Final = 8
+_MAX_NAMED_CURVES: Final = 8
 
 #: Marker at the end of a line beyond which blocks overturn.
-_END: Final[dict[str, Any]] = {"marker": "x", "linestyle": "none", "markersize": 4.0, "markeredgewidth": 1.0}
+_END_MARKER: Final[dict[str, Any]] = {"marker": "x", "linestyle": "none", "markersize": 4.0, "markeredgewidth": 1.0}
 
 
 class SpectrumCurves(NamedTuple):
@@ -197,7 +212,7 @@ def spectrum_figure(
     fractiles: Sequence[float],
     motions: Sequence[str],
     x_label: str,
-    **place: Unpack[Place],
+    **place: Unpack[FigureOptions],
 ) -> Figure:
     """Draw peak rotations against the abscissa, and below them the fraction of motions that overturn the block.
 
@@ -206,19 +221,19 @@ def spectrum_figure(
     motion, ends in a cross if the block of the next point overturns. In `ax`, only the peak rotations are drawn.
     """
     middle = min(fractiles, key=lambda share: abs(share - 0.5))
-    chosen = fractiles if len(motions) > 1 and len(curves) <= _WITH_ALL_FRACTILES else [middle]
+    chosen = fractiles if len(motions) > 1 and len(curves) <= _MAX_CURVES_WITH_FRACTILES else [middle]
     widths = {share: 1.8 if share == middle else 0.9 for share in chosen}
-    named, with_singles = select_evenly(len(curves), _NAMED), len(curves) <= _WITH_ALL_MOTIONS
-    with page_for((5.6, 4.8), **place) as page:
+    named, with_singles = select_evenly(len(curves), _MAX_NAMED_CURVES), len(curves) <= _MAX_CURVES_WITH_MOTIONS
+    with open_page((5.6, 4.8), **place) as page:
         peaks, *shares = panels = page.panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
-        for k, (style, curve) in enumerate(zip(styles_of(len(curves)), curves, strict=True)):
+        for k, (style, curve) in enumerate(zip(choose_styles(len(curves)), curves, strict=True)):
             peaks.plot([], [], linewidth=1.4, label=escape_dollars(curve.label) if k in named else "", **style)
             if with_singles:
                 singles = np.where(np.isfinite(curve.singles), curve.singles, np.nan)
                 peaks.plot(x, singles.T, color=style["color"], linewidth=0.5, alpha=0.35)
             for share, width in widths.items():
                 fractile = curve.fractiles[[*fractiles].index(share)]
-                _draw(peaks, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
+                _draw_peaks(peaks, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
             for panel in shares:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         if len(named) < len(curves):
@@ -230,7 +245,7 @@ def spectrum_figure(
                 text = "median" if share == 0.5 else f"{100 * share:g} % of the motions are below"
                 peaks.plot([], [], color=INK, linewidth=width, label=text)
         peaks.grid(True, which="both")
-        scale_by_ratio(panels[-1], x)
+        set_logarithmic(panels[-1], x)
         peaks.set_ylim(bottom=0.0)
         add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
         for panel in shares:
@@ -240,18 +255,18 @@ def spectrum_figure(
     return page.figure
 
 
-def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, Any]) -> None:
+def _draw_peaks(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, Any]) -> None:
     """Draw a line with gaps at infinite values, and mark its ends there."""
     finite = np.isfinite(values)
     shown = np.where(finite, values, np.nan)
     axes.plot(x, shown, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
     ends = finite & ~(np.append(True, finite[:-1]) & np.append(finite[1:], True))
     if ends.any():
-        axes.plot(x[ends], values[ends], color=style["color"], label="beyond: overturns", **_END)
+        axes.plot(x[ends], values[ends], color=style["color"], label="beyond: overturns", **_END_MARKER)
 
 
 #: Fractiles of the motions, and their line styles.
-_FRACTILES: Final[Mapping[float, Any]] = {0.16: (0, (1, 1)), 0.5: "-", 0.84: (0, (5, 1.5))}
+_FRACTILE_LINES: Final[Mapping[float, Any]] = {0.16: (0, (1, 1)), 0.5: "-", 0.84: (0, (5, 1.5))}
 
 
 class ScaledMotion(NamedTuple):
@@ -263,7 +278,7 @@ class ScaledMotion(NamedTuple):
     bands: Floats
 
 
-def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Unpack[Place]) -> Figure:
+def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Unpack[FigureOptions]) -> Figure:
     """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
 
     More than four motions are drawn in one style, with the fractiles of the levels that reach a peak rotation.
@@ -274,7 +289,7 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
         names = [f"{k}: {name}" for k, name in enumerate(names, start=1)]
     stands = np.concatenate([motion.levels[np.isfinite(motion.peak)] for motion in motions])
     last = max(float(motion.levels[-1]) for motion in motions)
-    with page_for((7.0, 4.2), **place) as page:
+    with open_page((7.0, 4.2), **place) as page:
         curves, *strips = page.panels("AB", sharey=True, width_ratios=(2.0, 1.0))
         for k, motion in enumerate(motions):
             style = CURVES[k] if few else {"color": GROUND, "linewidth": 0.6}
@@ -289,8 +304,8 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
         if not few:
             every = np.concatenate([motion.peak for motion in motions])
             peaks = np.linspace(0.0, float(np.max(every[np.isfinite(every)], initial=0.0)), 200)[1:]
-            reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
-            for share, linestyle in _FRACTILES.items():
+            reached = np.sort([find_reaching_levels(motion, peaks) for motion in motions], axis=0)
+            for share, linestyle in _FRACTILE_LINES.items():
                 # Lowest level that suffices for this fraction of the motions.
                 level = reached[int(np.ceil(share * len(motions))) - 1]
                 look = {"linestyle": linestyle, "label": f"level that suffices for {100 * share:g} % of them"}
@@ -306,7 +321,7 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
     return page.figure
 
 
-def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
+def find_reaching_levels(motion: ScaledMotion, peaks: Floats) -> Floats:
     """Return the lowest level at which a motion reaches each peak rotation; infinite if never."""
     overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
     below = motion.levels < overturns
@@ -322,9 +337,9 @@ def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
 
 
 #: Bars of a histogram of blocks.
-_BINS: Final = 24
+_BIN_COUNT: Final = 24
 
-_DOTS: Final[dict[str, Any]] = {"linestyle": "", "markersize": 3.2, "markeredgewidth": 0.6, "clip_on": False}
+_TEST_MARKER: Final[dict[str, Any]] = {"linestyle": "", "markersize": 3.2, "markeredgewidth": 0.6, "clip_on": False}
 
 
 class Parameter(NamedTuple):
@@ -346,18 +361,18 @@ def outcomes_figure(
     overturned: Flags,
     parameters: Sequence[Parameter],
     weights: Floats,
-    **place: Unpack[Place],
+    **place: Unpack[FigureOptions],
 ) -> Figure:
     """Draw the outcome of every test against its fitted probability, and the parameters of the blocks."""
-    with page_for((7.0, 4.6), **place) as page:
+    with open_page((7.0, 4.6), **place) as page:
         below = "ABCDEFGHI"[: len(parameters)]
         tests, *panels = page.panels(f"{'T' * len(parameters)};{below}", height_ratios=(1.2, 1.0))
         # Sorted, with each outcome at a probability of 0 or 1.
         order = np.argsort(probabilities, kind="stable")
         number, fell = np.arange(1, order.size + 1), overturned[order]
         tests.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
-        tests.plot(number[fell], np.ones(fell.sum()), "v", color=ABOVE, label="overturned", **_DOTS)
-        stood: Any = {"color": INK, "mfc": "white", "label": "did not overturn", **_DOTS}
+        tests.plot(number[fell], np.ones(fell.sum()), "v", color=ABOVE, label="overturned", **_TEST_MARKER)
+        stood: Any = {"color": INK, "mfc": "white", "label": "did not overturn", **_TEST_MARKER}
         tests.plot(number[~fell], np.zeros((~fell).sum()), "o", **stood)
         tests.set_ylim(0.0, 1.0)
         tests.grid(True)
@@ -370,10 +385,16 @@ def outcomes_figure(
 
 
 def measured_figure(
-    *, time: Floats, measured: Floats, residual: Floats, fitted_time: Floats, fitted: Floats, **place: Unpack[Place]
+    *,
+    time: Floats,
+    measured: Floats,
+    residual: Floats,
+    fitted_time: Floats,
+    fitted: Floats,
+    **place: Unpack[FigureOptions],
 ) -> Figure:
     """Draw measured and fitted rotation histories (rad, against s) and their residual."""
-    with page_for((7.0, 4.0), **place) as page:
+    with open_page((7.0, 4.0), **place) as page:
         main, *others = page.panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
         main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")
         main.plot(fitted_time, fitted, color=ABOVE, linewidth=0.9, label="fitted")
@@ -391,7 +412,7 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
     """Draw the distribution of the blocks, and the median and interval of the population's centre."""
     sides = parameter.values.shape[1]
     drawn = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}
-    edges = np.histogram_bin_edges(parameter.values, _BINS)
+    edges = np.histogram_bin_edges(parameter.values, _BIN_COUNT)
     for bound in parameter.bounds:
         axes.axvline(bound, color=GROUND, linewidth=1.0, linestyle=(0, (3, 2)), label="bound")
     for k, (name, style) in enumerate(drawn.items()):
@@ -408,10 +429,10 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
 
 
 def reliability_figure(
-    *, predicted: Floats, observed: Floats, band_lower: Floats, band_upper: Floats, **place: Unpack[Place]
+    *, predicted: Floats, observed: Floats, band_lower: Floats, band_upper: Floats, **place: Unpack[FigureOptions]
 ) -> Figure:
     """Draw observed against predicted fractions (bins,), with the bands of correct predictions."""
-    with page_for((3.7, 3.7), **place) as page:
+    with open_page((3.7, 3.7), **place) as page:
         (axes,) = page.panels()
         axes.plot([0.0, 1.0], [0.0, 1.0], color=GROUND, linewidth=0.8, linestyle=(0, (4, 2)))
         label = "90 % of what right predictions would show"
@@ -430,13 +451,13 @@ def draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float
 
 
 def motion_figure(
-    *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **place: Unpack[Place]
+    *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **place: Unpack[FigureOptions]
 ) -> Figure:
     """Draw a ground acceleration (g) against time (s), and below it the vertical one, which is omitted in `ax`."""
     traces = {"ground acceleration (g)": acceleration_g}
     if vertical_g is not None and place.get("ax") is None:
         traces["vertical acceleration (g)"] = vertical_g
-    with page_for((7.0, 0.6 + 1.8 * len(traces)), **place) as page:
+    with open_page((7.0, 0.6 + 1.8 * len(traces)), **place) as page:
         panels = page.panels(";".join("AB"[: len(traces)]), sharex=True)
         for axes, (label, trace) in zip(panels, traces.items(), strict=True):
             draw_ground(axes, time, trace, 0.8)
