@@ -97,8 +97,8 @@ def response_rose(
     --------
     >>> import rocking
     >>> pair = tuple(rocking.records.load(f"ridgecrest-tow2-{azimuth}") for azimuth in ("090", "360"))
-    >>> found = response_rose(rocking.Solid.from_mesh("statue"), [pair], azimuths=[0.0, 45.0, 90.0])
-    >>> found.data.overturned.values[0, 0].tolist()
+    >>> rose = response_rose(rocking.Solid.from_mesh("statue"), [pair], azimuths=[0.0, 45.0, 90.0])
+    >>> rose.data.overturned.values[0, 0].tolist()
     [False, False, False]
     """
     import xarray as xr
@@ -222,7 +222,7 @@ class ResponseRose(DatasetResult):
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.core.arrays import select_evenly
-        from rocking.plot.maps import shares_figure
+        from rocking.plot.maps import draw_shares
 
         data = self.data
         indices = [*select_evenly(data.sizes["level"], 4)]
@@ -234,7 +234,7 @@ class ResponseRose(DatasetResult):
         order = np.argsort(full_circle)
         shares = data.overturned_share.values[indices]
         level_names = self._format_levels()
-        return shares_figure(
+        return draw_shares(
             azimuth=full_circle[order],
             shares=np.concatenate([shares, shares[:, is_new]], axis=1)[:, order],
             labels=[level_names[k] for k in indices],
@@ -245,22 +245,22 @@ class ResponseRose(DatasetResult):
 
 
 def _name_pairs(pairs: Pairs) -> dict[str, Pair]:
-    """Return pairs by name, or raise an error if one is not a pair of motions."""
-    given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.items(pairs, "pairs", InvalidOption)
-    found = [list_motions(pair) for pair in given if not isinstance(pair, Motion)]
-    if not found or len(found) < len(given) or any(len(components) != 2 for components in found):
+    """Name pairs, or raise an error if one is not a pair of motions."""
+    entries = [*pairs.values()] if isinstance(pairs, Mapping) else checks.items(pairs, "pairs", InvalidOption)
+    lists = [list_motions(pair) for pair in entries if not isinstance(pair, Motion)]
+    if not lists or len(lists) < len(entries) or any(len(components) != 2 for components in lists):
         raise InvalidOption(
             "{} must hold the two horizontal components of each place, as [(first, second)]", "pairs", value=pairs
         )
-    names = [f"{one.name} and {other.name}" for one, other in found]
-    numbered = [f"{name} #{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
-    both = ((one, other) for one, other in found)
-    return dict(zip(map(str, pairs) if isinstance(pairs, Mapping) else numbered, both, strict=True))
+    names = [f"{first.name} and {second.name}" for first, second in lists]
+    unique_names = [f"{name} #{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
+    motion_pairs = ((first, second) for first, second in lists)
+    return dict(zip(map(str, pairs) if isinstance(pairs, Mapping) else unique_names, motion_pairs, strict=True))
 
 
 def _compute_pair_factors(scales: Scales, pair: Pair) -> Any:
-    """Return factors that scale the geometric mean of the measures of both components to the levels."""
+    """Compute factors that scale the geometric mean of the measures of both components to the levels."""
     if scales.measure is None:
         return scales.values
-    one, other = (scales.measure.positive(motion, motion.name) for motion in pair)
-    return scales.values / np.sqrt(one * other)
+    first, second = (scales.measure.positive(motion, motion.name) for motion in pair)
+    return scales.values / np.sqrt(first * second)

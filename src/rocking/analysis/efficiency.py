@@ -15,7 +15,7 @@ from rocking.analysis.levels import (
     MIRROR_NOTE,
     compute_intensities,
     compute_units,
-    describe_pooled_blocks,
+    describe_pool,
     describe_sample,
     normalise_weights,
     number_clusters,
@@ -100,38 +100,36 @@ def compare_measures(
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=0.5, alpha=0.1, restitution=0.5)
     >>> pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.05, 0.1, 0.2)]
-    >>> found = compare_measures(block, pulses, periods=[1.0])
-    >>> [f"{name} {beta:.2f}" for name, beta in zip(found.data.measure.values, found.data.dispersion.values)]
+    >>> comparison = compare_measures(block, pulses, periods=[1.0])
+    >>> [f"{name} {beta:.2f}" for name, beta in zip(comparison.data.measure.values, comparison.data.dispersion.values)]
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
     """
-    bodies, motion_list = bodies_of(blocks), list_motions(motions)
+    bodies, motions = bodies_of(blocks), list_motions(motions)
     slenderness_of(bodies)  # raise errors before the simulations
     block_weights = normalise_weights(weights, len(bodies))
-    if len(motion_list) < 2:
+    if len(motions) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
     period_values = checks.positive_numbers(periods, "periods", InvalidOption)
     spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
     measures = [Measure("pga"), Measure("pgv"), *spectral_measures, Measure("pga_ratio"), Measure("pgv_ratio")]
-    cluster_numbers = number_clusters(motion_list, clusters)
+    cluster_numbers = number_clusters(motions, clusters)
     _check_sample_size(len(np.unique(cluster_numbers)), clusters)
-    analysis = incremental_dynamic_analysis(bodies, motion_list, measure="pga_ratio", model=model, rtol=rtol)
+    analysis = incremental_dynamic_analysis(bodies, motions, measure="pga_ratio", model=model, rtol=rtol)
     levels = analysis.data.overturning_level.transpose("motion", "block").values
-    factors = (
-        levels * compute_units(bodies, measures[-2], model) / compute_intensities(motion_list, measures[0])[:, None]
-    )
+    factors = levels * compute_units(bodies, measures[-2], model) / compute_intensities(motions, measures[0])[:, None]
     intensity = [
-        factors * compute_intensities(motion_list, measure)[:, None] / compute_units(bodies, measure, model)
+        factors * compute_intensities(motions, measure)[:, None] / compute_units(bodies, measure, model)
         for measure in measures
     ]
-    families = number_families(motion_list, reversed_too=bodies.is_symmetric)
-    is_first = np.isin(np.arange(len(motion_list)), np.unique(families, return_index=True)[1])
+    families = number_families(motions, reversed_too=bodies.is_symmetric)
+    is_first = np.isin(np.arange(len(motions)), np.unique(families, return_index=True)[1])
     is_counted = is_first[:, None] & np.isfinite(levels)
     cluster_counts = [len(np.unique(cluster_numbers[overturns])) for overturns in is_counted[:, block_weights > 0.0].T]
     _check_sample_size(min(cluster_counts), clusters)
     dataset = _create_comparison_dataset(
-        measures, np.array(intensity), is_counted, block_weights, freedom=min(cluster_counts) - 1
+        measures, np.array(intensity), is_counted, block_weights, degrees_of_freedom=min(cluster_counts) - 1
     )
-    attributes = {"blocks": describe_pooled_blocks(blocks, weights), "model": model, "damping": damping}
+    attributes = {"blocks": describe_pool(blocks, weights), "model": model, "damping": damping}
     attributes["sample"] = describe_sample(cluster_numbers, clusters)
     motion_coordinates = {name: analysis.data[name] for name in ("motion", "vertical") if name in analysis.data.coords}
     return MeasureComparison(
@@ -213,10 +211,10 @@ class MeasureComparison(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import dispersions_figure
+        from rocking.plot.curves import draw_dispersions
 
         data, table = self.data, self._ranked_table
-        return dispersions_figure(
+        return draw_dispersions(
             names=[str(name) for name in table.index],
             dispersion=table.dispersion.to_numpy(),
             low=table.dispersion_low.to_numpy(),
@@ -228,41 +226,52 @@ class MeasureComparison(DatasetResult):
 
 
 def _create_comparison_dataset(
-    measures: Sequence[Measure], intensity: Floats, counts: Flags, shares: Floats, *, freedom: int
+    measures: Sequence[Measure], intensity: Floats, is_counted: Flags, block_weights: Floats, *, degrees_of_freedom: int
 ) -> xr.Dataset:
     """Combine intensities at overturning (measure, motion, block) with the dispersions of valid ones."""
     import xarray as xr
     from scipy.special import chdtri
 
-    logarithm = np.where(counts, np.log(intensity), np.nan)
-    weight, count = np.where(counts, shares, 0.0), counts.sum(axis=0)
+    log_intensity = np.where(is_counted, np.log(intensity), np.nan)
+    weight, count = np.where(is_counted, block_weights, 0.0), is_counted.sum(axis=0)
     # The sample consists of motions, which are the same for several blocks.
-    others = np.sum(shares * (count - 1))
-    within = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
-    own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / others)
-    mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
-    of_all = np.sqrt(np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / others)
+    total_degrees = np.sum(block_weights * (count - 1))
+    deviation = log_intensity - np.nansum(log_intensity, axis=1, keepdims=True) / np.maximum(count, 1)
+    dispersion = np.sqrt(np.nansum(weight * deviation**2, axis=(1, 2)) / total_degrees)
+    mean = np.nansum(weight * log_intensity, axis=(1, 2)) / weight.sum()
+    dispersion_of_all = np.sqrt(
+        np.nansum(weight * (log_intensity - mean[:, None, None]) ** 2, axis=(1, 2)) / total_degrees
+    )
     # Ratios of the ends of the interval to the standard deviation, for a normal sample.
-    low, high = (float(np.sqrt(freedom / chdtri(freedom, tail))) * own for tail in (0.05, 0.95))
-    spread = "standard deviation of the logarithm of the intensity at overturning"
-    median = "median of the intensities at overturning, in the measure's unit"
+    low, high = (
+        float(np.sqrt(degrees_of_freedom / chdtri(degrees_of_freedom, tail))) * dispersion for tail in (0.05, 0.95)
+    )
+    dispersion_text = "standard deviation of the logarithm of the intensity at overturning"
+    median_text = "median of the intensities at overturning, in the measure's unit"
     return xr.Dataset(
         {
             "intensity": variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
-            "median_intensity": variable("measure", np.exp(mean), median),
-            "dispersion": variable("measure", own, f"{spread} about each block's own mean", "1"),
+            "median_intensity": variable("measure", np.exp(mean), median_text),
+            "dispersion": variable("measure", dispersion, f"{dispersion_text} about each block's own mean", "1"),
             "dispersion_low": variable("measure", low, "lower end of its interval", "1"),
             "dispersion_high": variable("measure", high, "upper end of its interval", "1"),
-            "dispersion_of_all": variable("measure", of_all, f"{spread} about one mean of all blocks", "1"),
+            "dispersion_of_all": variable(
+                "measure", dispersion_of_all, f"{dispersion_text} about one mean of all blocks", "1"
+            ),
         },
-        {"measure": [each.short_name for each in measures], "unit": ("measure", [each.units for each in measures])},
+        {
+            "measure": [measure.short_name for measure in measures],
+            "unit": ("measure", [measure.units for measure in measures]),
+        },
     )
 
 
 def _check_sample_size(count: int, clusters: object) -> None:
     """Raise an error for a sample of one cluster, or of one motion without clusters."""
     if count < 2:
-        kind, which = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
+        argument, qualifier = (
+            ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
+        )
         raise InvalidOption(
-            f"fewer than two {{}}{which} overturn a block, however strong; a dispersion needs more", kind
+            f"fewer than two {{}}{qualifier} overturn a block, however strong; a dispersion needs more", argument
         )

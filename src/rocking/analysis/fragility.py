@@ -32,7 +32,7 @@ from rocking.analysis.levels import (
     compute_units,
     create_outcome_table,
     describe_polarities,
-    describe_pooled_blocks,
+    describe_pool,
     describe_sample,
     describe_undecided,
     exceeds_limit,
@@ -188,7 +188,8 @@ class Fragility(Result):
 
     def _headline(self) -> str:
         curves = ", ".join(
-            f"{curve.limit_state}: median {format_intensity(curve.median, self.measure)}, dispersion {curve.dispersion:.3g}"
+            f"{curve.limit_state}: median {format_intensity(curve.median, self.measure)}, "
+            f"dispersion {curve.dispersion:.3g}"
             for curve in self.curves
         )
         return f"{self.description}; {self.measure.label}; {curves}"
@@ -238,23 +239,26 @@ class Fragility(Result):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        found = Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
+        survival = Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
         if hazard is None or not self.several_blocks or self.outcomes is None:
-            return found
-        mean = compute_mean_survival(self.outcomes, self.measure.column, limit_state, hazard, found.years)
-        return replace(found, mean_probability=mean)
+            return survival
+        mean = compute_mean_survival(self.outcomes, self.measure.column, limit_state, hazard, survival.years)
+        return replace(survival, mean_probability=mean)
 
     @property
     def range(self) -> tuple[float, float]:
         """Lowest and highest intensity of the data, in SI units or a block's own."""
-        held = np.concatenate([curve.intensity for curve in self.curves])
-        return float(held.min()), float(held.max())
+        intensities = np.concatenate([curve.intensity for curve in self.curves])
+        return float(intensities.min()), float(intensities.max())
 
     def _columns(self, table: str) -> list[Column]:
         if table == "curves":
-            at = np.linspace(0.0, self.range[1], _POINTS)
-            values = np.concatenate([[at, curve.probability(at), *curve.band(at)] for curve in self.curves], axis=1)
-            names = [curve.limit_state for curve in self.curves for _ in at]
+            intensities = np.linspace(0.0, self.range[1], _POINTS)
+            values = np.concatenate(
+                [[intensities, curve.probability(intensities), *curve.band(intensities)] for curve in self.curves],
+                axis=1,
+            )
+            names = [curve.limit_state for curve in self.curves for _ in intensities]
             columns = zip((self.measure.column, "probability", "lower", "upper"), values, strict=True)
             return [Column("limit_state", names), *(Column(name, column) for name, column in columns)]
         if self.outcomes is None:
@@ -296,31 +300,32 @@ class Fragility(Result):
         """
         if block is not None:
             bodies_of(block)
-        chosen = self.block if block is None else block
-        imt = find_openquake_measure(self.measure, chosen, self.model)
-        lifting = None
-        if chosen is not None and imt[0] == "PGA" and not self.with_vertical:
-            lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
-        about = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
+        unit_block = self.block if block is None else block
+        imt = find_openquake_measure(self.measure, unit_block, self.model)
+        no_damage = None
+        if unit_block is not None and imt[0] == "PGA" and not self.with_vertical:
+            no_damage = min(unit_block.uplift_thresholds(self.model)) / STANDARD_GRAVITY
+        attributes = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
         write_text(
-            path, format_fragility_model(self.curves, imt, self.range, lifting, taxonomy, self.description, **about)
+            path,
+            format_fragility_model(self.curves, imt, self.range, no_damage, taxonomy, self.description, **attributes),
         )
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import fragility_figure
+        from rocking.plot.curves import draw_fragility
 
-        first = self.curves[0]
-        band_text = f"band: {100 * first.confidence:g} % confidence (likelihood)"
-        if not first.bounded:
-            band_text = f"no band: {self._few_clusters_text}"
+        first_curve = self.curves[0]
+        band_label = f"band: {100 * first_curve.confidence:g} % confidence (likelihood)"
+        if not first_curve.bounded:
+            band_label = f"no band: {self._few_clusters_text}"
         intensity = np.linspace(0.0, self.range[1], _POINTS)
-        states = [curve.limit_state for curve in self.curves]
-        return fragility_figure(
+        limit_states = [curve.limit_state for curve in self.curves]
+        return draw_fragility(
             lines=[create_fragility_line(curve, intensity, self.measure) for curve in self.curves],
             intensity_label=self.measure.label,
-            band_label=band_text,
-            probability_label=f"probability of {'' if states == ['overturning'] else 'exceeding '}"
-            + (states[0] if len(states) == 1 else "the limit state"),
+            band_label=band_label,
+            probability_label=f"probability of {'' if limit_states == ['overturning'] else 'exceeding '}"
+            + (limit_states[0] if len(limit_states) == 1 else "the limit state"),
             title=title or escape_dollars(self.description),
             ax=ax,
             figsize=figsize,
@@ -396,66 +401,69 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    many, how = bodies_of(blocks), Measure.parse(measure)
-    slenderness = slenderness_of(many)
-    shares = normalise_positive_weights(weights, len(many))
-    mirrored = checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
+    bodies, measure = bodies_of(blocks), Measure.parse(measure)
+    slenderness = slenderness_of(bodies)
+    block_weights = normalise_positive_weights(weights, len(bodies))
+    is_mirrored = (
+        checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and bodies.is_symmetric
+    )
     checks.fraction(confidence, "confidence", InvalidOption)
     states = check_limit_states(limit_states)
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
         raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
-    shaken = list_motions(motions)
-    values, together, units = (
-        compute_intensities(shaken, how),
-        number_clusters(shaken, clusters),
-        compute_units(many, how, model),
+    motions = list_motions(motions)
+    values, cluster_numbers, units = (
+        compute_intensities(motions, measure),
+        number_clusters(motions, clusters),
+        compute_units(bodies, measure, model),
     )
     options: dict[str, Any] = {"chattering": chattering}
-    options["polarity"] = "+" if mirrored else polarity
+    options["polarity"] = "+" if is_mirrored else polarity
     if stripes is None:
-        table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
+        table = simulate_many(bodies, motions, model=model, **options).expand_dims("level")
         intensity = (values[:, None] / units)[None, :, :, None]
     else:
-        table = simulate_levels(many, shaken, how, stripes, model=model, **options)
+        table = simulate_levels(bodies, motions, measure, stripes, model=model, **options)
         intensity = stripes[:, None, None, None]
     table = table if "polarity" in table.dims else table.expand_dims("polarity")
     table = table.transpose("level", "motion", "block", "polarity")
     missing = table.unfinished.values
     ratio = compute_ratios(table.peak_rotation.values, table.overturned.values, missing, slenderness[:, None])
-    groups = np.broadcast_to(together[None, :, None, None], ratio.shape)
-    x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
-    outcomes = create_outcome_table(table, how, x, ratio, states)
+    trial_clusters = np.broadcast_to(cluster_numbers[None, :, None, None], ratio.shape)
+    x, trials = (np.broadcast_to(array, ratio.shape).ravel() for array in (intensity, block_weights[:, None]))
+    outcomes = create_outcome_table(table, measure, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
     # Abandoned simulations and blocks of weight 0 are reported, but excluded from the fit.
-    counts = (trials > 0.0) & ~missing.ravel()
-    x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
+    is_counted = (trials > 0.0) & ~missing.ravel()
+    x, trials, trial_clusters = (x[is_counted], trials[is_counted], trial_clusters.ravel()[is_counted])
     data = {
-        name: (x, trials * exceeds_limit(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()
+        name: (x, trials * exceeds_limit(ratio, limit, name).ravel()[is_counted], trials)
+        for name, limit in states.items()
     }
     try:
-        curves = [fit_curve(name, data[name], groups, confidence, how, states[name]) for name in states]
-    except Unfitted as refused:
-        refused.outcomes = outcomes
+        curves = [fit_curve(name, data[name], trial_clusters, confidence, measure, states[name]) for name in states]
+    except Unfitted as error:
+        error.outcomes = outcomes
         raise
     scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
     factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
-    setup = Setup(many, model, chattering_scheme(chattering))
+    setup = Setup(bodies, model, chattering_scheme(chattering))
     kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
-    text = f"{describe_pooled_blocks(blocks, weights)}, {describe_sample(together, clusters)}, {kind}, {model} model"
+    text = f"{describe_pool(blocks, weights)}, {describe_sample(cluster_numbers, clusters)}, {kind}, {model} model"
     return Fragility(
         curves=tuple(curves),
-        measure=how,
-        description=text + describe_polarities(polarity, is_symmetric=many.is_symmetric),
+        measure=measure,
+        description=text + describe_polarities(polarity, is_symmetric=bodies.is_symmetric),
         block=find_single_block(blocks),
         model=model,
         outcomes=outcomes,
-        one_way=polarity != "both" and not many.is_symmetric,
+        one_way=polarity != "both" and not bodies.is_symmetric,
         with_vertical="vertical" in table.coords,
-        several_blocks=bool(np.count_nonzero(shares) > 1),
+        several_blocks=bool(np.count_nonzero(block_weights) > 1),
         source="motion" if clusters is None else "cluster",
-        undecided=describe_undecided(setup, shaken, factors, table.overturned.values),
+        undecided=describe_undecided(setup, motions, factors, table.overturned.values),
         missing=missing_text(missing),
     )
 
@@ -509,7 +517,7 @@ def fit_fragility(
 
     Notes
     -----
-    The likelihood of P = Phi(ln(x/median)/dispersion) assumes independent binomial counts (Baker 2015).
+    The likelihood of P = Phi(ln(x/median)/dispersion) assumes independent binomial counts :cite:p:`baker2015`.
 
     References
     ----------
@@ -522,18 +530,22 @@ def fit_fragility(
     >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
     median 3.1509 m/s^2, dispersion 0.3042
     """
-    how = Measure.parse(measure)
+    measure = Measure.parse(measure)
     x = checks.positive_numbers(intensity, "intensity", InvalidOption)
     for end in (x.min(), x.max()):
         checks.between(float(end), "intensity", InvalidOption, 1e-50, 1e50)
-    count = check_whole_numbers(trials, "trials", x.size, 1.0, 2.0**53)
+    counts = check_whole_numbers(trials, "trials", x.size, 1.0, 2.0**53)
     outcomes = check_state_mapping(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
-    groups = None if clusters is None else number_groups(clusters, "clusters", x.size)
+    cluster_numbers = None if clusters is None else number_groups(clusters, "clusters", x.size)
     checks.fraction(confidence, "confidence", InvalidOption)
     curves = [
         fit_curve(
-            name, (x, check_whole_numbers(values, "exceeded", x.size, 0.0, count), count), groups, confidence, how
+            name,
+            (x, check_whole_numbers(values, "exceeded", x.size, 0.0, counts), counts),
+            cluster_numbers,
+            confidence,
+            measure,
         )
         for name, values in outcomes.items()
     ]
-    return Fragility(tuple(curves), how, description, block, "nonlinear", None, source="cluster")
+    return Fragility(tuple(curves), measure, description, block, "nonlinear", None, source="cluster")

@@ -252,9 +252,9 @@ class Calibration(Result):
         return [*columns, Column("weight", self.weights), Column("model", [self.model] * len(self.weights))]
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import outcomes_figure
+        from rocking.plot.curves import draw_outcomes
 
-        return outcomes_figure(
+        return draw_outcomes(
             probabilities=self.probabilities,
             overturned=self.observed,
             parameters=[self._parameter(name) for name in self._evidence.candidates.space.unknown],

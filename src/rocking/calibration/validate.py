@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis import levels
-from rocking.analysis.levels import describe_pooled_blocks, normalise_weights
+from rocking.analysis.levels import describe_pool, normalise_weights
 from rocking.block.body import Bodies, Body
 from rocking.calibration.diagnostics import Scores, log_losses
 from rocking.calibration.outcomes import Calibration, Validation, chances_of, overturned_under
@@ -232,10 +232,10 @@ class ModelValidation(Result):
         return records_to_columns([asdict(test) for test in self.tests], {})
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import reliability_figure
+        from rocking.plot.curves import draw_reliability
 
         columns = ("predicted", "observed", "band_lower", "band_upper")
-        return reliability_figure(
+        return draw_reliability(
             **{name: np.array([getattr(row, name) for row in self.reliability]) for name in columns},
             title=title or escape_dollars(self._headline()),
             ax=ax,
@@ -343,7 +343,7 @@ def validate(
             shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
             outlier_probability = blocks.outlier_probability if outlier_probability is None else outlier_probability
         else:
-            description, how = describe_pooled_blocks(blocks, weights), model or "nonlinear"
+            description, how = describe_pool(blocks, weights), model or "nonlinear"
             bodies = bodies_of(blocks)
             slenderness_of(bodies)  # checked before the simulations
             shares = normalise_weights(weights, len(bodies)) / len(bodies)

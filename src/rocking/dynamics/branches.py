@@ -206,7 +206,7 @@ class Branch(Result):
         solid lines, unstable orbits dashed, and bifurcations are marked. `others` are further branches along the same
         parameter, for example of twice the period.
         """
-        from rocking.plot.orbits import branch_figure
+        from rocking.plot.orbits import draw_branches
 
         body, _ = self.family(float(self.values[0]))
         coordinate, branches = body.coordinate, [self, *others]
@@ -218,7 +218,7 @@ class Branch(Result):
         what = f"{coordinate.name} at the start of a period" if flat else f"largest {coordinate.name}"
         periods = ", ".join(str(each) for each in sorted({each.period for each in branches}))
         headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
-        return branch_figure(
+        return draw_branches(
             values=_apart([each.values for each in branches]),
             heights=_apart([each.states[:, 0] if flat else each.peaks for each in branches]),
             stable=_apart([each.is_stable for each in branches]) == 1.0,

@@ -59,8 +59,8 @@ STYLE: Final[dict[Any, Any]] = {
 #: A number with too many decimals.
 _LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
 
-#: Letter width relative to the font size: mean, and for short labels; letters that the handle
-#: and gaps of a legend line take.
+#: Letter width relative to the font size: mean, and for short labels; letters in place of the
+#: handle and the gaps of a legend line.
 _LETTER_WIDTH: Final = 0.52
 _WIDE_LETTER_WIDTH: Final = 0.53
 _HANDLE_LETTERS: Final = 5
@@ -89,13 +89,13 @@ def open_figure(
     Elsewhere no global state refers to the figure, and it is freed with its last reference. A notebook shows each
     figure once, as the value of a cell or at its end.
     """
-    short = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title)
+    short_title = _LONG_NUMBER.sub(lambda match: f"{float(match[0]):.4g}", title)
     if ax is not None:
         if not hasattr(ax, "get_figure"):
             raise InvalidOption(f"{{}} must be axes of Matplotlib's to draw in, not {ax!r}", "ax", value=ax)
         figure = ax.get_figure(root=True)
         assert figure is not None
-        ax.set_title(short, wrap=True)
+        ax.set_title(short_title, wrap=True)
         yield figure
         _show_once(figure)
         return
@@ -104,9 +104,11 @@ def open_figure(
 
     with mpl.rc_context(STYLE):
         figure = _create_figure(_check_size(default if figsize is None else figsize))
-        if short:
-            line = textwrap.fill(short, _count_letters((1.0 - 2.0 * _TITLE_X) * figure.bbox.width, figure.dpi))
-            figure.suptitle(line, x=_TITLE_X, ha="left")
+        if short_title:
+            wrapped_title = textwrap.fill(
+                short_title, _count_letters((1.0 - 2.0 * _TITLE_X) * figure.bbox.width, figure.dpi)
+            )
+            figure.suptitle(wrapped_title, x=_TITLE_X, ha="left")
         yield figure
         _create_ticks(figure)
         interactive = mpl.is_interactive()
@@ -130,42 +132,42 @@ class Page:
         self.panel_axes: list[Axes] = []
         self.handles: list[Any] | None = None
 
-    def panels(self, mosaic: Any = "A", **options: Any) -> list[Axes]:
+    def create_panels(self, mosaic: Any = "A", **options: Any) -> list[Axes]:
         """Create panels at the letters of a mosaic, the main one first, or return the caller's axes alone."""
         self.panel_axes = [self.ax] if self.ax else [*self.figure.subplot_mosaic(mosaic, **options).values()]
         return self.panel_axes
 
 
 @contextmanager
-def open_page(default: tuple[float, float], **place: Unpack[FigureOptions]) -> Iterator[Page]:
-    """Yield a page on a figure of `figure_for`; its legend lists all labelled artists of the panels."""
-    ax = place.get("ax")
-    with open_figure(ax, default, place.get("figsize"), place.get("title", "")) as figure:
+def open_page(default: tuple[float, float], **options: Unpack[FigureOptions]) -> Iterator[Page]:
+    """Yield a page on a figure of `open_figure`; its legend lists all labelled artists of the panels."""
+    ax = options.get("ax")
+    with open_figure(ax, default, options.get("figsize"), options.get("title", "")) as figure:
         page = Page(figure, ax)
         yield page
         add_legend(figure, ax, collect_handles(*page.panel_axes) if page.handles is None else page.handles)
 
 
-def _count_letters(width: float, dpi: float, letter: float = _LETTER_WIDTH) -> int:
-    """Return the number of letters in the style's font that fit in a width in pixels."""
-    return max(_MIN_LETTERS, int(width / (letter * dpi * float(STYLE["font.size"]) / 72.0)))
+def _count_letters(width: float, dpi: float, letter_width: float = _LETTER_WIDTH) -> int:
+    """Count the letters in the style's font that fit in a width in pixels."""
+    return max(_MIN_LETTERS, int(width / (letter_width * dpi * float(STYLE["font.size"]) / 72.0)))
 
 
 def find_magnification(largest: float) -> tuple[float, str]:
-    """Return a power of a thousand that scales values up to `largest`, and its words for a label."""
+    """Find a power of a thousand that scales values up to `largest`, and its words for a label."""
     power = 3 * max(0, math.ceil((-math.log10(largest) - 0.5) / 3.0)) if largest > 0.0 else 0
     return 10.0**power, f"$10^{{{power}}}$ " if power else ""
 
 
 def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
     """Label both axes, with lines about as long as the axes."""
-    lengths = _LABEL_LENGTHS[0] * axes.bbox.width, _LABEL_LENGTHS[1] * axes.bbox.height
-    for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
-        axis.set_label_text(textwrap.fill(label, _count_letters(length, axes.figure.dpi), break_long_words=False))
+    max_lengths = _LABEL_LENGTHS[0] * axes.bbox.width, _LABEL_LENGTHS[1] * axes.bbox.height
+    for axis, label, max_length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), max_lengths, strict=True):
+        axis.set_label_text(textwrap.fill(label, _count_letters(max_length, axes.figure.dpi), break_long_words=False))
 
 
 def choose_styles(count: int) -> list[dict[str, Any]]:
-    """Return a colour and dashes for each curve; more than four go from dark to light in order."""
+    """Choose a colour and dashes for each curve; more than four go from dark to light in order."""
     if count <= len(CURVES):
         return [*CURVES[:count]]
     from matplotlib import colormaps
@@ -175,9 +177,9 @@ def choose_styles(count: int) -> list[dict[str, Any]]:
     return [{"color": colour, "linestyle": dashes[k % len(dashes)]} for k, colour in enumerate(colours)]
 
 
-def add_text(axes: Axes, text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> None:
+def add_text(axes: Axes, text: str, position: tuple[Any, Any], offset: tuple[float, float], **style: Any) -> None:
     """Write a text at an offset in points from a position."""
-    axes.annotate(text, at, xytext=off, textcoords="offset points", **look)
+    axes.annotate(text, position, xytext=offset, textcoords="offset points", **style)
 
 
 def add_ticks(axes: Axes, positions: Floats, height: float, marker: str = "|", **options: Any) -> None:
@@ -187,10 +189,10 @@ def add_ticks(axes: Axes, positions: Floats, height: float, marker: str = "|", *
 
 
 def compute_cell_edges(x: Floats) -> Floats:
-    """Return the edges of the cells around positions: the midpoints, or a tenth away from a single position."""
+    """Compute the edges of the cells around positions: the midpoints, or a tenth away from a single position."""
     if x.size == 1:
-        half = max(0.1 * abs(float(x[0])), 1e-9)
-        return np.array([x[0] - half, x[0] + half])
+        half_width = max(0.1 * abs(float(x[0])), 1e-9)
+        return np.array([x[0] - half_width, x[0] + half_width])
     middles = 0.5 * (x[1:] + x[:-1])
     return np.concatenate([[2.0 * x[0] - middles[0]], middles, [2.0 * x[-1] - middles[-1]]])
 
@@ -211,20 +213,20 @@ def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> No
     if ax is not None and handles:
         ax.legend(handles=handles)
     elif handles:
-        space = _count_letters(figure.bbox.width, figure.dpi, _WIDE_LETTER_WIDTH)
-        labels = [textwrap.fill(str(handle.get_label()), space - _HANDLE_LETTERS) for handle in handles]
-        longest = _HANDLE_LETTERS + max(len(line) for label in labels for line in label.splitlines())
-        columns = min(max(1, space // longest), len(handles))
+        max_letters = _count_letters(figure.bbox.width, figure.dpi, _WIDE_LETTER_WIDTH)
+        labels = [textwrap.fill(str(handle.get_label()), max_letters - _HANDLE_LETTERS) for handle in handles]
+        max_label = _HANDLE_LETTERS + max(len(line) for label in labels for line in label.splitlines())
+        columns = min(max(1, max_letters // max_label), len(handles))
         figure.legend(handles, labels, ncols=columns, loc="outside lower center")
 
 
 def collect_handles(*panels: Axes) -> list[Artist]:
     """Collect the handles of labelled artists, each label once."""
-    named: dict[str, Artist] = {}
+    handles: dict[str, Artist] = {}
     for panel in panels:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
-    return [*named.values()]
+            handles.setdefault(label, handle)
+    return [*handles.values()]
 
 
 def _check_size(figsize: tuple[float, float]) -> tuple[float, float]:
@@ -280,7 +282,7 @@ def _is_displayable() -> bool:
 
 def _create_ticks(figure: Figure) -> None:
     """Create the first tick of every axis in the current style, which all later ticks copy."""
-    for axes in (one for panel in figure.axes for one in (panel, *panel.child_axes)):
+    for axes in (child for panel in figure.axes for child in (panel, *panel.child_axes)):
         for axis in (axes.xaxis, axes.yaxis):
             axis.get_major_ticks(1)
             axis.get_minor_ticks(1)

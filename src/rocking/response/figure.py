@@ -98,7 +98,7 @@ def histories(
     window: Sequence[float] | None,
     *,
     longest_sequence: bool,
-    **place: Unpack[FigureOptions],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw the rotation above the ground motion in a window.
 
@@ -120,9 +120,9 @@ def histories(
 
     rotation = response.states(time)[:, 0]
     drawn = rotation * scale(rotation)
-    sequence = _longest_sequence(response, *shown) if longest_sequence and place.get("ax") is None else None
+    sequence = _longest_sequence(response, *shown) if longest_sequence and options.get("ax") is None else None
     traces = _ground_traces(response, *shown)
-    with open_page((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **place) as page:
+    with open_page((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **options) as page:
         main, *grounds = _panels(page, 1 + len(traces), zoomed=sequence is not None)
         _shade_rest(main, np.clip(response.rest_intervals, *shown))
         _draw_rotation(main, time, drawn, np.array([-minus, plus]) * scales[::-1], coordinate.limit)
@@ -178,7 +178,7 @@ def _longest_sequence(response: Simulated, start: float, end: float) -> np.void 
 
 def _panels(page: Page, histories: int, *, zoomed: bool) -> list[Axes]:
     """Return the panels of rotation and motion, above the panel of the chattering sequence."""
-    panels = page.panels(
+    panels = page.create_panels(
         ";".join("RGV"[:histories] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:histories]] + [1.0] * zoomed
     )
     for axes in panels[1:histories]:
@@ -357,13 +357,13 @@ def marked(response: Simulated, start: float, end: float) -> dict[str, Floats]:
     return {kind: np.asarray(events["time"][inside & (events["kind"] == kind)], float) for kind in ("uplift", "rest")}
 
 
-def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Unpack[FigureOptions]) -> Figure:
+def phase_plane(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw normalised velocity against normalised rotation in a window, in units of a `Course`."""
     span = shown_span(response, window)
     course = course_of(response, *span)
     limit = response.block.coordinate.limit if response._energy.has_balances else "rad"
-    with open_page((4.6, 4.2), **place) as page:
-        (axes,) = page.panels()
+    with open_page((4.6, 4.2), **options) as page:
+        (axes,) = page.create_panels()
         axes.axhline(0.0, color=INK, linewidth=0.4)
         axes.axvline(0.0, color=INK, linewidth=0.4)
         axes.plot(*boundary_of(response), label="as much energy as at the balance", **_BOUNDARY)
@@ -382,12 +382,12 @@ def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Un
     return page.figure
 
 
-def energies(response: Simulated, window: Sequence[float] | None, **place: Unpack[FigureOptions]) -> Figure:
+def energies(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw kinetic, potential and total energy, divided by the overturning energy, in a window."""
     course = course_of(response, *shown_span(response, window))
     time, total = course.time, course.kinetic + course.potential
-    with open_page((7.0, 3.0), **place) as page:
-        (axes,) = page.panels()
+    with open_page((7.0, 3.0), **options) as page:
+        (axes,) = page.create_panels()
         _shade_rest(axes, np.clip(response.rest_intervals, time[0], time[-1]))
         top = float(np.max(total, initial=0.0)) or 1.0
         axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")

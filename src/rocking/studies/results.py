@@ -23,7 +23,7 @@ from rocking.analysis.levels import (
     compute_ratios,
     compute_units,
     describe_polarities,
-    describe_pooled_blocks,
+    describe_pool,
     describe_sample,
     exceeds_limit,
     find_single_block,
@@ -291,7 +291,7 @@ class BlockTable(DatasetResult):
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the first variable against p and slenderness, in up to four panels, or one fractile."""
-        from rocking.plot.maps import blocks_figure
+        from rocking.plot.maps import draw_blocks
 
         drawn, parameters = next(iter(self.data.data_vars.values())), self.block_parameters
         if "fractile" in drawn.dims:
@@ -309,7 +309,7 @@ class BlockTable(DatasetResult):
             np.mean([parameters[one] for one in (name, f"{name}_plus", f"{name}_minus") if one in parameters], axis=0)
             for name in ("p", "alpha")
         )
-        return blocks_figure(
+        return draw_blocks(
             p,
             alpha,
             panels={names[k]: shown[k] for k in select_evenly(len(names), 4)},
@@ -415,7 +415,7 @@ def pooled_fragility(
         fit_curve(name, (x[found], count[found], trials[found]), groups[found], confidence, measure, limits[name])
         for name, count in counts.items()
     ]
-    text = f"{describe_pooled_blocks(bodies, weights)}, {describe_sample(together, clusters)}, {format_count(scales, 'scale')}"
+    text = f"{describe_pool(bodies, weights)}, {describe_sample(together, clusters)}, {format_count(scales, 'scale')}"
     return Fragility(
         tuple(curves),
         measure,
