@@ -188,10 +188,7 @@ def test_bisection_finds_a_thin_region_between_two_others():
 def test_bisection_of_endless_regions_ends():
     rng = np.random.default_rng(0)
     edges = find_boundaries(
-        np.array([1.0, 2.0]),
-        np.array([[0], [1]]),
-        lambda column, level: rng.integers(2, 1000, len(level)),
-        rtol=1e-6,
+        np.array([1.0, 2.0]), np.array([[0], [1]]), lambda column, level: rng.integers(2, 1000, len(level)), rtol=1e-6
     )
     assert len(edges.level) <= 128
     assert np.all(np.diff(edges.low) > 0.0)

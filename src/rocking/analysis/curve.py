@@ -258,7 +258,7 @@ def create_fragility_line(curve: FragilityCurve, intensity: Floats, measure: Mea
     return FragilityLine(label, scale * intensity, probability, *band, scale * mean_intensity, observed)
 
 
-def check_whole_numbers(values: ArrayLike, argument: str, size: int, minimum: float, maximum: ArrayLike) -> Floats:
+def check_counts(values: ArrayLike, argument: str, size: int, minimum: float, maximum: ArrayLike) -> Floats:
     """Check integers between two bounds, and return one for each intensity."""
     array = checks.booleans_or_numbers(values, argument, InvalidOption)
     try:
@@ -317,7 +317,7 @@ def _compute_logarithm(intensity: Floats) -> Floats:
         return np.asarray(np.log(intensity))
 
 
-def format_fragility_model(
+def format_nrml(
     curves: Sequence[FragilityCurve],
     measure: tuple[str, float],
     data_range: tuple[float, float],

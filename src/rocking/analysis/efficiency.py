@@ -126,14 +126,14 @@ def compare_measures(
     is_counted = is_first[:, None] & np.isfinite(levels)
     cluster_counts = [len(np.unique(cluster_numbers[overturns])) for overturns in is_counted[:, block_weights > 0.0].T]
     _check_sample_size(min(cluster_counts), clusters)
-    dataset = _create_comparison_dataset(
-        measures, np.array(intensity), is_counted, block_weights, degrees_of_freedom=min(cluster_counts) - 1
+    dataset = _combine_dispersions(
+        measures, np.array(intensity), is_counted, block_weights, dof=min(cluster_counts) - 1
     )
     attributes = {"blocks": describe_pool(blocks, weights), "model": model, "damping": damping}
     attributes["sample"] = describe_sample(cluster_numbers, clusters)
-    motion_coordinates = {name: analysis.data[name] for name in ("motion", "vertical") if name in analysis.data.coords}
+    coordinates = {name: analysis.data[name] for name in ("motion", "vertical") if name in analysis.data.coords}
     return MeasureComparison(
-        dataset.assign_coords(motion_coordinates).assign_attrs(attributes, sides_differ=analysis.data.sides_differ)
+        dataset.assign_coords(coordinates).assign_attrs(attributes, sides_differ=analysis.data.sides_differ)
     )
 
 
@@ -172,26 +172,20 @@ class MeasureComparison(DatasetResult):
 
     def summary(self) -> str:
         data, table = self.data, self._ranked_table
-        has_several_blocks, min_dispersion = data.sizes["block"] > 1, table.dispersion_of_all.min()
+        is_pooled, min_dispersion = data.sizes["block"] > 1, table.dispersion_of_all.min()
         rows = [
             [
                 row.Index,
                 f"{row.median_intensity:.3g} {row.unit}".removesuffix(" 1"),
                 f"{row.dispersion:.3f}",
                 f"{row.dispersion_low:.3f} to {row.dispersion_high:.3f}",
-                *([f"{row.dispersion_of_all:.3f}"] if has_several_blocks else []),
+                *([f"{row.dispersion_of_all:.3f}"] if is_pooled else []),
                 f"{row.dispersion_of_all / min_dispersion:.2f}" if min_dispersion > 0.0 else "-",
             ]
             for row in table.itertuples()
         ]
         headline = f"{data.blocks}, {data.model} model: intensities at which {data.sample} overturn"
-        columns = [
-            "measure",
-            "median",
-            "dispersion",
-            "90 % between",
-            *(["of all blocks"] if has_several_blocks else []),
-        ]
+        columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if is_pooled else [])]
         lines = [headline, "", format_table([*columns, "over the best"], rows)]
         if missing := int(np.sum(np.isnan(data.intensity.values[0]))):
             pairs = format_count(missing, "pair")
@@ -225,39 +219,33 @@ class MeasureComparison(DatasetResult):
         )
 
 
-def _create_comparison_dataset(
-    measures: Sequence[Measure], intensity: Floats, is_counted: Flags, block_weights: Floats, *, degrees_of_freedom: int
+def _combine_dispersions(
+    measures: Sequence[Measure], intensity: Floats, is_counted: Flags, block_weights: Floats, *, dof: int
 ) -> xr.Dataset:
     """Combine intensities at overturning (measure, motion, block) with the dispersions of valid ones."""
     import xarray as xr
     from scipy.special import chdtri
 
-    log_intensity = np.where(is_counted, np.log(intensity), np.nan)
+    logarithm = np.where(is_counted, np.log(intensity), np.nan)
     weight, count = np.where(is_counted, block_weights, 0.0), is_counted.sum(axis=0)
     # The sample consists of motions, which are the same for several blocks.
-    total_degrees = np.sum(block_weights * (count - 1))
-    deviation = log_intensity - np.nansum(log_intensity, axis=1, keepdims=True) / np.maximum(count, 1)
-    dispersion = np.sqrt(np.nansum(weight * deviation**2, axis=(1, 2)) / total_degrees)
-    mean = np.nansum(weight * log_intensity, axis=(1, 2)) / weight.sum()
-    dispersion_of_all = np.sqrt(
-        np.nansum(weight * (log_intensity - mean[:, None, None]) ** 2, axis=(1, 2)) / total_degrees
-    )
+    total_dof = np.sum(block_weights * (count - 1))
+    deviation = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
+    dispersion = np.sqrt(np.nansum(weight * deviation**2, axis=(1, 2)) / total_dof)
+    mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
+    pooled = np.sqrt(np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / total_dof)
     # Ratios of the ends of the interval to the standard deviation, for a normal sample.
-    low, high = (
-        float(np.sqrt(degrees_of_freedom / chdtri(degrees_of_freedom, tail))) * dispersion for tail in (0.05, 0.95)
-    )
-    dispersion_text = "standard deviation of the logarithm of the intensity at overturning"
+    low, high = (float(np.sqrt(dof / chdtri(dof, tail))) * dispersion for tail in (0.05, 0.95))
+    spread = "standard deviation of the logarithm of the intensity at overturning"
     median_text = "median of the intensities at overturning, in the measure's unit"
     return xr.Dataset(
         {
             "intensity": variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
             "median_intensity": variable("measure", np.exp(mean), median_text),
-            "dispersion": variable("measure", dispersion, f"{dispersion_text} about each block's own mean", "1"),
+            "dispersion": variable("measure", dispersion, f"{spread} about each block's own mean", "1"),
             "dispersion_low": variable("measure", low, "lower end of its interval", "1"),
             "dispersion_high": variable("measure", high, "upper end of its interval", "1"),
-            "dispersion_of_all": variable(
-                "measure", dispersion_of_all, f"{dispersion_text} about one mean of all blocks", "1"
-            ),
+            "dispersion_of_all": variable("measure", pooled, f"{spread} about one mean of all blocks", "1"),
         },
         {
             "measure": [measure.short_name for measure in measures],
@@ -269,9 +257,7 @@ def _create_comparison_dataset(
 def _check_sample_size(count: int, clusters: object) -> None:
     """Raise an error for a sample of one cluster, or of one motion without clusters."""
     if count < 2:
-        argument, qualifier = (
-            ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
-        )
+        argument, kind = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
         raise InvalidOption(
-            f"fewer than two {{}}{qualifier} overturn a block, however strong; a dispersion needs more", argument
+            f"fewer than two {{}}{kind} overturn a block, however strong; a dispersion needs more", argument
         )

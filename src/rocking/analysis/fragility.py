@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike
 from rocking.analysis.curve import (
     FragilityCurve,
     LossCategory,
-    check_whole_numbers,
+    check_counts,
     create_fragility_line,
     find_openquake_measure,
     fit_curve,
-    format_fragility_model,
     format_intensity,
     format_interval,
     format_median_interval,
+    format_nrml,
 )
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
@@ -306,10 +306,7 @@ class Fragility(Result):
         if unit_block is not None and imt[0] == "PGA" and not self.with_vertical:
             no_damage = min(unit_block.uplift_thresholds(self.model)) / STANDARD_GRAVITY
         attributes = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
-        write_text(
-            path,
-            format_fragility_model(self.curves, imt, self.range, no_damage, taxonomy, self.description, **attributes),
-        )
+        write_text(path, format_nrml(self.curves, imt, self.range, no_damage, taxonomy, self.description, **attributes))
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import draw_fragility
@@ -404,9 +401,7 @@ def fragility(
     bodies, measure = bodies_of(blocks), Measure.parse(measure)
     slenderness = slenderness_of(bodies)
     block_weights = normalise_positive_weights(weights, len(bodies))
-    is_mirrored = (
-        checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and bodies.is_symmetric
-    )
+    mirrored = checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and bodies.is_symmetric
     checks.fraction(confidence, "confidence", InvalidOption)
     states = check_limit_states(limit_states)
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
@@ -419,7 +414,7 @@ def fragility(
         compute_units(bodies, measure, model),
     )
     options: dict[str, Any] = {"chattering": chattering}
-    options["polarity"] = "+" if is_mirrored else polarity
+    options["polarity"] = "+" if mirrored else polarity
     if stripes is None:
         table = simulate_many(bodies, motions, model=model, **options).expand_dims("level")
         intensity = (values[:, None] / units)[None, :, :, None]
@@ -534,18 +529,12 @@ def fit_fragility(
     x = checks.positive_numbers(intensity, "intensity", InvalidOption)
     for end in (x.min(), x.max()):
         checks.between(float(end), "intensity", InvalidOption, 1e-50, 1e50)
-    counts = check_whole_numbers(trials, "trials", x.size, 1.0, 2.0**53)
+    counts = check_counts(trials, "trials", x.size, 1.0, 2.0**53)
     outcomes = check_state_mapping(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
-    cluster_numbers = None if clusters is None else number_groups(clusters, "clusters", x.size)
+    groups = None if clusters is None else number_groups(clusters, "clusters", x.size)
     checks.fraction(confidence, "confidence", InvalidOption)
     curves = [
-        fit_curve(
-            name,
-            (x, check_whole_numbers(values, "exceeded", x.size, 0.0, counts), counts),
-            cluster_numbers,
-            confidence,
-            measure,
-        )
+        fit_curve(name, (x, check_counts(values, "exceeded", x.size, 0.0, counts), counts), groups, confidence, measure)
         for name, values in outcomes.items()
     ]
     return Fragility(tuple(curves), measure, description, block, "nonlinear", None, source="cluster")

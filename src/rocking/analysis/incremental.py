@@ -146,7 +146,7 @@ def incremental_dynamic_analysis(
     overturned_grid = table.overturned.transpose("level", "motion", "block").values
     flat_grid = overturned_grid.reshape(len(overturned_grid), -1).astype(np.int64)
     brackets = find_boundaries(table.level.values, flat_grid, find_overturned, rtol=relative_width)
-    dataset = _create_bands_dataset(table, flat_grid, brackets, slenderness, measure)
+    dataset = _combine_bands(table, flat_grid, brackets, slenderness, measure)
     attributes = {
         "blocks": describe_blocks(blocks),
         "lowest_uplift": lowest_uplift,
@@ -321,7 +321,7 @@ def _simulate_until_overturned(
     return table.isel(level=slice(0, indices[0] + 1 if indices.size else None))
 
 
-def _create_bands_dataset(
+def _combine_bands(
     table: xr.Dataset, flat_grid: Integers, brackets: Boundaries, alpha: Floats, measure: Measure
 ) -> xr.Dataset:
     """Pair the levels of outcome changes in a (level, column) grid, NaN for bands beyond it."""

@@ -329,11 +329,7 @@ class Boundaries:
 
 
 def find_boundaries(
-    levels: Floats,
-    outcome: Integers,
-    find_outcome: Callable[[Integers, Floats], Integers],
-    *,
-    rtol: float,
+    levels: Floats, outcome: Integers, find_outcome: Callable[[Integers, Floats], Integers], *, rtol: float
 ) -> Boundaries:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 

@@ -208,7 +208,7 @@ def overturning_map(
         "pulse_name": unit.name,
         "rtol": relative_width,
     }
-    return OverturningMap(_create_map_dataset(levels, ratios, modes, peaks, brackets, attributes))
+    return OverturningMap(_combine_modes(levels, ratios, modes, peaks, brackets, attributes))
 
 
 def mode_name(mode: int) -> str:
@@ -403,7 +403,7 @@ def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio:
     return bool(np.abs(second_values - first_values).mean() <= _SHAPE_TOLERANCE * np.abs(first_values).max())
 
 
-def _create_map_dataset(
+def _combine_modes(
     levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, brackets: Boundaries, attributes: dict[str, Any]
 ) -> xr.Dataset:
     import xarray as xr

@@ -135,7 +135,7 @@ def rocking_spectrum(
         ratio = compute_ratios(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
         statistics = names, compute_fractiles(ratio, shares), compute_overturned_share(ratio)
         return RockingSpectrum(
-            _create_spectrum_dataset(table, names, (peak, overturned, ratio), statistics, axes, shares, bodies.gravity)
+            _combine_peaks(table, names, (peak, overturned, ratio), statistics, axes, shares, bodies.gravity)
         )
     weight = normalise_weights(weights, len(bodies))
     median = float(compute_weighted_fractiles(bodies.p.mean(axis=1), weight, _MEDIAN_SHARE)[0])
@@ -150,13 +150,9 @@ def rocking_spectrum(
         table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _OUTCOME_NAMES
     )
     ratio = compute_ratios(peak, overturned, unfinished, bodies.alpha.min(axis=1)[:, None])
-    flat, flat_weights = ratio.reshape(-1, count), np.tile(weight, len(ratio))
-    statistics = (
-        ("p",),
-        compute_weighted_fractiles(flat, flat_weights, shares),
-        compute_overturned_share(flat, flat_weights),
-    )
-    data = _create_spectrum_dataset(
+    flat, tiled = ratio.reshape(-1, count), np.tile(weight, len(ratio))
+    statistics = ("p",), compute_weighted_fractiles(flat, tiled, shares), compute_overturned_share(flat, tiled)
+    data = _combine_peaks(
         table, ("block", "p"), (peak, overturned, ratio), statistics, {"p": p_values}, shares, bodies.gravity
     )
     return RockingSpectrum(
@@ -317,7 +313,7 @@ class RockingSpectrum(DatasetResult):
         return np.asarray(compute_weighted_fractiles(peaks, curve.weight.values, _MEDIAN_SHARE)[0])
 
 
-def _create_spectrum_dataset(
+def _combine_peaks(
     table: xr.Dataset,
     names: tuple[str, ...],
     peaks: tuple[Floats, Floats, Floats],

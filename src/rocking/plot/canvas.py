@@ -105,10 +105,8 @@ def open_figure(
     with mpl.rc_context(STYLE):
         figure = _create_figure(_check_size(default if figsize is None else figsize))
         if short_title:
-            wrapped_title = textwrap.fill(
-                short_title, _count_letters((1.0 - 2.0 * _TITLE_X) * figure.bbox.width, figure.dpi)
-            )
-            figure.suptitle(wrapped_title, x=_TITLE_X, ha="left")
+            lines = textwrap.fill(short_title, _count_letters((1.0 - 2.0 * _TITLE_X) * figure.bbox.width, figure.dpi))
+            figure.suptitle(lines, x=_TITLE_X, ha="left")
         yield figure
         _create_ticks(figure)
         interactive = mpl.is_interactive()
@@ -188,7 +186,7 @@ def add_ticks(axes: Axes, positions: Floats, height: float, marker: str = "|", *
     axes.plot(positions, np.full(positions.size, height), marker, transform=axes.get_xaxis_transform(), **style)
 
 
-def compute_cell_edges(x: Floats) -> Floats:
+def find_cell_edges(x: Floats) -> Floats:
     """Compute the edges of the cells around positions: the midpoints, or a tenth away from a single position."""
     if x.size == 1:
         half_width = max(0.1 * abs(float(x[0])), 1e-9)
@@ -197,7 +195,7 @@ def compute_cell_edges(x: Floats) -> Floats:
     return np.concatenate([[2.0 * x[0] - middles[0]], middles, [2.0 * x[-1] - middles[-1]]])
 
 
-def set_logarithmic(axes: Axes, x: Floats) -> None:
+def set_log_axis(axes: Axes, x: Floats) -> None:
     """Make the axis of these numbers logarithmic, with as many tick labels as fit."""
     from matplotlib.ticker import LogLocator, NullFormatter
 

@@ -18,7 +18,7 @@ from rocking.plot.canvas import (
     add_labels,
     choose_styles,
     open_page,
-    set_logarithmic,
+    set_log_axis,
 )
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def draw_risk(
             is_visible |= line.share > _MIN_SHARE * line.share.max()
         for panel in hazard_axes:
             panel.set_ylim(0.5 * float(hazard.rate[is_visible].min()), 2.0 * float(hazard.rate[is_visible].max()))
-        set_logarithmic(share_axes, intensity[is_visible])
+        set_log_axis(share_axes, intensity[is_visible])
         share_axes.set(xlim=(float(intensity[is_visible][0]), float(intensity[is_visible][-1])))
         share_axes.set_ylim(bottom=0.0)
         share_axes.grid(True)
@@ -152,7 +152,7 @@ def draw_survival(
     """Draw a hazard curve and the largest annual rates consistent with a standing block."""
     with open_page((5.6, 3.6), **options) as page:
         (axes,) = page.create_panels()
-        set_logarithmic(axes, intensity)
+        set_log_axis(axes, intensity)
         if hazard is not None:
             _draw_hazard(axes, intensity, hazard)
             style: dict[str, Any] = {"color": ABOVE, "alpha": 0.2, "label": "more often than the block allows"}
@@ -247,7 +247,7 @@ def draw_spectrum(
                 label = "median" if share == 0.5 else f"{100 * share:g} % of the motions are below"
                 peaks.plot([], [], color=INK, linewidth=width, label=label)
         peaks.grid(True, which="both")
-        set_logarithmic(panels[-1], x)
+        set_log_axis(panels[-1], x)
         peaks.set_ylim(bottom=0.0)
         add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
         for panel in shares:

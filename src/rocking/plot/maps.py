@@ -20,7 +20,7 @@ from rocking.plot.canvas import (
     FigureOptions,
     add_labels,
     choose_styles,
-    compute_cell_edges,
+    find_cell_edges,
     open_page,
 )
 
@@ -86,7 +86,7 @@ def draw_outcome_map(
             for ink, width in (("#ffffff", 2.0), (_LATER_COLOUR, 0.9)):
                 style: dict[str, Any] = {"cmap": ListedColormap(["none"]), "edgecolor": ink, "linewidth": 0.0}
                 with rc_context({"hatch.linewidth": width}):
-                    axes.pcolor(compute_cell_edges(x), compute_cell_edges(y), cells, hatch="////", **style)
+                    axes.pcolor(find_cell_edges(x), find_cell_edges(y), cells, hatch="////", **style)
             page.handles.append(_create_patch(("#ffffff", "////"), "overturns later"))
         add_labels(axes, x_label, y_label)
     return page.figure
@@ -98,7 +98,7 @@ def _colour_cells(axes: Axes, x: Floats, y: Floats, numbers: NDArray[np.integer]
 
     norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
     style: dict[str, Any] = {"cmap": ListedColormap([*colours]), "norm": norm, "rasterized": True}
-    axes.pcolormesh(compute_cell_edges(x), compute_cell_edges(y), numbers, **style)
+    axes.pcolormesh(find_cell_edges(x), find_cell_edges(y), numbers, **style)
 
 
 def draw_regions(
@@ -134,16 +134,10 @@ def draw_regions(
             rows = [(x[k], edges[k]) for k in range(start, end)]
             if start > 0:
                 rows.insert(
-                    0,
-                    (
-                        np.mean(x[start - 1 : start + 1]),
-                        _interpolate_boundaries(start, start - 1, edges, regions, farthest),
-                    ),
+                    0, (np.mean(x[start - 1 : start + 1]), _interpolate(start, start - 1, edges, regions, farthest))
                 )
             if end < len(x):
-                rows.append(
-                    (np.mean(x[end - 1 : end + 1]), _interpolate_boundaries(end - 1, end, edges, regions, farthest))
-                )
+                rows.append((np.mean(x[end - 1 : end + 1]), _interpolate(end - 1, end, edges, regions, farthest)))
             abscissae = np.array([abscissa for abscissa, _ in rows])
             levels = np.array([[low, *row, high] for _, row in rows]).T
             is_visible = np.diff(levels, axis=0).max(axis=1) > _MIN_STRIP_HEIGHT * (high - low)
@@ -167,7 +161,7 @@ def draw_regions(
     return page.figure
 
 
-def _interpolate_boundaries(
+def _interpolate(
     k: int, neighbour: int, edges: Sequence[Floats], regions: Sequence[Sequence[int]], max_distance: float
 ) -> Floats:
     """Interpolate a column's boundaries half way to its neighbour: to the nearest alike, closed, or unchanged."""
@@ -242,14 +236,14 @@ def draw_blocks(
 
 
 #: Shades by kind, with different luminances; orbits are ordered by basin size, and the last shade is repeated.
-_ATTRACTOR_SHADES: Final = {
+_SHADES: Final = {
     "orbit": ("#f4f7fb", "#c3d3e6", "#8fabcd", "#6488b3", "#e8d9a8", "#bda55d"),
     "overturns": ("#8c3410", "#3f1404"),
     "unsettled": ("#7a7f85",),
 }
 
 #: Markers of orbit points, one for each orbit.
-_ORBIT_MARKERS: Final = ("o", "^", "s", "D", "v", "P")
+_MARKERS: Final = ("o", "^", "s", "D", "v", "P")
 
 
 def draw_basins(
@@ -266,9 +260,7 @@ def draw_basins(
 ) -> Figure:
     """Draw the attractor of each state of a grid: integers of shape (len(y), len(x))."""
     ranks = [kinds[:k].count(kind) for k, kind in enumerate(kinds)]
-    shades = [
-        _ATTRACTOR_SHADES[kind][min(k, len(_ATTRACTOR_SHADES[kind]) - 1)] for k, kind in zip(ranks, kinds, strict=True)
-    ]
+    shades = [_SHADES[kind][min(k, len(_SHADES[kind]) - 1)] for k, kind in zip(ranks, kinds, strict=True)]
     with open_page((5.4, 4.6), **options) as page:
         (axes,) = page.create_panels()
         _colour_cells(axes, x, y, outcome, shades)
@@ -278,7 +270,7 @@ def draw_basins(
             inside = points[(points >= [x[0], y[0]]).all(axis=1) & (points <= [x[-1], y[-1]]).all(axis=1)]
             if kind == "orbit" and len(inside):
                 style: dict[str, Any] = {
-                    "marker": _ORBIT_MARKERS[k % len(_ORBIT_MARKERS)],
+                    "marker": _MARKERS[k % len(_MARKERS)],
                     "markersize": 4.5,
                     "markeredgewidth": 0.8,
                 }
@@ -313,13 +305,10 @@ def draw_rose(
         label = "support over height of centre of mass"
         main.add_patch(Polygon(support, facecolor=REST, edgecolor=GROUND, linewidth=1.0, label=label))
         main.plot(
-            *_convert_to_points(azimuth, acceleration),
-            color=INK,
-            linewidth=1.4,
-            label="ground acceleration that lifts it",
+            *_find_points(azimuth, acceleration), color=INK, linewidth=1.4, label="ground acceleration that lifts it"
         )
         label = f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg"
-        end = _convert_to_points(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
+        end = _find_points(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
         main.plot(*np.insert(end, 0, 0.0, axis=1), color=ABOVE, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
         add_labels(main, "towards west and east (g)", "towards south and north (g)")
     return page.figure
@@ -332,7 +321,7 @@ def draw_shares(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **opt
         _set_plan_view(axes, 1.0)
         for share, label, style in zip(shares, labels, choose_styles(len(labels)), strict=True):
             line_style = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": escape_dollars(label), **style}
-            axes.plot(*_convert_to_points(azimuth, share), **line_style)
+            axes.plot(*_find_points(azimuth, share), **line_style)
         add_labels(axes, "share towards west and east", "share towards south and north")
     return page.figure
 
@@ -342,7 +331,7 @@ def _close_circle(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
     return np.append(azimuth, azimuth[0] + 360.0), np.append(values, values[0])
 
 
-def _convert_to_points(azimuth: Floats, values: Floats) -> Floats:
+def _find_points(azimuth: Floats, values: Floats) -> Floats:
     """Convert azimuths and distances to the points of a closed line, shape (2, n)."""
     closed_azimuth, distances = _close_circle(azimuth, values)
     angle = np.deg2rad(closed_azimuth)

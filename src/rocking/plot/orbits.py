@@ -20,7 +20,7 @@ _IMPACT_STYLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.8, "lines
 _UNSTABLE_STYLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 #: Markers of bifurcations by name, and of other bifurcations.
-_BIFURCATION_MARKERS: Final = {
+_MARKERS: Final = {
     "fold": "o",
     "flip": "D",
     "symmetry breaking": "s",
@@ -79,12 +79,10 @@ def draw_branches(
         for is_branch, name, style in ((stable, "stable", _STABLE_STYLE), (~stable, "unstable", _UNSTABLE_STYLE)):
             # Dashes extend to the points where solid lines begin.
             is_joined = is_branch | np.append(is_branch[1:], False) | np.insert(is_branch[:-1], 0, False)
-            is_visible = is_branch if name == "stable" else is_joined
+            mask = is_branch if name == "stable" else is_joined
             if np.any(is_branch & ~np.isnan(values)):
-                axes.plot(
-                    np.where(is_visible, values, np.nan), np.where(is_visible, heights, np.nan), label=name, **style
-                )
-        marker_style: dict[str, Any] = {
+                axes.plot(np.where(mask, values, np.nan), np.where(mask, heights, np.nan), label=name, **style)
+        markers: dict[str, Any] = {
             "color": INK,
             "markersize": 4.5,
             "markerfacecolor": GROUND,
@@ -92,14 +90,8 @@ def draw_branches(
             "zorder": 4,
         }
         for kind in dict.fromkeys(name for name, _, _ in marks):
-            positions = np.array([(value, height) for name, value, height in marks if name == kind])
-            axes.plot(
-                positions[:, 0],
-                positions[:, 1],
-                marker=_BIFURCATION_MARKERS.get(kind, _OTHER_MARKER),
-                label=kind,
-                **marker_style,
-            )
+            points = np.array([(value, height) for name, value, height in marks if name == kind])
+            axes.plot(points[:, 0], points[:, 1], marker=_MARKERS.get(kind, _OTHER_MARKER), label=kind, **markers)
         axes.margins(x=0.04, y=0.06)
         add_labels(axes, *labels)
     return page.figure
@@ -139,13 +131,7 @@ def draw_bifurcation(
     return page.figure
 
 
-_SIDE_MARKER: Final[dict[str, Any]] = {
-    "linestyle": "",
-    "marker": "o",
-    "color": INK,
-    "markersize": 3.2,
-    "markeredgewidth": 0.6,
-}
+_DOT: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "markersize": 3.2, "markeredgewidth": 0.6}
 
 #: Margin beside the first and the last impact, relative to their number.
 _AXIS_MARGIN: Final = 0.03
@@ -182,4 +168,4 @@ def _draw_sides(axes: Axes, number: Integers, values: Floats) -> None:
     for remainder, face, label in ((1, INK, "impacts 1, 3, ..."), (0, "white", "impacts 2, 4, ...")):
         is_selected = number % 2 == remainder
         if is_selected.any():
-            axes.plot(number[is_selected], values[is_selected], markerfacecolor=face, label=label, **_SIDE_MARKER)
+            axes.plot(number[is_selected], values[is_selected], markerfacecolor=face, label=label, **_DOT)
