@@ -108,7 +108,7 @@ def compare_measures(
     slenderness_of(bodies)  # raise errors before the simulations
     block_weights = normalise_weights(weights, len(bodies))
     if len(motions) < 2:
-        raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
+        raise InvalidOption("{} must contain two motions or more for a comparison of measures; got one", "motions")
     period_values = checks.positive_numbers(periods, "periods", InvalidOption)
     spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
     measures = [Measure("pga"), Measure("pgv"), *spectral_measures, Measure("pga_ratio"), Measure("pgv_ratio")]

@@ -406,7 +406,7 @@ def fragility(
     states = check_limit_states(limit_states)
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
-        raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
+        raise InvalidOption(f"{{}} must contain two levels or more; got {stripes.size}", "levels", value=levels)
     motions = list_motions(motions)
     values, cluster_numbers, units = (
         compute_intensities(motions, measure),

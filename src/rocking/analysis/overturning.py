@@ -364,7 +364,8 @@ def _create_pulse_function(
     if callable(pulse):
         if parameters:
             raise InvalidOption(
-                f"a {{}} given as a function takes no {', '.join(parameters)}: bind them to it", "pulse"
+                f"{{}} is a function, so no parameters are accepted; got {', '.join(parameters)}: bind them to it",
+                "pulse",
             )
         return pulse
     family = find_family(pulse)
