@@ -13,7 +13,7 @@ from pages import markdown, write
 
 import rocking
 from rocking import dynamics
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, REST, add_labels, add_legend, figure_for, handles_of
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, REST, add_labels, add_legend, collect_handles, open_figure
 
 #: The block of Hogan's orbits, forced at three times its frequency parameter; what it hits the ground twice in.
 HOGAN_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.1, restitution=0.925)
@@ -86,7 +86,7 @@ def hogan_figure(branches):
         family, np.linspace(4.5, 7.3, 561), start * [1.0, 1.0001], transient=600, recorded=48, model="linear",
     ).data  # fmt: skip
     look = {"color": INK, "markersize": 4.5, "markerfacecolor": "white"}
-    with figure_for(None, (7.4, 3.5)) as drawn:
+    with open_figure(None, (7.4, 3.5)) as drawn:
         left, right = drawn.subplots(1, 2)
         for curve, (period, pair) in zip(CURVES, branches.items(), strict=False):
             for number, branch in enumerate(pair):
@@ -120,7 +120,7 @@ def hogan_figure(branches):
         add_labels(
             right, "peak acceleration over that of uplift", "rotation at the start of a period, over the slenderness"
         )
-        add_legend(drawn, None, handles_of(left, right))
+        add_legend(drawn, None, collect_handles(left, right))
     return drawn
 
 
@@ -152,7 +152,7 @@ def lost_at(restitution, low, high):
 def sticking_figure():
     """Draw a course with chattering and rest, the time of rest by frequency, and impacts beyond the boundary."""
     ends = {0.5: lost_at(0.5, 0.55, 0.65), 0.8: lost_at(0.8, 0.32, 0.36), 0.9: lost_at(0.9, 0.19, 0.22)}
-    with figure_for(None, (7.6, 2.9)) as drawn:
+    with open_figure(None, (7.6, 2.9)) as drawn:
         course, rests, beyond = drawn.subplots(1, 3)
         body, motion = oscillating(0.8, 0.3, 2)
         response = dynamics.simulate(body, motion, duration=motion.duration)
@@ -176,7 +176,7 @@ def sticking_figure():
         beyond.plot(away, counts, drawstyle="steps-mid", **CURVES[0])
         beyond.set_xscale("log")
         add_labels(beyond, "frequency beyond the boundary", "impacts in a period")
-        add_legend(drawn, None, handles_of(rests))
+        add_legend(drawn, None, collect_handles(rests))
     return drawn
 
 

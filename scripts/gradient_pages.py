@@ -11,7 +11,7 @@ import numpy as np
 from pages import DOCS, write
 
 import rocking
-from rocking.plot.canvas import ABOVE, GROUND, INK, add_labels, figure_for
+from rocking.plot.canvas import ABOVE, GROUND, INK, add_labels, open_figure
 
 
 def main() -> None:
@@ -33,7 +33,7 @@ def gradient_figure(names):
     """Draw a record, the rotation, and the derivative of its peak by each sample."""
     record, response, samples = names["record"], names["response"], names["found"].samples
     times = np.arange(0.0, 14.0, 0.005)
-    with figure_for(None, (6.4, 5.0), None, "") as figure:
+    with open_figure(None, (6.4, 5.0), None, "") as figure:
         ground, rotation, derivative = figure.subplots(3, 1, sharex=True)
         ground.plot(times, record.acceleration(times), color=GROUND, linewidth=0.8)
         rotation.plot(times, response.rotation(times), color=INK, linewidth=0.9)
@@ -51,7 +51,7 @@ def change_figure(names):
     """Draw both records, the change alone, both rotations over the slenderness, and the energy along both searches."""
     statue, samples, change, first = (names[each] for each in ("statue", "samples", "change", "first"))
     times, shown, longer = first + names["step"] * np.arange(len(samples)), slice(1100, 1450), slice(1100, 3300)
-    with figure_for(None, (6.4, 6.6), None, "") as figure:
+    with open_figure(None, (6.4, 6.6), None, "") as figure:
         ground, rotation, energy = figure.subplots(3, 1)
         ground.plot(times[shown], samples[shown], color=GROUND, linewidth=2.0, label="record")
         ground.plot(times[shown], (samples + change)[shown], "--", color=INK, linewidth=1.0, label="changed record")

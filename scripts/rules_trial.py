@@ -13,9 +13,9 @@ from pages import markdown, write
 
 import rocking
 from rocking import rules
-from rocking.analysis.survey import title_of
+from rocking.analysis.survey import format_rule_name
 from rocking.core.constants import MODELS
-from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, handles_of
+from rocking.plot.canvas import CURVES, add_labels, add_legend, collect_handles, open_figure
 
 #: Heights, m, and slendernesses of the blocks: from a bottle to a monument.
 HEIGHTS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
@@ -109,7 +109,13 @@ def verdict_table(blocks, motions, ratios, fell):
         falls, stands = int(np.sum(lifted & fell)), int(np.sum(lifted & ~fell))
         right = 1.0 - (unsafe + wary) / (falls + stands)
         rows.append(
-            (title_of(name), f"{100 * unsafe / falls:.1f}", f"{100 * wary / stands:.1f}", f"{100 * right:.1f}", unsafe)
+            (
+                format_rule_name(name),
+                f"{100 * unsafe / falls:.1f}",
+                f"{100 * wary / stands:.1f}",
+                f"{100 * right:.1f}",
+                unsafe,
+            )
         )
     head = ("rule", "unsafe, % of the falls", "over-conservative, % of the others", "right, % of all", "unsafe cases")
     total = (f"{len(motions)} records, {len(blocks)} blocks", f"{falls} falls", f"{stands} others", "", "")
@@ -123,7 +129,7 @@ def capacity_table(ratios, capacities):
         share = (1.0 / ratio / capacities)[np.isfinite(capacities)]
         low, median, high = np.quantile(share, [0.05, 0.5, 0.95])
         numbers = (f"{value:.2f}" for value in (low, median, high, share.max()))
-        rows.append((title_of(name), *numbers, f"{100.0 * np.mean(share > 1.0):.0f}"))
+        rows.append((format_rule_name(name), *numbers, f"{100.0 * np.mean(share > 1.0):.0f}"))
     return markdown(("rule", "5 %", "median", "95 %", "largest", "above 1, %"), rows)
 
 
@@ -157,11 +163,13 @@ def noise_table(fell):
 
 def figure(ratios, capacities):
     """Distribution of the rules' overturning accelerations over the simulated ones."""
-    with figure_for(None, (5.6, 3.9)) as drawn:
+    with open_figure(None, (5.6, 3.9)) as drawn:
         axes = drawn.add_subplot()
         for (name, ratio), curve in zip(ratios.items(), STYLES, strict=True):
             share = np.sort((1.0 / ratio / capacities)[np.isfinite(capacities)])
-            axes.step(share, np.arange(1, share.size + 1) / share.size, where="post", label=title_of(name), **curve)
+            axes.step(
+                share, np.arange(1, share.size + 1) / share.size, where="post", label=format_rule_name(name), **curve
+            )
         axes.axvline(1.0, color="0.35", linewidth=0.8)
         axes.set_xscale("log")
         ticks = [0.1, 0.2, 0.5, 1.0, 2.0, 3.0]
@@ -172,7 +180,7 @@ def figure(ratios, capacities):
         axes.text(0.97, 0.02, "safe side", ha="right", color="0.35", fontsize=8)
         axes.text(1.03, 0.02, "unsafe side", ha="left", color="0.35", fontsize=8)
         add_labels(axes, "overturning PGA by the rule over the simulated one", "share of blocks and records")
-        add_legend(drawn, None, handles_of(axes))
+        add_legend(drawn, None, collect_handles(axes))
     return drawn
 
 

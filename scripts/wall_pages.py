@@ -12,7 +12,7 @@ from pages import write
 
 import rocking
 from rocking import Block, RestrainedBlock, Tendon, Thrust
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for, handles_of
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, collect_handles, open_figure
 
 G = 9.80665
 
@@ -46,7 +46,7 @@ def facade_figure():
     shaking, bodies = motions(), [facade(thrust) for thrust in THRUSTS]
     found = rocking.incremental_dynamic_analysis(bodies, shaking, rtol=1e-2)
     lowest = found.data.overturning_level.transpose("motion", "block").values / G
-    with figure_for(None, (6.2, 3.4), None, "") as figure:
+    with open_figure(None, (6.2, 3.4), None, "") as figure:
         axes, x = figure.subplots(), 1e-3 * np.array(THRUSTS)
         axes.plot(x, lowest.T, "o", color=GROUND, markersize=3.0, label="_each motion")
         axes.plot([], [], "o", color=GROUND, markersize=3.0, label=f"overturns, each of {len(shaking)} motions")
@@ -54,7 +54,7 @@ def facade_figure():
         axes.plot(x, [body.uplift_thresholds()[0] / G for body in bodies], "--", color=INK, label="lifts")
         axes.set_ylim(0.0)
         add_labels(axes, "thrust per metre of wall (kN/m)", "lowest peak acceleration (g)")
-        add_legend(figure, None, handles_of(axes))
+        add_legend(figure, None, collect_handles(axes))
     return figure
 
 
@@ -65,7 +65,7 @@ def tendon_figure():
     levels = np.geomspace(1.4, 30.0, 60)
     found = rocking.incremental_dynamic_analysis(bodies, pulses, levels=levels, rtol=1e-3)
     lowest = found.data.overturning_level.transpose("block", "motion").values / G
-    with figure_for(None, (6.2, 3.6), None, "") as figure:
+    with open_figure(None, (6.2, 3.6), None, "") as figure:
         axes = figure.subplots()
         for name, row, look in zip(BODIES, lowest, CURVES, strict=False):
             axes.plot(FREQUENCIES, row, **look, label=name)
@@ -76,7 +76,7 @@ def tendon_figure():
         axes.minorticks_off()
         axes.set_yticks([0.2, 0.5, 1.0, 2.0, 3.0], ["0.2", "0.5", "1", "2", "3"])
         add_labels(axes, "frequency of the one-sine pulse (Hz)", "lowest amplitude\nthat overturns (g)")
-        add_legend(figure, None, handles_of(axes))
+        add_legend(figure, None, collect_handles(axes))
     return figure
 
 
@@ -88,7 +88,7 @@ def yielding_figure():
         "elastic tendon": RestrainedBlock(COLUMN, Tendon(1e6, prestress=5e3)),
         "tendon that yields at 40 kN": RestrainedBlock(COLUMN, Tendon(1e6, prestress=5e3, strength=4e4)),
     }
-    with figure_for(None, (6.6, 4.4), None, "") as figure:
+    with open_figure(None, (6.6, 4.4), None, "") as figure:
         histories, forces = figure.subplots(2, 1, height_ratios=(1.2, 1.0), sharex=True)
         for (name, body), look in zip(bodies.items(), CURVES, strict=False):
             times = np.linspace(0.0, 10.0, 4001)
@@ -100,7 +100,7 @@ def yielding_figure():
         histories.set_ylim(-10.0, 16.0)
         add_labels(histories, "", "rotation (°)")
         add_labels(forces, "time (s)", "force in the tendon (kN)")
-        add_legend(figure, None, handles_of(histories))
+        add_legend(figure, None, collect_handles(histories))
     return figure
 
 

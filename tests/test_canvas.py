@@ -11,10 +11,10 @@ from rocking.errors import InvalidOption
 DRAW = """
 import sys
 import numpy as np
-from rocking.plot.maps import regions_figure
+from rocking.plot.maps import draw_regions
 
 def draw(**options):
-    return regions_figure(
+    return draw_regions(
         x=np.array([1.0, 2.0]), y_range=(0.0, 3.0), edges=[np.array([1.0]), np.array([2.0])],
         regions=[[-3, 0], [-3, 0]], names={-3: "stays", 0: "overturns"}, x_label="x", y_label="y", **options)
 """

@@ -20,18 +20,18 @@ from rocking.plot.curves import (
     RiskLine,
     ScaledMotion,
     SpectrumCurves,
-    fragility_figure,
-    ida_figure,
-    levels_reaching,
-    measured_figure,
-    outcomes_figure,
-    reliability_figure,
-    risk_figure,
-    spectrum_figure,
-    survival_figure,
+    draw_fragility,
+    draw_ida,
+    draw_measured_history,
+    draw_outcomes,
+    draw_reliability,
+    draw_risk,
+    draw_spectrum,
+    draw_survival,
+    find_reaching_levels,
 )
-from rocking.plot.maps import basins_figure, outcome_figure, regions_figure, rose_figure, shares_figure
-from rocking.plot.orbits import bifurcation_figure, branch_figure, intervals_figure, orbit_figure
+from rocking.plot.maps import draw_basins, draw_outcome_map, draw_regions, draw_rose, draw_shares
+from rocking.plot.orbits import draw_bifurcation, draw_branches, draw_intervals, draw_orbit
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"
@@ -45,7 +45,7 @@ def spectrum_of(count, curves=1, **options):
     fractiles = np.sort(each, axis=0)[[0, count // 2, -1]]
     lines = [SpectrumCurves(f"α = {k}", each, fractiles, np.isinf(each).mean(axis=0)) for k in range(curves)]
     chosen = {"fractiles": [0.16, 0.5, 0.84], "motions": RECORDS[:count], "x_label": "half diagonal R (m)"}
-    return spectrum_figure(x=x, curves=lines, **(chosen | options))
+    return draw_spectrum(x=x, curves=lines, **(chosen | options))
 
 
 def scaled(count):
@@ -56,7 +56,7 @@ def scaled(count):
 
 
 def ida_of(count, **options):
-    return ida_figure(motions=scaled(count), **({"level_label": "peak ground acceleration (m/s²)"} | options))
+    return draw_ida(motions=scaled(count), **({"level_label": "peak ground acceleration (m/s²)"} | options))
 
 
 def fragility_of(**options):
@@ -64,7 +64,7 @@ def fragility_of(**options):
     p = x / 9.0
     line = FragilityLine("overturning: median 4.149", x, p, 0.8 * p, 1.1 * p, x[[9, 19, 29]], p[[9, 19, 29]])
     texts = {"intensity_label": "peak ground acceleration (m/s²)", "band_label": "band: 90 % confidence (likelihood)"}
-    return fragility_figure(lines=[line, line._replace(label="half: median 3.6")], **(texts | options))
+    return draw_fragility(lines=[line, line._replace(label="half: median 3.6")], **(texts | options))
 
 
 def rose_of(**options):
@@ -72,19 +72,19 @@ def rose_of(**options):
     values = 0.3 + 0.1 * np.abs(np.sin(np.deg2rad(2.0 * azimuth)))
     corners = np.array([[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]])
     each = {"acceleration": values, "slenderness": 60.0 * values, "p": 3.0 - values}
-    return rose_figure(azimuth=azimuth, support=corners, weakest=(90.0, 0.3), **each, **options)
+    return draw_rose(azimuth=azimuth, support=corners, weakest=(90.0, 0.3), **each, **options)
 
 
 def shares_of(**options):
     azimuth = np.arange(0.0, 360.0, 15.0)
     shares = np.array([0.2, 0.4, 0.7, 1.0])[:, None] * np.abs(np.cos(np.deg2rad(azimuth)))
     labels = [f"peak ground velocity {level:g} m/s" for level in (0.4, 0.8, 1.2, 2.0)]
-    return shares_figure(azimuth=azimuth, shares=shares, labels=labels, **options)
+    return draw_shares(azimuth=azimuth, shares=shares, labels=labels, **options)
 
 
 def map_of(**options):
     texts = {"x_label": "frequency of the pulse over p", "y_label": "amplitude over the smallest that lifts the block"}
-    return regions_figure(
+    return draw_regions(
         x=np.array([0.4, 9.0]),
         y_range=(0.5, 15.0),
         edges=[np.arange(2.0, 14.0, 2.0)] * 2,
@@ -114,7 +114,7 @@ def energy_over_time_of(**options):
 
 
 def outcomes_of(**options):
-    return outcome_figure(
+    return draw_outcome_map(
         x=np.arange(3.0),
         y=np.arange(3.0),
         outcome=np.arange(9).reshape(3, 3) % 6,
@@ -132,7 +132,7 @@ def outcomes_of(**options):
 
 def intervals_of(count=60, **options):
     intervals = 0.5 * 0.9 ** np.arange(count) * np.where(np.arange(count) % 2, 0.1, 1.0)
-    return intervals_figure(intervals=intervals, eta=0.9, **options)
+    return draw_intervals(intervals=intervals, eta=0.9, **options)
 
 
 def trials_of(sides=2, **options):
@@ -142,7 +142,7 @@ def trials_of(sides=2, **options):
     parameters = [Parameter(name, values, np.array([[1.0, 0.5, 2.0]] * sides), (0.1, 9.0)) for name in names]
     fell = probabilities > rng.uniform(size=80)
     weights = np.full(50, 0.02)
-    return outcomes_figure(
+    return draw_outcomes(
         probabilities=probabilities, overturned=fell, parameters=parameters, weights=weights, **options
     )
 
@@ -150,14 +150,14 @@ def trials_of(sides=2, **options):
 def validation_of(**options):
     middle = np.linspace(0.05, 0.95, 10)
     bands = {"band_lower": np.maximum(middle - 0.2, 0.0), "band_upper": np.minimum(middle + 0.2, 1.0)}
-    return reliability_figure(predicted=middle, observed=middle**1.2, **bands, **options)
+    return draw_reliability(predicted=middle, observed=middle**1.2, **bands, **options)
 
 
 def risk_of(**options):
     x = np.geomspace(0.05, 2.0, 80)
     lines = [RiskLine(f"{name}: once in 460 years (210 to 830)", x * np.exp(-x)) for name in ("half", "overturning")]
     hazard = HazardLine(1e-3 * x**-2.0, (0.1, 1.0))
-    return risk_figure(
+    return draw_risk(
         intensity=x, hazard=hazard, lines=lines, **({"intensity_label": "peak ground acceleration (g)"} | options)
     )
 
@@ -167,14 +167,14 @@ def survival_of(**options):
     label = "at most, with 10000 years without overturning (95 %)"
     hazard = HazardLine(1e-3 * x**-2.0, (0.1, 1.0))
     texts = {"intensity_label": "peak ground acceleration (g)", "largest_label": label}
-    return survival_figure(intensity=x, largest=1e-3 / x, hazard=hazard, **(texts | options))
+    return draw_survival(intensity=x, largest=1e-3 / x, hazard=hazard, **(texts | options))
 
 
 def measured_of(**options):
     time = np.linspace(0.0, 5.0, 101)
     fine = np.linspace(0.0, 5.0, 1001)
     arrays = {"time": time, "measured": np.sin(time), "residual": 1e-3 * np.cos(time)}
-    return measured_figure(**arrays, fitted_time=fine, fitted=np.sin(fine), **options)
+    return draw_measured_history(**arrays, fitted_time=fine, fitted=np.sin(fine), **options)
 
 
 def basins_of(**options):
@@ -185,28 +185,28 @@ def basins_of(**options):
     texts = {"x_label": "rotation at the start of a period (rad)", "y_label": "angular velocity (rad/s)"}
     outcome = np.arange(9).reshape(3, 3) % 8 - 1
     arrays = {"x": np.arange(3.0), "y": np.arange(3.0), "outcome": outcome, "orbits": orbits}
-    return basins_figure(**arrays, names=names, kinds=kinds, **(texts | options))
+    return draw_basins(**arrays, names=names, kinds=kinds, **(texts | options))
 
 
 def bifurcation_of(**options):
     value = np.linspace(1.0, 2.0, 30)
     states = {way: np.sin(np.outer(value, np.arange(1.0, 9.0)) + k) for k, way in enumerate(("up", "down"))}
     texts = {"x_label": "amplitude over the smallest that lifts the block", "y_label": "rotation (rad)"}
-    return bifurcation_figure(value=value, states=states, overturned=value > 1.9, **(texts | options))
+    return draw_bifurcation(value=value, states=states, overturned=value > 1.9, **(texts | options))
 
 
 def orbit_of(**options):
     time = np.linspace(0.0, 2.0, 400)
     arrays = {"coordinate": 0.1 * np.sin(np.pi * time), "velocity": 0.3 * np.cos(np.pi * time)}
     texts = {"labels": ("rotation (rad)", "velocity (rad/s)"), "states": np.array([[0.0, 0.3], [0.0, -0.3]])}
-    return orbit_figure(time=time, impact_times=time[[100, 300]], **arrays, **(texts | options))
+    return draw_orbit(time=time, impact_times=time[[100, 300]], **arrays, **(texts | options))
 
 
 def branch_of(**options):
     s = np.linspace(-1.0, 1.0, 60)
     marks = [("fold", 3.0, 0.2), ("symmetry breaking", 3.6, 0.31), ("loss of complete chattering", 3.9, 0.02)]
     texts = {"marks": marks, "labels": ("peak ground acceleration (m/s²)", "largest rotation (rad)")}
-    return branch_figure(values=3.0 + s * s, heights=0.2 + 0.18 * s, stable=s > 0.0, **(texts | options))
+    return draw_branches(values=3.0 + s * s, heights=0.2 + 0.18 * s, stable=s > 0.0, **(texts | options))
 
 
 FIGURES = {
@@ -299,24 +299,24 @@ def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
     x = np.arange(1.0, 8.0)
     peaks = np.array([[0.1, 0.2, np.inf, 0.4, np.inf, 0.6, 0.7]])
     curve = SpectrumCurves("", peaks, peaks, np.isinf(peaks[0]).astype(float))
-    figure = spectrum_figure(x=x, curves=[curve], fractiles=[0.5], motions=["a"], x_label="p")
+    figure = draw_spectrum(x=x, curves=[curve], fractiles=[0.5], motions=["a"], x_label="p")
     (crosses,) = [line for line in figure.axes[0].lines if line.get_marker() == "x"]
     np.testing.assert_array_equal(crosses.get_xydata(), [[2.0, 0.2], [4.0, 0.4], [6.0, 0.6]])
     assert entries(figure) == ["beyond: overturns"]
     standing = curve._replace(singles=0.0 * np.nan_to_num(peaks, posinf=0.0))
-    assert not spectrum_figure(x=x, curves=[standing], fractiles=[0.5], motions=["a"], x_label="p").legends
+    assert not draw_spectrum(x=x, curves=[standing], fractiles=[0.5], motions=["a"], x_label="p").legends
 
 
 def test_the_lowest_level_that_reaches_a_peak_is_on_the_curve_before_it_turns_back():
     levels = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     peak = np.array([0.1, 0.3, 0.2, 0.6, np.inf])
     motion = ScaledMotion("a", levels, peak, np.array([[4.5, 5.0]]))
-    reached = levels_reaching(motion, np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7]))
+    reached = find_reaching_levels(motion, np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7]))
     np.testing.assert_allclose(reached, [1.0, 1.0, 1.5, 2.0, 3.5, 4.0, 4.5])
     standing = motion._replace(peak=np.append(peak[:4], 0.65), bands=np.empty((0, 2)))
-    np.testing.assert_allclose(levels_reaching(standing, np.array([0.65, 0.7])), [5.0, np.inf])
+    np.testing.assert_allclose(find_reaching_levels(standing, np.array([0.65, 0.7])), [5.0, np.inf])
     always = motion._replace(bands=np.array([[1.0, 5.0]]))
-    np.testing.assert_allclose(levels_reaching(always, np.array([0.1, 0.9])), [1.0, 1.0])
+    np.testing.assert_allclose(find_reaching_levels(always, np.array([0.1, 0.9])), [1.0, 1.0])
 
 
 def test_the_intervals_of_a_sequence_are_drawn_with_the_limit_of_their_ratios():

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 import rocking
 from rocking import errors
-from rocking.analysis.survey import folder_names, survey
+from rocking.analysis.survey import create_folder_names, survey
 from rocking.cli.study import FORMATS
 from rocking.core import tables
 from rocking.core.result import DatasetResult
@@ -151,8 +151,8 @@ def test_a_link_is_kept_and_a_file_keeps_its_rights_and_a_device_is_written_to(t
 
 
 def test_records_of_one_name_have_a_folder_each() -> None:
-    assert folder_names(["a/one.csv", "b/one.csv", "c/one.csv", "two.csv"]) == ["one", "one-2", "one-3", "two"]
-    assert folder_names(["-", "sine:amplitude=1"]) == ["standard-input", "sine-amplitude=1"]
+    assert create_folder_names(["a/one.csv", "b/one.csv", "c/one.csv", "two.csv"]) == ["one", "one-2", "one-3", "two"]
+    assert create_folder_names(["-", "sine:amplitude=1"]) == ["standard-input", "sine-amplitude=1"]
 
 
 @pytest.mark.parametrize("index", [False, True])

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 import rocking
-from rocking.analysis.levels import boundaries
+from rocking.analysis.levels import find_boundaries
 from rocking.analysis.overturning import PULSES, mode_name, overturning_map
 from rocking.block import Blocks
 from rocking.engine.schemes import Certified
@@ -169,7 +169,7 @@ def test_bisection_finds_a_region_inside_an_interval_of_the_grid():
     def outcome_of(column, level):
         return np.select([level < 1.3, level < 1.6], [0, 1], 2)
 
-    edges = boundaries(levels, np.array([[0], [2]]), outcome_of, rtol=1e-12)
+    edges = find_boundaries(levels, np.array([[0], [2]]), outcome_of, rtol=1e-12)
     np.testing.assert_allclose(edges.level, [1.3, 1.6], rtol=1e-12)
     assert edges.below.tolist() == [0, 1]
     assert edges.above.tolist() == [1, 2]
@@ -180,18 +180,15 @@ def test_bisection_finds_a_thin_region_between_two_others():
     def outcome_of(column, level):
         return np.select([level < 1.3, level < 1.3 + 1e-7], [1, -1], 0)
 
-    edges = boundaries(np.array([1.0, 2.0]), np.array([[1], [0]]), outcome_of, rtol=1e-12)
+    edges = find_boundaries(np.array([1.0, 2.0]), np.array([[1], [0]]), outcome_of, rtol=1e-12)
     np.testing.assert_allclose(edges.level, [1.3, 1.3 + 1e-7], rtol=1e-12)
     assert edges.above.tolist() == [-1, 0]
 
 
 def test_bisection_of_endless_regions_ends():
     rng = np.random.default_rng(0)
-    edges = boundaries(
-        np.array([1.0, 2.0]),
-        np.array([[0], [1]]),
-        lambda column, level: rng.integers(2, 1000, len(level)),
-        rtol=1e-6,
+    edges = find_boundaries(
+        np.array([1.0, 2.0]), np.array([[0], [1]]), lambda column, level: rng.integers(2, 1000, len(level)), rtol=1e-6
     )
     assert len(edges.level) <= 128
     assert np.all(np.diff(edges.low) > 0.0)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rocking.plot.maps import regions_figure
+from rocking.plot.maps import draw_regions
 
 LOW, HIGH = 0.0, 10.0
 
@@ -53,7 +53,7 @@ def test_the_lobe_that_goes_on_is_the_nearer_one():
 
 def map_of(columns, **options):
     names = {-3: "no uplift", -2: "rests", -1: "rocks"} | {k: f"overturns after {k}" for k in range(9)}
-    return regions_figure(
+    return draw_regions(
         x=np.arange(len(columns), dtype=float),
         y_range=(LOW, HIGH),
         edges=[np.array(column[1::2]) for column in columns],

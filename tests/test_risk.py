@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking import HazardCurve
-from rocking.analysis.hazard import log_parts, log_rate_within, log_standing, powers
+from rocking.analysis.hazard import compute_log_parts, compute_log_rate_within, compute_log_survival, compute_power_laws
 from rocking.analysis.probit import Probit
-from rocking.analysis.risk import mean_of_blocks
+from rocking.analysis.risk import compute_mean_survival
 from rocking.calibration.tables import read_observed
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
@@ -40,7 +40,7 @@ def fragility_with(median: float, dispersion: float) -> rocking.Fragility:
 def by_quadrature(curve: object, hazard: HazardCurve) -> float:
     """Integral of rate(x) dP(x) by forty points of Gauss to each of many pieces."""
     a, b = (float(value[0]) for value in curve.fitted)
-    exponents, factors = powers(hazard)
+    exponents, factors = compute_power_laws(hazard)
     inside = a + b * np.log(hazard.intensity)
     ends = np.union1d(inside, np.linspace(min(*inside, 0.0) - 40.0, max(*inside, 0.0) + 40.0, 60))
     points, weights = np.polynomial.legendre.leggauss(40)
@@ -144,7 +144,7 @@ def test_the_interval_is_that_of_the_fragility() -> None:
 def test_limits_of_fits_have_the_rates_of_what_they_stand_for() -> None:
     hazard = HazardCurve([0.5, 5.0], [1e-2, 1e-4])
     fits = Probit(np.array([-np.inf, 0.0, -1e9, 2.0]), np.array([0.0, 0.0, 1e9, 1.0]))
-    rates = np.exp(np.logaddexp.reduce(log_parts(fits, hazard), axis=1))
+    rates = np.exp(np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1))
     # None ever, half of the weakest motions, all from e m/s^2 on, a lognormal of median exp(-2) and dispersion 1.
     assert rates[:3] == pytest.approx([0.0, math.inf, 1e-2 * (math.e / 0.5) ** -2.0])
     assert rates[3] == pytest.approx(1e-2 * (math.exp(-2.0) / 0.5) ** -2.0 * math.exp(2.0))
@@ -389,7 +389,7 @@ def test_blocks_that_always_or_never_fall_or_at_once_have_their_part_in_the_mean
         ]
     )
     rates = [0.0, 1e-2 - 2e-4, float(site.rate_of(1.5)), float(site.rate_of(2.0))]
-    found = mean_of_blocks(table, "pga_m_s2", "overturning", site, 100.0)
+    found = compute_mean_survival(table, "pga_m_s2", "overturning", site, 100.0)
     assert found == pytest.approx(np.mean(np.exp(-100.0 * np.array(rates))), rel=1e-4)
 
 
@@ -414,7 +414,7 @@ def test_a_block_of_which_the_intensity_alone_decides_stands_as_quadrature_says(
 
     corners = [a + b * math.log(x) for x in hazard.intensity]
     expected = mpmath.ncdf(low) * mpmath.exp(-5.0) + mpmath.ncdf(-high) + mpmath.quad(integrand, corners)
-    found = log_standing(Probit(np.array([a]), np.array([b])), hazard, 100.0)
+    found = compute_log_survival(Probit(np.array([a]), np.array([b])), hazard, 100.0)
     assert found[0, 0] == pytest.approx(float(mpmath.log(expected)), abs=1e-5)
 
 
@@ -424,7 +424,7 @@ def test_a_curve_that_does_not_rise_is_the_limit_of_flat_ones(a: float) -> None:
     hazard = rocking.HazardCurve([4.0, 12.0, 40.0], [1e-3, 1e-4, 1e-5])
     chance, flat = scipy.stats.norm.cdf(a), Probit(np.array([a, np.clip(a, -9.0, 9.0)]), np.array([0.0, 1e-9]))
     with np.errstate(all="raise"):
-        rates, standing = log_rate_within(flat, hazard)[:, 0], log_standing(flat, hazard, 1000.0)[:, 0]
+        rates, standing = compute_log_rate_within(flat, hazard)[:, 0], compute_log_survival(flat, hazard, 1000.0)[:, 0]
     assert np.exp(rates) == pytest.approx(chance * (1e-3 - 1e-5), rel=1e-6, abs=1e-21)
     assert np.exp(standing) == pytest.approx(1.0 - chance + chance * math.exp(-1.0), rel=1e-6)
 

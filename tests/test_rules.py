@@ -92,7 +92,7 @@ def test_asce_43_05_in_the_terms_of_the_standard(record):
 @pytest.mark.parametrize("share", [0.01, 0.5, 1.0])
 def test_the_oscillator_of_asce_43_05_has_the_energy_of_the_block_and_loses_what_two_impacts_take(share):
     p, alpha, e = 3.0, 0.25, 0.9
-    here = criteria._reserve_energy(p, alpha, e, G, share)
+    here = criteria._create_energy_oscillator(p, alpha, e, G, share)
     rotation = share * alpha
     # Work against gravity about the pivot, over m g R; h = R cos(alpha), a spring's force grows with the rotation.
     work = quad(lambda t: math.sin(alpha - t), 0.0, rotation)[0]
@@ -106,9 +106,9 @@ def test_the_oscillator_of_asce_43_05_has_the_energy_of_the_block_and_loses_what
 
 def test_the_period_of_priestley_is_that_of_free_rocking():
     block = rocking.Block.from_parameters(p=3.0, alpha=0.1, restitution=0.9)
-    here = criteria._free_rocking(3.0, 0.1, 0.9, G)
+    here = criteria._create_free_rocking_oscillator(3.0, 0.1, 0.9, G)
     for k in (0, 24, 55):
-        start = criteria._SHARES[k] * 0.1
+        start = criteria._ROTATION_SHARES[k] * 0.1
         free = rocking.simulate(block, None, model="linear", initial_rotation=start)
         assert 4.0 * free.impacts["time"][0] == pytest.approx(here.periods[k], rel=1e-12)
     # At the balance point the centre of mass stands above the pivot.
@@ -127,7 +127,7 @@ def test_the_damping_of_priestley_lies_between_those_of_small_and_large_free_roc
         dampings.append(math.log(share / later) / (4.0 * math.pi))
     small, large = dampings
     assert small == pytest.approx(-2.0 * math.log(restitution) / math.pi, rel=2e-3)
-    assert small < criteria._free_rocking(3.0, 0.1, restitution, G).damping < min(large, 1.1 * small)
+    assert small < criteria._create_free_rocking_oscillator(3.0, 0.1, restitution, G).damping < min(large, 1.1 * small)
 
 
 @pytest.mark.parametrize("name", rules.RULES)

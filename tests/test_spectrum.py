@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import rocking
-from rocking.analysis.spectrum import fractiles_of, rocking_spectrum, weighted_fractiles
+from rocking.analysis.spectrum import compute_fractiles, compute_weighted_fractiles, rocking_spectrum
 
 PULSES = [rocking.pulses.one_sine(5.0, frequency) for frequency in (0.5, 0.8, 1.3, 2.0)]
 
@@ -81,7 +81,7 @@ def test_large_similar_blocks_have_equal_displacements():
 def test_finite_fractiles_are_interpolated_linearly(values, shares):
     shares = np.array(shares)
     expected = np.quantile(values, shares, axis=0)
-    np.testing.assert_allclose(fractiles_of(values, shares), expected, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(compute_fractiles(values, shares), expected, rtol=1e-12, atol=1e-9)
 
 
 @example(8, 18, Fraction(28, 100))  # 0.28 * 25 is more than 7 in floating point
@@ -89,7 +89,7 @@ def test_finite_fractiles_are_interpolated_linearly(values, shares):
 def test_a_fractile_is_infinite_where_the_value_at_it_or_next_above_is(finite, infinite, share):
     values = np.concatenate([np.arange(finite, dtype=float), np.full(infinite, np.inf)])[:, None]
     place = share * (finite + infinite - 1)
-    (result,) = fractiles_of(values, np.array([float(share)]))[:, 0]
+    (result,) = compute_fractiles(values, np.array([float(share)]))[:, 0]
     assert math.isinf(result) == (math.ceil(place) >= finite)
     assert not math.isnan(result)
 
@@ -146,7 +146,7 @@ def test_a_weight_counts_as_often_as_it_says(values, data, share):
     counts = data.draw(arrays(int, values.shape, elements=st.integers(1, 4)))
     repeated = np.sort(np.repeat(values, counts))
     expected = repeated[math.ceil(share * len(repeated) * (1.0 - 1e-12)) - 1]
-    assert weighted_fractiles(values, counts.astype(float), np.array([share]))[0] == expected
+    assert compute_weighted_fractiles(values, counts.astype(float), np.array([share]))[0] == expected
 
 
 def test_an_ensemble_of_one_block_has_the_spectrum_of_its_shape():

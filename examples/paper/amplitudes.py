@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST, figure_for, write
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, add_text, open_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +38,7 @@ def duration_figure(*, amplitude: Floats, durations: Mapping[str, Floats], criti
     All are over amplitudes (n,), of the ground acceleration over g alpha: by the exact method first, NaN where
     incomplete.
     """
-    with figure_for(None, (5.2, 5.0), title=title) as figure:
+    with open_figure(None, (5.2, 5.0), title=title) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         for (name, values), style in zip(durations.items(), _CURVES, strict=False):
             upper.plot(amplitude, values, label=name, **style)
@@ -46,7 +46,7 @@ def duration_figure(*, amplitude: Floats, durations: Mapping[str, Floats], criti
         for at, text in ((1.0, "$a = 1$"), (critical, rf"$a_{{cr}}$ = {critical:.6f}")):
             upper.axvline(at, color=INK, linewidth=0.6, linestyle=(0, (1, 2)))
             side, off = ("left", 3) if at == 1.0 else ("right", -3)
-            write(upper, text, (at, 1.045), (off, 0), ha=side)
+            add_text(upper, text, (at, 1.045), (off, 0), ha=side)
         upper.set_ylim(0.0, 1.14)
         upper.set_ylabel(r"chattering time, $\tau_{ch}\,/\,(T/2)$")
         upper.legend(loc="lower right", bbox_to_anchor=(0.84, 0.02))
@@ -69,7 +69,7 @@ def contour_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
     """
     from matplotlib.lines import Line2D
 
-    with figure_for(None, (7.2, 3.3)) as figure:
+    with open_figure(None, (7.2, 3.3)) as figure:
         surface, error = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes in (surface, error):
             axes.set_xscale("log", base=2)
@@ -105,7 +105,7 @@ def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
     """
     from matplotlib.lines import Line2D
 
-    with figure_for(None, (5.2, 4.4)) as figure:
+    with open_figure(None, (5.2, 4.4)) as figure:
         axes: Any = figure.add_subplot(projection="3d")
         # A drawing in three dimensions does not tell what lies above the surface from what lies below: the points do.
         x, y = np.meshgrid(omega, eta, indexing="ij")
@@ -141,7 +141,7 @@ def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: st
 
     All are over frequencies (n,), by the exact method first.
     """
-    with figure_for(None, (5.2, 3.3), title=title) as figure:
+    with open_figure(None, (5.2, 3.3), title=title) as figure:
         axes = figure.add_subplot()
         exact = next(iter(critical.values()))
         low, high = float(exact.min()), float(exact.max())

@@ -16,11 +16,11 @@ from rocking.plot.canvas import (
     INK,
     REST,
     add_legend,
+    add_text,
     add_ticks,
-    figure_for,
-    handles_of,
-    magnified,
-    write,
+    collect_handles,
+    find_magnification,
+    open_figure,
 )
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def excitation_figure(
     Times are over the period, accelerations over g alpha; `marks` are the first one or two initiations. The chattering
     time is NaN where chattering is incomplete.
     """
-    with figure_for(None, (7.0, 2.9), title=title) as figure:
+    with open_figure(None, (7.0, 2.9), title=title) as figure:
         axes = figure.add_subplot()
         _draw_excitation(axes, time, acceleration)
         _mark_initiations(axes, marks, float(acceleration.max()))
@@ -88,10 +88,10 @@ def excitation_figure(
             if math.isnan(end):
                 continue
             axes.annotate("", (end, height), (first, height), arrowprops={"arrowstyle": "<->", "linewidth": 0.8})
-            write(axes, text, (0.5 * (first + end), height), (0, 2), ha="center", va="bottom")
+            add_text(axes, text, (0.5 * (first + end), height), (0, 2), ha="center", va="bottom")
         if not math.isnan(rest):
             axes.plot([rest, rest], [-0.75, 0.1], linewidth=0.9, **_LIMIT)
-            write(axes, "at rest", (rest, -0.75), (-3, 0), ha="right", color=ABOVE)
+            add_text(axes, "at rest", (rest, -0.75), (-3, 0), ha="right", color=ABOVE)
         axes.set_xlim(time[0], time[-1])
         axes.set_xlabel("time over period, $t/T$")
         axes.legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.04))
@@ -112,7 +112,7 @@ def history_figure(
     Times are over the period, rotations over the slenderness, the reference first, accelerations over g alpha. The time
     of the detail is shaded in the first panel.
     """
-    with figure_for(None, (7.0, 5.6), title=title) as figure:
+    with open_figure(None, (7.0, 5.6), title=title) as figure:
         response, excitation, close = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 1.2))
         response.axvspan(*detail.time, color=REST, label="the time of (c)")
         low = min(float(rotation.min()) for rotation in rotations.values())
@@ -131,13 +131,13 @@ def history_figure(
         close.set_xlabel("time over period, $t/T$")
         for letter, axes in zip("abc", (response, excitation, close), strict=True):
             axes.set_title(f"({letter})", loc="left", pad=3.0)
-        add_legend(figure, None, handles_of(response, excitation))
+        add_legend(figure, None, collect_handles(response, excitation))
     return figure
 
 
 def _draw_responses(axes: Axes, time: Floats, rotations: Mapping[str, Floats], limits: tuple[float, float]) -> None:
     """Draw rotations between limits, all magnified by as much as these ask for."""
-    scale, power = magnified(max(abs(limit) for limit in limits))
+    scale, power = find_magnification(max(abs(limit) for limit in limits))
     axes.axhline(0.0, color=INK, linewidth=0.4)
     for (name, rotation), style in zip(rotations.items(), _SCHEMES, strict=False):
         axes.plot(time, scale * rotation, label=name, **style)
@@ -163,7 +163,7 @@ def _mark_initiations(axes: Axes, marks: tuple[Mark, ...], peak: float) -> None:
     axes.set_yticks([-1.0, 0.0, 1.0])
     for mark in marks:
         axes.plot(mark.time, height, "v", **_MARK)
-        write(axes, mark.text, (mark.time, height), (-4, 4), color=ABOVE, fontsize=7.5)
+        add_text(axes, mark.text, (mark.time, height), (-4, 4), color=ABOVE, fontsize=7.5)
 
 
 class Ratios(NamedTuple):
@@ -182,7 +182,7 @@ def chattering_figure(
     Times are p t since uplift, dense also between the late impacts; rotations are over the slenderness. The second
     detail starts at the impact with the index `late_impact`.
     """
-    with figure_for(None, (7.0, 5.0), title=title) as figure:
+    with open_figure(None, (7.0, 5.0), title=title) as figure:
         grid = figure.add_gridspec(2, 2)
         whole, first, last = (figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1]))
         _draw_whole(whole, time, rotation, impact_times, rest)
@@ -191,7 +191,7 @@ def chattering_figure(
         first.set_title("(b) first cycles", loc="left")
         first.set_xlabel(r"time since uplift, $\tau$")
         late = impact_times[late_impact : late_impact + _LAST_CYCLES + 1]
-        scale, power = magnified(float(late[-1] - late[0]))
+        scale, power = find_magnification(float(late[-1] - late[0]))
         _draw_cycles(last, scale * (time - late[0]), rotation, scale * (late - late[0]), late_impact + 1)
         last.set_title(rf"(c) cycles after impact {late_impact + 1}", loc="left")
         last.set_xlabel(rf"{power}$(\tau - \tau_{{{late_impact + 1}}})$")
@@ -199,13 +199,13 @@ def chattering_figure(
 
 
 def _draw_whole(axes: Axes, time: Floats, rotation: Floats, impact_times: Floats, rest: float) -> None:
-    scale, power = magnified(float(np.max(np.abs(rotation))))
+    scale, power = find_magnification(float(np.max(np.abs(rotation))))
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, scale * rotation, color=INK, linewidth=0.9)
     add_ticks(axes, impact_times, 0.06)
     axes.axvline(rest, linewidth=1.0, **_LIMIT)
     text, across = rf"at rest, $\tau_{{ch}}$ = {rest:.6f}", axes.get_xaxis_transform()
-    write(axes, text, (rest, 0.3), (-6, 0), xycoords=across, ha="right", color=ABOVE)
+    add_text(axes, text, (rest, 0.3), (-6, 0), xycoords=across, ha="right", color=ABOVE)
     axes.set_xlim(0.0, 1.06 * rest)
     low, high = axes.get_ylim()
     axes.set_ylim(low - 0.18 * (high - low), high)
@@ -218,7 +218,7 @@ def _draw_cycles(axes: Axes, time: Floats, rotation: Floats, impacts: Floats, nu
     """Draw the stretch between the given impacts, which are numbered from `number` on, with the intervals."""
     margin = 0.06 * (impacts[-1] - impacts[0])
     shown = (time >= impacts[0] - margin) & (time <= impacts[-1] + margin)
-    scale, power = magnified(float(np.max(np.abs(rotation[(time >= impacts[0]) & (time <= impacts[-1])]))))
+    scale, power = find_magnification(float(np.max(np.abs(rotation[(time >= impacts[0]) & (time <= impacts[-1])]))))
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time[shown], scale * rotation[shown], color=INK, linewidth=1.0)
     axes.plot(impacts, np.zeros(impacts.size), "o", color=INK, markersize=3.4, markerfacecolor="white")
@@ -241,12 +241,12 @@ def _draw_intervals(axes: Axes, impacts: Floats, number: int, height: float) -> 
         if end - start < _NARROW * (impacts[-1] - impacts[0]):
             continue
         axes.annotate("", (end, height), (start, height), arrowprops=_ARROW)
-        write(axes, rf"$\Delta\tau_{{{number + k}}}$", (0.5 * (start + end), height), (0, -2), ha="center", va="top")
+        add_text(axes, rf"$\Delta\tau_{{{number + k}}}$", (0.5 * (start + end), height), (0, -2), ha="center", va="top")
 
 
 def ratio_figure(panels: Sequence[Ratios]) -> Figure:
     """Draw the ratios of the intervals between every second impact, each panel with the limit."""
-    with figure_for(None, (7.0, 2.9)) as figure:
+    with open_figure(None, (7.0, 2.9)) as figure:
         for k, (panel, axes) in enumerate(zip(panels, figure.subplots(1, len(panels), squeeze=False)[0], strict=True)):
             n = np.arange(panel.values.size)
             for start, face, label in ((0, INK, "even $n$"), (1, "white", "odd $n$")):
@@ -255,7 +255,7 @@ def ratio_figure(panels: Sequence[Ratios]) -> Figure:
                 axes.plot(n[chosen], panel.values[chosen], "o", **look)
             axes.axhline(panel.limit, linewidth=0.9, **_LIMIT, zorder=0)
             text, at, up = rf"$\eta^2$ = {panel.limit:.4f}", (0.98, panel.limit), axes.get_yaxis_transform()
-            write(axes, text, at, (0, -5), xycoords=up, ha="right", va="top", color=ABOVE)
+            add_text(axes, text, at, (0, -5), xycoords=up, ha="right", va="top", color=ABOVE)
             axes.set_title(f"({'abcdef'[k]}) {panel.title}", loc="left")
             axes.set_xlabel("impact $n$")
             axes.grid(color=GROUND, linewidth=0.3, alpha=0.6)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST, figure_for
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, open_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +35,7 @@ def block_figure(*, upright: Floats, rocking: Floats, title: str) -> Figure:
     """
     from matplotlib.patches import Polygon
 
-    with figure_for(None, (3.4, 4.2), title=title) as figure:
+    with open_figure(None, (3.4, 4.2), title=title) as figure:
         axes = figure.add_subplot()
         axes.set_aspect("equal")
         axes.set_axis_off()
@@ -148,7 +148,7 @@ def flowchart_figure(charts: Sequence[Flowchart]) -> Figure:
     left, right = max(left, *(-via for via in vias)) + 0.06, max(right, *vias) + 0.06
     low = min(box.at[1] - 0.5 * box.size[1] for box in boxes) - 0.05
     high = max(box.at[1] + 0.5 * box.size[1] for box in boxes) + 0.28
-    with figure_for(None, (len(charts) * (left + right), high - low)) as figure:
+    with open_figure(None, (len(charts) * (left + right), high - low)) as figure:
         figure.set_layout_engine("none")
         for k, chart in enumerate(charts):
             axes = figure.add_axes((k / len(charts), 0.0, 1.0 / len(charts), 1.0))

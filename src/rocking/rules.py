@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.levels import values_of
+from rocking.analysis.levels import compute_intensities
 from rocking.analysis.survey import Check
 from rocking.block import Block, Blocks, one_block
 from rocking.core import checks
@@ -34,7 +34,7 @@ __all__ = ["RULES", "Check", "Rating", "asce_43_05", "check", "housner", "ishiya
 
 #: Ratios of rotation to slenderness for the comparison with a spectrum, from stiff oscillators to a rocking period of
 #: 30/p.
-_SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linspace(0.5, 0.999, 26))
+_ROTATION_SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linspace(0.5, 0.999, 26))
 
 #: Ratio of damping to -ln e^2 (Makris and Konstantinidis 2003).
 _DAMPING: Final = 0.34
@@ -88,13 +88,13 @@ Rule = Callable[[Blocks | Block | Iterable[Block], Motion], Rating]
 #: Demand and capacity of the sides of blocks, shape (n, 2).
 Comparison = Callable[[Blocks, Motion], tuple[Any, Floats]]
 
-_rules: dict[str, Rule] = {}
+_rules_by_name: dict[str, Rule] = {}
 
 #: Rules by name.
-RULES: Final[Mapping[str, Rule]] = MappingProxyType(_rules)
+RULES: Final[Mapping[str, Rule]] = MappingProxyType(_rules_by_name)
 
 #: Common sections of the docstrings of all rules.
-_DOCUMENTATION: Final = """{}
+_DOCSTRING: Final = """{}
 
     Parameters
     ----------
@@ -118,29 +118,29 @@ _DOCUMENTATION: Final = """{}
 def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
     """Create a rule from a comparison, the unit of its results, and the ratio in its example."""
 
-    def rule_of(comparison: Comparison) -> Rule:
+    def decorate(comparison: Comparison) -> Rule:
         @wraps(comparison, assigned=("__module__", "__name__", "__qualname__"))
         def rule(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
-            demand, capacity = np.broadcast_arrays(*comparison(_free(blocks), list_motions([motion])[0]))
+            demand, capacity = np.broadcast_arrays(*comparison(_combine_free_blocks(blocks), list_motions([motion])[0]))
             weaker = np.arange(len(demand)), np.argmax(demand / capacity, axis=1)
             return Rating(name, demand[weaker], capacity[weaker], unit)
 
         name = comparison.__name__
-        first, _, rest = (comparison.__doc__ or "").partition("\n\n")
-        rule.__doc__ = _DOCUMENTATION.format(first, rest.rstrip(), name, example)
+        first, _, sections = (comparison.__doc__ or "").partition("\n\n")
+        rule.__doc__ = _DOCSTRING.format(first, sections.rstrip(), name, example)
         del rule.__wrapped__  # the comparison has other arguments than the rule
-        _rules[name] = rule
+        _rules_by_name[name] = rule
         return rule
 
-    return rule_of
+    return decorate
 
 
-def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
+def _combine_free_blocks(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
     """Combine blocks, or raise an error if they have restraints."""
-    many = Blocks.from_bodies(blocks)
-    for each in many if many.terms else ():
-        one_block(each)
-    return many
+    combined = Blocks.from_bodies(blocks)
+    for block in combined if combined.terms else ():
+        one_block(block)
+    return combined
 
 
 @_rule("m/s^2", "0.895")
@@ -199,7 +199,7 @@ def ishiyama(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
 
 
 def overturning_velocity(blocks: Blocks) -> Floats:
-    """Sudden ground velocity after which a block at rest just reaches its balance point, m/s, shape (n, 2)."""
+    """Compute the ground velocity jump after which a block at rest just reaches balance, m/s, shape (n, 2)."""
     return np.asarray(2.0 * blocks.gravity * np.sin(0.5 * blocks.alpha) / (blocks.p * np.cos(blocks.alpha)))
 
 
@@ -235,7 +235,7 @@ def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
 
 
 def mean_spectral_velocity(motion: Motion) -> float:
-    """Mean undamped pseudo-velocity over periods of 0.1 to 2.5 s, m/s (Housner 1952)."""
+    """Compute the mean undamped pseudo-velocity over periods of 0.1 to 2.5 s, m/s (Housner 1952)."""
     periods = np.linspace(0.1, 2.5, 97)
     velocities = motion.spectral_acceleration(periods, 0.0) * periods / (2.0 * np.pi)
     return float(np.trapezoid(velocities, periods) / (periods[-1] - periods[0]))
@@ -273,7 +273,7 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     ASCE (2005). Seismic Design Criteria for Structures, Systems, and Components in Nuclear Facilities. ASCE/SEI 43-05,
     Appendix A, section A.2.
     """
-    return _least_ratio(blocks, motion, _reserve_energy)
+    return _find_min_ratio(blocks, motion, _create_energy_oscillator)
 
 
 @_rule("m", "1.070")
@@ -300,7 +300,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     For a rotation theta_0:
 
     - period (4/p) acosh(1/(1 - theta_0/alpha)), Housner's period of free rocking of a slender block;
-    - damping -0.34 ln r, r = e^2, the line that Makris and Konstantinidis fitted to the decay of free rocking;
+    - damping -0.34 ln r, r = e^2, the line that :cite:t:`makris2003` fitted to the decay of free rocking;
     - displacement R (sin(alpha) - sin(alpha - theta_0)), half the width at the balance point, with R = 3 g/(4 p^2) as
       for a rectangular block.
 
@@ -318,7 +318,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
             f"priestley needs a restitution above {lowest:.2g}, from where on its damping is below critical, not "
             f"{blocks.restitution.min():g}; leave that rule out"
         )
-    return _least_ratio(blocks, motion, _free_rocking)
+    return _find_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 
 
 def rate(
@@ -351,10 +351,10 @@ def rate(
     >>> [*rate(rocking.Block(width=0.3, height=0.9), record, ["west", "ishiyama"])]
     ['west', 'ishiyama']
     """
-    wanted = [*RULES] if rules is None else checks.items(rules, "rules", InvalidOption)
-    names = [checks.choice(name, "rules", InvalidOption, [*RULES]) for name in wanted]
-    many = _free(blocks)
-    return {name: RULES[name](many, motion) for name in names}
+    requested = [*RULES] if rules is None else checks.items(rules, "rules", InvalidOption)
+    names = [checks.choice(name, "rules", InvalidOption, [*RULES]) for name in requested]
+    combined = _combine_free_blocks(blocks)
+    return {name: RULES[name](combined, motion) for name in names}
 
 
 class _Oscillator(NamedTuple):
@@ -366,38 +366,40 @@ class _Oscillator(NamedTuple):
     per_acceleration: Floats
 
 
-def _reserve_energy(p: float, alpha: float, restitution: float, gravity: float, share: float = 1.0) -> _Oscillator:
-    """ASCE/SEI 43-05, Appendix A.2, at one ratio of rotation to slenderness, by default the balance point."""
+def _create_energy_oscillator(
+    p: float, alpha: float, restitution: float, gravity: float, share: float = 1.0
+) -> _Oscillator:
+    """Create the oscillator of ASCE/SEI 43-05, A.2, at a share of the slenderness, by default the balance point."""
     rotation = np.array([share * alpha])
     # cos(t) + a sin(t) - 1 without cancellation near 1.
-    raised = 2.0 * np.sin(0.5 * rotation) * (math.tan(alpha) * np.cos(0.5 * rotation) - np.sin(0.5 * rotation))
-    periods = 2.0 * np.pi * rotation / (p * np.sqrt(2.0 * raised * math.cos(alpha)))
+    lift = 2.0 * np.sin(0.5 * rotation) * (math.tan(alpha) * np.cos(0.5 * rotation) - np.sin(0.5 * rotation))
+    periods = 2.0 * np.pi * rotation / (p * np.sqrt(2.0 * lift * math.cos(alpha)))
     decay = -2.0 * math.log(restitution)
     damping = decay / math.hypot(2.0 * math.pi, decay)
-    return _Oscillator(periods, damping, 2.0 * gravity * raised / rotation, np.ones_like(rotation))
+    return _Oscillator(periods, damping, 2.0 * gravity * lift / rotation, np.ones_like(rotation))
 
 
-def _free_rocking(p: float, alpha: float, restitution: float, gravity: float) -> _Oscillator:
-    """Priestley, Evison and Carr (1978)."""
-    periods = 4.0 / p * np.arccosh(1.0 / (1.0 - _SHARES))
-    displacements = 0.75 * gravity / p**2 * (math.sin(alpha) - np.sin(alpha * (1.0 - _SHARES)))
+def _create_free_rocking_oscillator(p: float, alpha: float, restitution: float, gravity: float) -> _Oscillator:
+    """Create the oscillators of Priestley, Evison and Carr (1978) with the period of free rocking."""
+    periods = 4.0 / p * np.arccosh(1.0 / (1.0 - _ROTATION_SHARES))
+    displacements = 0.75 * gravity / p**2 * (math.sin(alpha) - np.sin(alpha * (1.0 - _ROTATION_SHARES)))
     damping = -2.0 * _DAMPING * math.log(restitution)
     return _Oscillator(periods, damping, displacements, (periods / (2.0 * np.pi)) ** 2)
 
 
-def _least_ratio(
-    blocks: Blocks, motion: Motion, oscillator_of: Callable[[float, float, float, float], _Oscillator]
+def _find_min_ratio(
+    blocks: Blocks, motion: Motion, create_oscillator: Callable[[float, float, float, float], _Oscillator]
 ) -> tuple[Floats, Floats]:
-    """Demand and capacity of the sides of blocks at the rotation with the smallest ratio."""
+    """Find demand and capacity of the sides of blocks at the rotation with the smallest ratio."""
     sides = np.stack([blocks.p, blocks.alpha, blocks.restitution], axis=-1).reshape(-1, 3)
-    distinct, place = np.unique(sides, axis=0, return_inverse=True)
-    found = np.empty((len(distinct), 2))
+    distinct, index = np.unique(sides, axis=0, return_inverse=True)
+    results = np.empty((len(distinct), 2))
     for k, (p, alpha, restitution) in enumerate(distinct.tolist()):
-        here = oscillator_of(p, alpha, restitution, blocks.gravity)
-        demands = here.per_acceleration * motion.spectral_acceleration(here.periods, here.damping)
-        least = int(np.argmin(demands / here.capacities))
-        found[k] = demands[least], here.capacities[least]
-    demand, capacity = found[place.reshape(-1)].reshape(len(blocks), 2, 2).transpose(2, 0, 1)
+        oscillator = create_oscillator(p, alpha, restitution, blocks.gravity)
+        demands = oscillator.per_acceleration * motion.spectral_acceleration(oscillator.periods, oscillator.damping)
+        worst = int(np.argmin(demands / oscillator.capacities))
+        results[k] = demands[worst], oscillator.capacities[worst]
+    demand, capacity = results[index.reshape(-1)].reshape(len(blocks), 2, 2).transpose(2, 0, 1)
     return demand, capacity
 
 
@@ -440,8 +442,8 @@ def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None,
     >>> import rocking
     >>> tombstone = rocking.Block(width=0.3, height=0.9)
     >>> records = {name: rocking.records.load(name) for name in ["el-centro-meloland-270", "el-centro-meloland-360"]}
-    >>> found = check(tombstone, records, rules=["west", "ishiyama"])
-    >>> for row in found.rows():
+    >>> comparison = check(tombstone, records, rules=["west", "ishiyama"])
+    >>> for row in comparison.rows():
     ...     print(f"{row['west']:.2f} {row['ishiyama']:.2f} {row['simulated']:.2f} {row['verdict']}")
     0.90 0.90 0.71 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
     0.93 0.93 0.64 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
@@ -449,7 +451,7 @@ def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None,
     named_motions = index_motions(motions)
     names = None if rules is None else checks.items(rules, "rules", InvalidOption)
     # Raise errors before the simulations.
-    values_of([*named_motions.values()], Measure("pga"))
+    compute_intensities([*named_motions.values()], Measure("pga"))
     ratios = [
         {name: float(rating.ratio[0]) for name, rating in rate(block, motion, names).items()}
         for motion in named_motions.values()
@@ -458,15 +460,15 @@ def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None,
     with Progress("checking", total=len(named_motions)) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, model=model))
-            margins.append(_margin(responses[-1], block, motion, model))
+            margins.append(_compute_margin(responses[-1], block, motion, model))
             bar.advance()
     return Check(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
 
 
-def _margin(response: Response, block: Block, motion: Motion, model: Model) -> float:
-    """Reciprocal of the lowest factor on the motion that overturns the block, consistent with the response."""
-    scaled = incremental_dynamic_analysis(block, motion, model=model, rtol=_TOLERANCE)
-    margin = motion.pga / float(scaled.data.overturning_level[0, 0])
+def _compute_margin(response: Response, block: Block, motion: Motion, model: Model) -> float:
+    """Compute the reciprocal of the lowest factor that overturns the block, consistent with the response."""
+    analysis = incremental_dynamic_analysis(block, motion, model=model, rtol=_TOLERANCE)
+    margin = motion.pga / float(analysis.data.overturning_level[0, 0])
     if response.overturned:
         return float(np.fmax(margin, 1.0))  # the factor may be beyond all simulated levels
     # The level is the midpoint of a bracket. If this contains the motion itself, which stands, the change is above.

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis import probit
-from rocking.analysis.levels import units_of
-from rocking.analysis.probit import Outcomes, Probit, normal_scores, probabilities
+from rocking.analysis.levels import compute_units
+from rocking.analysis.probit import Outcomes, Probit, compute_normal_scores, compute_probabilities
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, unwrap_scalar
@@ -31,11 +31,11 @@ NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
 
 LossCategory = Literal["structural", "nonstructural", "contents", "business_interruption"]
 
-#: Square of the largest dispersion whose lognormal has a finite standard deviation.
-_WIDEST: Final = 700.0
+#: Largest square of a dispersion for which the lognormal has a finite standard deviation.
+_MAX_VARIANCE: Final = 700.0
 
 #: Largest plausible ratio of the median to the data.
-_FARTHEST: Final = 1000.0
+_MAX_MEDIAN_RATIO: Final = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +65,12 @@ class FragilityCurve:
         Maximum of the log-likelihood, without binomial coefficients.
     region : Probit
         Fits on the boundary of the confidence region, whose extremes are the intervals. The region follows from the
-        profile likelihood, adjusted to the differences between clusters with several outcomes (Chandler and Bate 2007).
+        profile likelihood, adjusted to the differences between clusters with several outcomes
+        :cite:p:`chandler2007`.
     goodness : Goodness
         Pearson's test of groups of outcomes against the fit: one group for each intensity if each has five outcomes or
-        more (stripes), otherwise up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow). The test
-        assumes independence, and has no p-value for clusters of several outcomes.
+        more (stripes), otherwise up to ten of equal size along the intensity (cloud, as in :cite:t:`hosmer1980`). The
+        test assumes independence, and has no p-value for clusters of several outcomes.
 
     See Also
     --------
@@ -100,11 +101,12 @@ class FragilityCurve:
     region: Probit
 
     def __repr__(self) -> str:
-        median, dispersion = median_text(self, 1.0), interval_text(self.dispersion_interval, 4)
-        count = f"{self.exceeded.sum():.0f} of {self.trials.sum():.0f} exceeded"
+        median_bounds, dispersion_text = format_median_interval(self, 1.0), format_interval(self.dispersion_interval, 4)
+        count_text = f"{self.exceeded.sum():.0f} of {self.trials.sum():.0f} exceeded"
         return (
-            f"<FragilityCurve: {self.limit_state}, {count}; median {self.median:.4g} ({median}) in SI units, "
-            f"dispersion {self.dispersion:.4g} ({dispersion}); {100 * self.confidence:g} % confidence>"
+            f"<FragilityCurve: {self.limit_state}, {count_text}; "
+            f"median {self.median:.4g} ({median_bounds}) in SI units, "
+            f"dispersion {self.dispersion:.4g} ({dispersion_text}); {100 * self.confidence:g} % confidence>"
         )
 
     @property
@@ -125,19 +127,21 @@ class FragilityCurve:
     @property
     def median_interval(self) -> tuple[float, float]:
         """Confidence interval of the median, 0 or infinite if the data allow a curve that does not rise."""
-        low, high = extremes(self.region, _log_medians)
+        low, high = find_extremes(self.region, _compute_log_medians)
         with np.errstate(over="ignore"):
             return float(np.exp(low[0])), float(np.exp(high[0]))
 
     @property
     def dispersion_interval(self) -> tuple[float, float]:
         """Confidence interval of the dispersion, infinite if the data allow a curve that does not rise."""
-        return _dispersion(float(self.region.slope.max())), _dispersion(float(self.region.slope.min()))
+        return _compute_dispersion(float(self.region.slope.max())), _compute_dispersion(float(self.region.slope.min()))
 
     def probability(self, intensity: ArrayLike) -> Floats:
         """Compute the fitted probability at intensities >= 0 (SI units or a block's own), with their shape."""
-        at = check_intensities(intensity)
-        return unwrap_scalar(probabilities(self.fitted, _logarithm(at).ravel())[0].reshape(at.shape))
+        intensities = check_intensities(intensity)
+        return unwrap_scalar(
+            compute_probabilities(self.fitted, _compute_logarithm(intensities).ravel())[0].reshape(intensities.shape)
+        )
 
     def intensity_of(self, probability: float) -> float:
         """Compute the intensity (SI units or a block's own) for a fitted probability between 0 and 1.
@@ -146,8 +150,8 @@ class FragilityCurve:
         """
         from scipy.special import ndtri
 
-        share = checks.fraction(probability, "probability", InvalidOption)
-        score = float(ndtri(share))
+        fraction = checks.fraction(probability, "probability", InvalidOption)
+        score = float(ndtri(fraction))
         with np.errstate(over="ignore", under="ignore"):
             return float(np.exp((score - self.fitted.intercept[0]) / self.fitted.slope[0]))
 
@@ -157,19 +161,19 @@ class FragilityCurve:
         The rates are -ln(1 - confidence)/(years P(intensity)), with a one-sided confidence as in `Fragility.survival` and the shape of the intensities (SI units, 0 or more),
         and infinite at 0. A precarious rock that has stood for so long contradicts hazard curves above them.
         """
-        time = checks.positive(years, "years", InvalidOption)
-        share = checks.fraction(confidence, "confidence", InvalidOption)
+        duration = checks.positive(years, "years", InvalidOption)
+        fraction = checks.fraction(confidence, "confidence", InvalidOption)
         with np.errstate(divide="ignore"):
-            return -math.log1p(-share) / (time * self.probability(intensity))
+            return -math.log1p(-fraction) / (duration * self.probability(intensity))
 
     def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
         """Compute the lower and upper end of the pointwise confidence band of `probability`."""
         from scipy.special import ndtr
 
-        at = check_intensities(intensity)
-        z = _logarithm(at).ravel()
-        ends = extremes(self.region, lambda fits: normal_scores(fits, z))
-        low, high = (unwrap_scalar(np.asarray(ndtr(end)).reshape(at.shape)) for end in ends)
+        intensities = check_intensities(intensity)
+        log_intensity = _compute_logarithm(intensities).ravel()
+        score_bounds = find_extremes(self.region, lambda fits: compute_normal_scores(fits, log_intensity))
+        low, high = (unwrap_scalar(np.asarray(ndtr(scores)).reshape(intensities.shape)) for scores in score_bounds)
         return low, high
 
     def to_dict(self) -> dict[str, Any]:
@@ -191,7 +195,7 @@ class FragilityCurve:
         }
 
 
-def fitted_curve(
+def fit_curve(
     name: str,
     data: tuple[Floats, Floats, Floats],
     clusters: Integers | None,
@@ -206,19 +210,19 @@ def fitted_curve(
     exceeded = np.where(np.abs(trials - exceeded) <= 1e-12 * trials, trials, exceeded)
     z = np.log(intensity)
     outcomes = Outcomes(z, exceeded, trials)
-    fault = probit.unidentified(outcomes, measure.shown)
-    if fault is not None:
-        raise Unfitted(f"no lognormal can be fitted to {name!r}: {fault}")
+    reason = probit.explain_missing_fit(outcomes, measure.shown)
+    if reason is not None:
+        raise Unfitted(f"no lognormal can be fitted to {name!r}: {reason}")
     fitted = probit.fit(outcomes.alone())
-    middle = float(-fitted.intercept[0] / fitted.slope[0])
-    if not z.min() - math.log(_FARTHEST) <= middle <= z.max() + math.log(_FARTHEST):
+    log_median = float(-fitted.intercept[0] / fitted.slope[0])
+    if not z.min() - math.log(_MAX_MEDIAN_RATIO) <= log_median <= z.max() + math.log(_MAX_MEDIAN_RATIO):
         raise Unfitted(
             f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, and put the median "
-            f"{'above' if middle > z.max() else 'below'} all intensities by a factor of more than 1000: motions nearer "
-            "to it, or another measure, are needed"
+            f"{'above' if log_median > z.max() else 'below'} all intensities by a factor of more than 1000: "
+            "motions nearer to it, or another measure, are needed"
         )
-    count = round(float(trials.sum())) if clusters is None else int(clusters.max()) + 1
-    independent = clusters is None or (count == z.size and bool(np.all(trials <= 1.0)))
+    cluster_count = round(float(trials.sum())) if clusters is None else int(clusters.max()) + 1
+    independent = clusters is None or (cluster_count == z.size and bool(np.all(trials <= 1.0)))
     return FragilityCurve(
         limit_state=name,
         limit=limit,
@@ -226,108 +230,116 @@ def fitted_curve(
         exceeded=exceeded,
         trials=trials,
         fitted=fitted,
-        covariance=probit.covariance(outcomes, fitted),
+        covariance=probit.compute_covariance(outcomes, fitted),
         confidence=confidence,
-        clusters=count,
+        clusters=cluster_count,
         independent=independent,
-        log_likelihood=float(probit.likelihood(outcomes.alone(), np.column_stack(fitted))[0]),
-        goodness=probit.goodness(outcomes, fitted, independent=independent),
-        region=probit.likely_region(outcomes, fitted, None if independent else clusters, confidence),
+        log_likelihood=float(probit.compute_log_likelihood(outcomes.alone(), np.column_stack(fitted))[0]),
+        goodness=probit.compute_goodness(outcomes, fitted, independent=independent),
+        region=probit.find_confidence_region(outcomes, fitted, None if independent else clusters, confidence),
     )
 
 
-def fragility_line(curve: FragilityCurve, intensity: Floats, measure: Measure) -> FragilityLine:
-    """Return curve, band, and observed shares of the groups of the test for a figure."""
+def create_fragility_line(curve: FragilityCurve, intensity: Floats, measure: Measure) -> FragilityLine:
+    """Create the line of a figure: curve, band, and observed shares in the groups of the test."""
     from rocking.plot.curves import FragilityLine
 
-    group = probit.groups(np.log(curve.intensity), curve.trials)
-    held = np.bincount(group, curve.trials).astype(np.float64)
-    at, seen = (np.bincount(group, sums) / held for sums in (curve.trials * curve.intensity, curve.exceeded))
+    groups = probit.group_outcomes(np.log(curve.intensity), curve.trials)
+    counts = np.bincount(groups, curve.trials).astype(np.float64)
+    mean_intensity, observed = (
+        np.bincount(groups, totals) / counts for totals in (curve.trials * curve.intensity, curve.exceeded)
+    )
     is_rotation = curve.limit is not None and math.isfinite(curve.limit)
-    limit = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
-    at_half = f"median {in_units(curve.median, measure)}, dispersion {curve.dispersion:.3g}"
-    chance = curve.probability(intensity)
-    band, scale = curve.band(intensity) if curve.bounded else (chance, chance), measure.scale
-    text = f"{curve.limit_state}{limit}: {at_half}"
-    return FragilityLine(text, scale * intensity, chance, *band, scale * at, seen)
+    limit_text = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
+    parameters = f"median {format_intensity(curve.median, measure)}, dispersion {curve.dispersion:.3g}"
+    probability = curve.probability(intensity)
+    band, scale = curve.band(intensity) if curve.bounded else (probability, probability), measure.scale
+    label = f"{curve.limit_state}{limit_text}: {parameters}"
+    return FragilityLine(label, scale * intensity, probability, *band, scale * mean_intensity, observed)
 
 
-def whole_numbers(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
-    """Return integers between two bounds, one for each intensity."""
-    given = checks.booleans_or_numbers(values, name, InvalidOption)
+def check_counts(values: ArrayLike, argument: str, size: int, minimum: float, maximum: ArrayLike) -> Floats:
+    """Check integers between two bounds, and return one for each intensity."""
+    array = checks.booleans_or_numbers(values, argument, InvalidOption)
     try:
-        numbers = np.broadcast_to(given, size)
+        numbers = np.broadcast_to(array, size)
     except ValueError:
-        raise InvalidOption(f"{{}} must hold one number for each of the {size} intensities", name) from None
-    if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
-        bound = f"{most:g}" if isinstance(most, float) else "the trials"
-        raise InvalidOption(f"{{}} must be whole numbers, at least {least:g} and no more than {bound}", name)
+        raise InvalidOption(f"{{}} must hold one number for each of the {size} intensities", argument) from None
+    if not np.all((numbers >= minimum) & (numbers <= np.asarray(maximum)) & (numbers == np.floor(numbers))):
+        maximum_text = f"{maximum:g}" if isinstance(maximum, float) else "the trials"
+        raise InvalidOption(
+            f"{{}} must be whole numbers, at least {minimum:g} and no more than {maximum_text}", argument
+        )
     return numbers
 
 
-def extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:
-    """Return lowest and highest quantities (fits, n) in a region of fits."""
+def find_extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:
+    """Find the lowest and the highest values of a quantity (fits, n) in a region of fits."""
     values = quantity(region)
     return values.min(axis=0), values.max(axis=0)
 
 
-def in_units(intensity: float, measure: Measure) -> str:
+def format_intensity(intensity: float, measure: Measure) -> str:
     """Format an intensity (SI) with its unit."""
     return f"{measure.scale * intensity:.4g} {measure.shown_in}".rstrip()
 
 
-def interval_text(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
+def format_interval(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
     """Format an interval, with bounds in place of finite ends beyond them."""
-    text = f"{{:.{digits}g}}".format
+    format_end = f"{{:.{digits}g}}".format
     return " to ".join(
-        "infinity" if math.isinf(end) else format_within(end, bounds if end else (0, 0), text) for end in ends
+        "infinity" if math.isinf(end) else format_within(end, bounds if end else (0, 0), format_end) for end in ends
     )
 
 
-def median_text(curve: FragilityCurve, scale: float) -> str:
+def format_median_interval(curve: FragilityCurve, scale: float) -> str:
     """Format the interval of the median, times a factor, without numbers too far from the data."""
-    bounds = scale * curve.intensity.min() / _FARTHEST, scale * curve.intensity.max() * _FARTHEST
-    return interval_text([scale * end for end in curve.median_interval], 4, bounds)
+    bounds = scale * curve.intensity.min() / _MAX_MEDIAN_RATIO, scale * curve.intensity.max() * _MAX_MEDIAN_RATIO
+    return format_interval([scale * end for end in curve.median_interval], 4, bounds)
 
 
-def _log_medians(fits: Probit) -> Floats:
-    """Logarithms of medians, shape (fits, 1), -inf or inf for level curves above or below one half."""
+def _compute_log_medians(fits: Probit) -> Floats:
+    """Compute logarithms of medians, shape (fits, 1), -inf or inf for level curves above or below one half."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        sloping = -fits.intercept / fits.slope
-    return np.where(fits.slope > 0.0, sloping, np.where(fits.intercept > 0.0, -np.inf, np.inf))[:, None]
+        log_medians = -fits.intercept / fits.slope
+    return np.where(fits.slope > 0.0, log_medians, np.where(fits.intercept > 0.0, -np.inf, np.inf))[:, None]
 
 
-def _dispersion(slope: float) -> float:
-    """Dispersion for a slope: 0 for a step, infinite for a level curve."""
+def _compute_dispersion(slope: float) -> float:
+    """Convert a slope to a dispersion: 0 for a step, infinite for a level curve."""
     if slope >= probit.STEEP:
         return 0.0
     return 1.0 / slope if slope > 0.0 else math.inf
 
 
-def _logarithm(intensity: Floats) -> Floats:
+def _compute_logarithm(intensity: Floats) -> Floats:
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(intensity))
 
 
-def fragility_model(
+def format_nrml(
     curves: Sequence[FragilityCurve],
-    imt: tuple[str, float],
-    valid: tuple[float, float],
+    measure: tuple[str, float],
+    data_range: tuple[float, float],
     no_damage: float | None,
     taxonomy: str,
     description: str,
-    **about: str,
+    **attributes: str,
 ) -> str:
-    """Create an OpenQuake fragility model (NRML 0.5) of one function from moments of the intensity.
+    """Format an OpenQuake fragility model (NRML 0.5) of one function from moments of the intensity.
 
-    `imt` contains OpenQuake's measure and the factor of its unit, `valid` the range (SI) of the data, `no_damage` the
-    lowest damaging intensity in OpenQuake's unit, and `about` the model's id, assetCategory and lossCategory.
+    `measure` contains OpenQuake's name and the factor of its unit, `data_range` the range (SI) of the data, `no_damage`
+    the lowest damaging intensity in OpenQuake's unit, and `attributes` the model's id, assetCategory and lossCategory.
     """
-    checks.choice(about["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
-    for what, name in (("taxonomy", taxonomy), ("model_id", about["id"]), ("asset_category", about["assetCategory"])):
-        check_names([name], what)
-    check_names([curve.limit_state for curve in curves], "a limit state")
-    low, high = (imt[1] * end for end in valid)
+    checks.choice(attributes["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
+    for argument, name in (
+        ("taxonomy", taxonomy),
+        ("model_id", attributes["id"]),
+        ("asset_category", attributes["assetCategory"]),
+    ):
+        check_nrml_names([name], argument)
+    check_nrml_names([curve.limit_state for curve in curves], "a limit state")
+    low, high = (measure[1] * end for end in data_range)
     low = max(low, no_damage or 0.0)
     if not high > low * (1.0 + 1e-5):
         raise InvalidOption(
@@ -335,38 +347,38 @@ def fragility_model(
             "intensity, or below the one that lifts the block"
         )
     root = ET.Element("nrml", {"xmlns": NAMESPACE})
-    model = ET.SubElement(root, "fragilityModel", about)
+    model = ET.SubElement(root, "fragilityModel", attributes)
     # The manual requires a brief string in ASCII.
     ET.SubElement(model, "description").text = description.encode("ascii", "replace").decode("ascii")
     ET.SubElement(model, "limitStates").text = " ".join(curve.limit_state for curve in curves)
-    kind = {"id": taxonomy, "format": "continuous", "shape": "logncdf"}
-    function = ET.SubElement(model, "fragilityFunction", kind)
-    levels = {"imt": imt[0]} | ({} if no_damage is None else {"noDamageLimit": f"{no_damage:.8g}"})
-    ET.SubElement(function, "imls", levels | {"minIML": f"{low:.8g}", "maxIML": f"{high:.8g}"})
+    function_attributes = {"id": taxonomy, "format": "continuous", "shape": "logncdf"}
+    function = ET.SubElement(model, "fragilityFunction", function_attributes)
+    level_attributes = {"imt": measure[0]} | ({} if no_damage is None else {"noDamageLimit": f"{no_damage:.8g}"})
+    ET.SubElement(function, "imls", level_attributes | {"minIML": f"{low:.8g}", "maxIML": f"{high:.8g}"})
     for curve in curves:
         variance = curve.dispersion**2
-        if variance > _WIDEST:
+        if variance > _MAX_VARIANCE:
             raise InvalidOption(f"a dispersion of {curve.dispersion:.3g} is too wide for the mean and stddev of NRML")
-        mean = imt[1] * curve.median * math.exp(0.5 * variance)
+        mean = measure[1] * curve.median * math.exp(0.5 * variance)
         moments = {"mean": f"{mean:.8g}", "stddev": f"{mean * math.sqrt(math.expm1(variance)):.8g}"}
         ET.SubElement(function, "params", {"ls": curve.limit_state} | moments)
     ET.indent(root)
     return f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, encoding='unicode')}\n"
 
 
-def check_names(names: Iterable[str], what: str) -> None:
+def check_nrml_names(names: Iterable[str], argument: str) -> None:
     """Raise an InvalidOption unless NRML allows all names."""
     for name in names:
-        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", checks.text(name, what, InvalidOption)):
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", checks.text(name, argument, InvalidOption)):
             raise InvalidOption(
                 f"{{}} of NRML may have letters, digits, dashes and underscores, and 100 of them at most, not {name!r}",
-                what,
+                argument,
                 value=name,
             )
 
 
-def openquake_measure(measure: Measure, block: Body | None, model: Model) -> tuple[str, float]:
-    """Return OpenQuake's measure, and the factor from SI units or the block's own (g, or cm/s for PGV).
+def find_openquake_measure(measure: Measure, block: Body | None, model: Model) -> tuple[str, float]:
+    """Find OpenQuake's measure, and the factor from SI units or the block's own (g, or cm/s for PGV).
 
     SA(T) does not state its damping, which is the damping of ground-motion models.
     """
@@ -374,9 +386,9 @@ def openquake_measure(measure: Measure, block: Body | None, model: Model) -> tup
         raise InvalidOption(
             f"{measure.name} counts in a block's own unit; give {{}} to write it as PGA or PGV", "block"
         )
-    own = 1.0 if block is None else float(units_of(block.alone(), measure, model)[0])
+    unit = 1.0 if block is None else float(compute_units(block.alone(), measure, model)[0])
     if measure.of_motion == "pgv":
-        return "PGV", 100.0 * own
+        return "PGV", 100.0 * unit
     if measure.damping != DAMPING:
         raise InvalidOption(
             f"the {{}} of OpenQuake's spectral accelerations is {DAMPING:g} of critical, not {measure.damping:g}: fit "
@@ -384,4 +396,4 @@ def openquake_measure(measure: Measure, block: Body | None, model: Model) -> tup
             "damping",
             value=measure.damping,
         )
-    return "PGA" if measure.of_motion == "pga" else f"SA({measure.period:g})", own / STANDARD_GRAVITY
+    return "PGA" if measure.of_motion == "pga" else f"SA({measure.period:g})", unit / STANDARD_GRAVITY

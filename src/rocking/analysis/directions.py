@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.levels import ratios_of
-from rocking.analysis.spectrum import overturned_share
+from rocking.analysis.levels import compute_ratios
+from rocking.analysis.spectrum import compute_overturned_share
 from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
@@ -97,33 +97,37 @@ def response_rose(
     --------
     >>> import rocking
     >>> pair = tuple(rocking.records.load(f"ridgecrest-tow2-{azimuth}") for azimuth in ("090", "360"))
-    >>> found = response_rose(rocking.Solid.from_mesh("statue"), [pair], azimuths=[0.0, 45.0, 90.0])
-    >>> found.data.overturned.values[0, 0].tolist()
+    >>> rose = response_rose(rocking.Solid.from_mesh("statue"), [pair], azimuths=[0.0, 45.0, 90.0])
+    >>> rose.data.overturned.values[0, 0].tolist()
     [False, False, False]
     """
     import xarray as xr
 
     if not isinstance(solid, Solid):
         raise InvalidBlock(f"a Solid is needed, not a {type(solid).__name__}: make one with rocking.Solid.from_mesh")
-    named = _named_pairs(pairs)
-    at = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
+    named_pairs = _name_pairs(pairs)
+    angles = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
     scales = Scales.from_levels(levels, measure)
-    blocks = [solid.block(azimuth, restitution=restitution) for azimuth in at]
-    factors = np.array([_factors(scales, pair) for pair in named.values()])
-    shape = (len(named), scales.count, len(at))
+    blocks = [solid.block(azimuth, restitution=restitution) for azimuth in angles]
+    factors = np.array([_compute_pair_factors(scales, pair) for pair in named_pairs.values()])
+    shape = (len(named_pairs), scales.count, len(angles))
     peak, overturned = np.empty(shape), np.empty(shape, bool)
-    with Progress("simulating", total=len(at)) as bar:
-        for k, (azimuth, block) in enumerate(zip(at.tolist(), blocks, strict=True)):
-            along = [one.rotated(other, azimuth, recorded=recorded) for one, other in named.values()]
+    with Progress("simulating", total=len(angles)) as bar:
+        for k, (azimuth, block) in enumerate(zip(angles.tolist(), blocks, strict=True)):
+            components = [first.rotated(second, azimuth, recorded=recorded) for first, second in named_pairs.values()]
             motions = [
-                motion.scaled(factor) for motion, own in zip(along, factors, strict=True) for factor in own.tolist()
+                motion.scaled(factor)
+                for motion, pair_factors in zip(components, factors, strict=True)
+                for factor in pair_factors.tolist()
             ]
-            found = simulate_many(block, motions, model=model, chattering=chattering)
-            fell = found.overturned.values
-            ratio = ratios_of(found.peak_rotation.values, fell, found.unfinished.values, min(block.balance))
-            overturned[..., k], peak[..., k] = fell.reshape(shape[:2]), ratio.reshape(shape[:2])
+            table = simulate_many(block, motions, model=model, chattering=chattering)
+            is_overturned = table.overturned.values
+            ratio = compute_ratios(
+                table.peak_rotation.values, is_overturned, table.unfinished.values, min(block.balance)
+            )
+            overturned[..., k], peak[..., k] = is_overturned.reshape(shape[:2]), ratio.reshape(shape[:2])
             bar.advance()
-    anywhere = np.where(overturned.any(axis=2), np.inf, peak.max(axis=2))
+    worst_peak = np.where(overturned.any(axis=2), np.inf, peak.max(axis=2))
     dims = ("pair", "level", "azimuth")
     return ResponseRose(
         xr.Dataset(
@@ -133,16 +137,18 @@ def response_rose(
                     dims, peak, "largest rotation over the smaller slenderness; inf: overturns, NaN: not finished", "1"
                 ),
                 "overturned_share": variable(
-                    dims[1:], overturned_share(peak), "share of the pairs that overturn the body", "1"
+                    dims[1:], compute_overturned_share(peak), "share of the pairs that overturn the body", "1"
                 ),
-                "anywhere": variable("level", overturned_share(anywhere), "share that does at any azimuth", "1"),
+                "anywhere": variable(
+                    "level", compute_overturned_share(worst_peak), "share that does at any azimuth", "1"
+                ),
             },
             {
-                "pair": [*named],
+                "pair": [*named_pairs],
                 "level": variable(
                     "level", scales.values, "of the geometric mean of both components", scales.about["units"]
                 ),
-                "azimuth": variable("azimuth", at, "clockwise from north", "deg"),
+                "azimuth": variable("azimuth", angles, "clockwise from north", "deg"),
             },
             {"description": solid.description, "model": model, "measure": (scales.measure or FACTOR).quantity},
         )
@@ -173,10 +179,10 @@ class ResponseRose(DatasetResult):
 
     def _headline(self) -> str:
         data = self.data
-        over = f"{format_count(data.sizes['pair'], 'pair')}, {format_count(data.sizes['azimuth'], 'azimuth')}"
-        return f"{data.description}, {data.model} model: share overturned, {over}"
+        counts = f"{format_count(data.sizes['pair'], 'pair')}, {format_count(data.sizes['azimuth'], 'azimuth')}"
+        return f"{data.description}, {data.model} model: share overturned, {counts}"
 
-    def _levels(self) -> list[str]:
+    def _format_levels(self) -> list[str]:
         """Format the levels."""
         data = self.data
         unit = data.level.attrs.get("units", "1")
@@ -187,11 +193,13 @@ class ResponseRose(DatasetResult):
     def summary(self) -> str:
         data = self.data
         rows = []
-        for k, name in enumerate(self._levels()):
-            share = data.overturned_share.values[k]
-            most = data.azimuth.values[share == share.max()]
-            where = f"{most[0]:g} deg" if len(most) == 1 else f"{len(most)} azimuths"
-            rows.append([name, share.min(), share.max(), where, float(data.anywhere[k])])
+        for k, name in enumerate(self._format_levels()):
+            shares = data.overturned_share.values[k]
+            worst_azimuths = data.azimuth.values[shares == shares.max()]
+            azimuth_text = (
+                f"{worst_azimuths[0]:g} deg" if len(worst_azimuths) == 1 else f"{len(worst_azimuths)} azimuths"
+            )
+            rows.append([name, shares.min(), shares.max(), azimuth_text, float(data.anywhere[k])])
         table = format_table(["level", "least share", "largest share", "at", "at any azimuth"], rows)
         missing = missing_text(np.isnan(data.peak_over_slenderness.values))
         return f"{self._headline()}\n\n{table}" + f"\nnote: {missing}" * bool(missing)
@@ -205,50 +213,50 @@ class ResponseRose(DatasetResult):
             "pairs": [str(name) for name in data.pair.values],
             "levels": data.level.values.tolist(),
             "azimuths_deg": data.azimuth.values.tolist(),
-            **{str(name): each.values.tolist() for name, each in data.data_vars.items()},
+            **{str(name): values.values.tolist() for name, values in data.data_vars.items()},
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.core.arrays import select_evenly
-        from rocking.plot.maps import shares_figure
+        from rocking.plot.maps import draw_shares
 
         data = self.data
-        chosen = [*select_evenly(data.sizes["level"], 4)]
+        indices = [*select_evenly(data.sizes["level"], 4)]
         azimuth = data.azimuth.values
         # An opposite azimuth that was not requested has the same outcome.
         opposite = np.mod(azimuth + 180.0, 360.0)
-        new = ~np.isin(opposite, azimuth)
-        around = np.concatenate([azimuth, opposite[new]])
-        order = np.argsort(around)
-        shares = data.overturned_share.values[chosen]
-        names = self._levels()
-        return shares_figure(
-            azimuth=around[order],
-            shares=np.concatenate([shares, shares[:, new]], axis=1)[:, order],
-            labels=[names[k] for k in chosen],
+        is_new = ~np.isin(opposite, azimuth)
+        full_circle = np.concatenate([azimuth, opposite[is_new]])
+        order = np.argsort(full_circle)
+        shares = data.overturned_share.values[indices]
+        level_names = self._format_levels()
+        return draw_shares(
+            azimuth=full_circle[order],
+            shares=np.concatenate([shares, shares[:, is_new]], axis=1)[:, order],
+            labels=[level_names[k] for k in indices],
             title=title or escape_dollars(self._headline()),
             ax=ax,
             figsize=figsize,
         )
 
 
-def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
-    """Return pairs by name, or raise an error if one is not a pair of motions."""
-    given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.items(pairs, "pairs", InvalidOption)
-    found = [list_motions(pair) for pair in given if not isinstance(pair, Motion)]
-    if not found or len(found) < len(given) or any(len(components) != 2 for components in found):
+def _name_pairs(pairs: Pairs) -> dict[str, Pair]:
+    """Name pairs, or raise an error if one is not a pair of motions."""
+    entries = [*pairs.values()] if isinstance(pairs, Mapping) else checks.items(pairs, "pairs", InvalidOption)
+    lists = [list_motions(pair) for pair in entries if not isinstance(pair, Motion)]
+    if not lists or len(lists) < len(entries) or any(len(components) != 2 for components in lists):
         raise InvalidOption(
             "{} must hold the two horizontal components of each place, as [(first, second)]", "pairs", value=pairs
         )
-    names = [f"{one.name} and {other.name}" for one, other in found]
-    numbered = [f"{name} #{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
-    both = ((one, other) for one, other in found)
-    return dict(zip(map(str, pairs) if isinstance(pairs, Mapping) else numbered, both, strict=True))
+    names = [f"{first.name} and {second.name}" for first, second in lists]
+    unique_names = [f"{name} #{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
+    motion_pairs = ((first, second) for first, second in lists)
+    return dict(zip(map(str, pairs) if isinstance(pairs, Mapping) else unique_names, motion_pairs, strict=True))
 
 
-def _factors(scales: Scales, pair: Pair) -> Any:
-    """Return factors that scale the geometric mean of the measures of both components to the levels."""
+def _compute_pair_factors(scales: Scales, pair: Pair) -> Any:
+    """Compute factors that scale the geometric mean of the measures of both components to the levels."""
     if scales.measure is None:
         return scales.values
-    one, other = (scales.measure.positive(motion, motion.name) for motion in pair)
-    return scales.values / np.sqrt(one * other)
+    first, second = (scales.measure.positive(motion, motion.name) for motion in pair)
+    return scales.values / np.sqrt(first * second)

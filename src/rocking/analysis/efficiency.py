@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import (
     MIRROR_NOTE,
-    clusters_of,
-    families_of,
-    motions_in_words,
-    normalised_weights,
-    pooled,
-    units_of,
-    values_of,
+    compute_intensities,
+    compute_units,
+    describe_pool,
+    describe_sample,
+    normalise_weights,
+    number_clusters,
+    number_families,
 )
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
@@ -100,34 +100,41 @@ def compare_measures(
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=0.5, alpha=0.1, restitution=0.5)
     >>> pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.05, 0.1, 0.2)]
-    >>> found = compare_measures(block, pulses, periods=[1.0])
-    >>> [f"{name} {beta:.2f}" for name, beta in zip(found.data.measure.values, found.data.dispersion.values)]
+    >>> comparison = compare_measures(block, pulses, periods=[1.0])
+    >>> [f"{name} {beta:.2f}" for name, beta in zip(comparison.data.measure.values, comparison.data.dispersion.values)]
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
     """
-    many, shaken = bodies_of(blocks), list_motions(motions)
-    slenderness_of(many)  # raise errors before the simulations
-    shares = normalised_weights(weights, len(many))
-    if len(shaken) < 2:
-        raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
-    times = checks.positive_numbers(periods, "periods", InvalidOption)
-    of_periods = [Measure("sa", float(time), damping) for time in times]
-    measures = [Measure("pga"), Measure("pgv"), *of_periods, Measure("pga_ratio"), Measure("pgv_ratio")]
-    together = clusters_of(shaken, clusters)
-    _check_enough(len(np.unique(together)), clusters)
-    scaled = incremental_dynamic_analysis(many, shaken, measure="pga_ratio", model=model, rtol=rtol)
-    level = scaled.data.overturning_level.transpose("motion", "block").values
-    factors = level * units_of(many, measures[-2], model) / values_of(shaken, measures[0])[:, None]
-    intensity = [factors * values_of(shaken, each)[:, None] / units_of(many, each, model) for each in measures]
-    families = families_of(shaken, reversed_too=many.is_symmetric)
-    is_first = np.isin(np.arange(len(shaken)), np.unique(families, return_index=True)[1])
-    counts = is_first[:, None] & np.isfinite(level)
-    sizes = [len(np.unique(together[overturns])) for overturns in counts[:, shares > 0.0].T]
-    _check_enough(min(sizes), clusters)
-    found = _dataset(measures, np.array(intensity), counts, shares, freedom=min(sizes) - 1)
-    about = {"blocks": pooled(blocks, weights), "model": model, "damping": damping}
-    about["sample"] = motions_in_words(together, clusters)
-    named = {name: scaled.data[name] for name in ("motion", "vertical") if name in scaled.data.coords}
-    return MeasureComparison(found.assign_coords(named).assign_attrs(about, sides_differ=scaled.data.sides_differ))
+    bodies, motions = bodies_of(blocks), list_motions(motions)
+    slenderness_of(bodies)  # raise errors before the simulations
+    block_weights = normalise_weights(weights, len(bodies))
+    if len(motions) < 2:
+        raise InvalidOption("{} must contain two motions or more for a comparison of measures; got one", "motions")
+    period_values = checks.positive_numbers(periods, "periods", InvalidOption)
+    spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
+    measures = [Measure("pga"), Measure("pgv"), *spectral_measures, Measure("pga_ratio"), Measure("pgv_ratio")]
+    cluster_numbers = number_clusters(motions, clusters)
+    _check_sample_size(len(np.unique(cluster_numbers)), clusters)
+    analysis = incremental_dynamic_analysis(bodies, motions, measure="pga_ratio", model=model, rtol=rtol)
+    levels = analysis.data.overturning_level.transpose("motion", "block").values
+    factors = levels * compute_units(bodies, measures[-2], model) / compute_intensities(motions, measures[0])[:, None]
+    intensity = [
+        factors * compute_intensities(motions, measure)[:, None] / compute_units(bodies, measure, model)
+        for measure in measures
+    ]
+    families = number_families(motions, reversed_too=bodies.is_symmetric)
+    is_first = np.isin(np.arange(len(motions)), np.unique(families, return_index=True)[1])
+    is_counted = is_first[:, None] & np.isfinite(levels)
+    cluster_counts = [len(np.unique(cluster_numbers[overturns])) for overturns in is_counted[:, block_weights > 0.0].T]
+    _check_sample_size(min(cluster_counts), clusters)
+    dataset = _combine_dispersions(
+        measures, np.array(intensity), is_counted, block_weights, dof=min(cluster_counts) - 1
+    )
+    attributes = {"blocks": describe_pool(blocks, weights), "model": model, "damping": damping}
+    attributes["sample"] = describe_sample(cluster_numbers, clusters)
+    coordinates = {name: analysis.data[name] for name in ("motion", "vertical") if name in analysis.data.coords}
+    return MeasureComparison(
+        dataset.assign_coords(coordinates).assign_attrs(attributes, sides_differ=analysis.data.sides_differ)
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -158,32 +165,32 @@ class MeasureComparison(DatasetResult):
     POOLED = ("motion", "block")
 
     @property
-    def _ranked(self) -> pd.DataFrame:
+    def _ranked_table(self) -> pd.DataFrame:
         """Table of measures, the most efficient first."""
         table = self.data[list(self.TABLES["measures"])].to_dataframe()
         return table.sort_values("dispersion_of_all", kind="stable")
 
     def summary(self) -> str:
-        data, table = self.data, self._ranked
-        several, best = data.sizes["block"] > 1, table.dispersion_of_all.min()
+        data, table = self.data, self._ranked_table
+        is_pooled, min_dispersion = data.sizes["block"] > 1, table.dispersion_of_all.min()
         rows = [
             [
-                one.Index,
-                f"{one.median_intensity:.3g} {one.unit}".removesuffix(" 1"),
-                f"{one.dispersion:.3f}",
-                f"{one.dispersion_low:.3f} to {one.dispersion_high:.3f}",
-                *([f"{one.dispersion_of_all:.3f}"] if several else []),
-                f"{one.dispersion_of_all / best:.2f}" if best > 0.0 else "-",
+                row.Index,
+                f"{row.median_intensity:.3g} {row.unit}".removesuffix(" 1"),
+                f"{row.dispersion:.3f}",
+                f"{row.dispersion_low:.3f} to {row.dispersion_high:.3f}",
+                *([f"{row.dispersion_of_all:.3f}"] if is_pooled else []),
+                f"{row.dispersion_of_all / min_dispersion:.2f}" if min_dispersion > 0.0 else "-",
             ]
-            for one in table.itertuples()
+            for row in table.itertuples()
         ]
-        head = f"{data.blocks}, {data.model} model: intensities at which {data.sample} overturn"
-        columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if several else [])]
-        text = [head, "", format_table([*columns, "over the best"], rows)]
+        headline = f"{data.blocks}, {data.model} model: intensities at which {data.sample} overturn"
+        columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if is_pooled else [])]
+        lines = [headline, "", format_table([*columns, "over the best"], rows)]
         if missing := int(np.sum(np.isnan(data.intensity.values[0]))):
             pairs = format_count(missing, "pair")
-            text.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
-        return "\n".join(text + ([f"note: {MIRROR_NOTE}"] if data.sides_differ else []))
+            lines.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
+        return "\n".join(lines + ([f"note: {MIRROR_NOTE}"] if data.sides_differ else []))
 
     def to_dict(self) -> dict[str, Any]:
         data, names = self.data, self.TABLES["measures"]
@@ -194,14 +201,14 @@ class MeasureComparison(DatasetResult):
             "damping": data.damping,
             "motions": [str(name) for name in data.motion.values],
             **({"verticals": [str(name) for name in data.vertical.values]} if "vertical" in data.coords else {}),
-            "measures": [{**row, "intensity": each} for row, each in zip(rows, data.intensity.values, strict=True)],
+            "measures": [{**row, "intensity": values} for row, values in zip(rows, data.intensity.values, strict=True)],
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import dispersions_figure
+        from rocking.plot.curves import draw_dispersions
 
-        data, table = self.data, self._ranked
-        return dispersions_figure(
+        data, table = self.data, self._ranked_table
+        return draw_dispersions(
             names=[str(name) for name in table.index],
             dispersion=table.dispersion.to_numpy(),
             low=table.dispersion_low.to_numpy(),
@@ -212,42 +219,45 @@ class MeasureComparison(DatasetResult):
         )
 
 
-def _dataset(
-    measures: Sequence[Measure], intensity: Floats, counts: Flags, shares: Floats, *, freedom: int
+def _combine_dispersions(
+    measures: Sequence[Measure], intensity: Floats, is_counted: Flags, block_weights: Floats, *, dof: int
 ) -> xr.Dataset:
     """Combine intensities at overturning (measure, motion, block) with the dispersions of valid ones."""
     import xarray as xr
     from scipy.special import chdtri
 
-    logarithm = np.where(counts, np.log(intensity), np.nan)
-    weight, count = np.where(counts, shares, 0.0), counts.sum(axis=0)
+    logarithm = np.where(is_counted, np.log(intensity), np.nan)
+    weight, count = np.where(is_counted, block_weights, 0.0), is_counted.sum(axis=0)
     # The sample consists of motions, which are the same for several blocks.
-    others = np.sum(shares * (count - 1))
-    within = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
-    own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / others)
+    total_dof = np.sum(block_weights * (count - 1))
+    deviation = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
+    dispersion = np.sqrt(np.nansum(weight * deviation**2, axis=(1, 2)) / total_dof)
     mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
-    of_all = np.sqrt(np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / others)
+    pooled = np.sqrt(np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / total_dof)
     # Ratios of the ends of the interval to the standard deviation, for a normal sample.
-    low, high = (float(np.sqrt(freedom / chdtri(freedom, tail))) * own for tail in (0.05, 0.95))
+    low, high = (float(np.sqrt(dof / chdtri(dof, tail))) * dispersion for tail in (0.05, 0.95))
     spread = "standard deviation of the logarithm of the intensity at overturning"
-    median = "median of the intensities at overturning, in the measure's unit"
+    median_text = "median of the intensities at overturning, in the measure's unit"
     return xr.Dataset(
         {
             "intensity": variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
-            "median_intensity": variable("measure", np.exp(mean), median),
-            "dispersion": variable("measure", own, f"{spread} about each block's own mean", "1"),
+            "median_intensity": variable("measure", np.exp(mean), median_text),
+            "dispersion": variable("measure", dispersion, f"{spread} about each block's own mean", "1"),
             "dispersion_low": variable("measure", low, "lower end of its interval", "1"),
             "dispersion_high": variable("measure", high, "upper end of its interval", "1"),
-            "dispersion_of_all": variable("measure", of_all, f"{spread} about one mean of all blocks", "1"),
+            "dispersion_of_all": variable("measure", pooled, f"{spread} about one mean of all blocks", "1"),
         },
-        {"measure": [each.short_name for each in measures], "unit": ("measure", [each.units for each in measures])},
+        {
+            "measure": [measure.short_name for measure in measures],
+            "unit": ("measure", [measure.units for measure in measures]),
+        },
     )
 
 
-def _check_enough(count: int, clusters: object) -> None:
+def _check_sample_size(count: int, clusters: object) -> None:
     """Raise an error for a sample of one cluster, or of one motion without clusters."""
     if count < 2:
-        kind, which = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
+        argument, kind = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
         raise InvalidOption(
-            f"fewer than two {{}}{which} overturn a block, however strong; a dispersion needs more", kind
+            f"fewer than two {{}}{kind} overturn a block, however strong; a dispersion needs more", argument
         )

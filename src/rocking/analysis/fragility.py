@@ -14,35 +14,35 @@ from numpy.typing import ArrayLike
 from rocking.analysis.curve import (
     FragilityCurve,
     LossCategory,
-    fitted_curve,
-    fragility_line,
-    fragility_model,
-    in_units,
-    interval_text,
-    median_text,
-    openquake_measure,
-    whole_numbers,
+    check_counts,
+    create_fragility_line,
+    find_openquake_measure,
+    fit_curve,
+    format_intensity,
+    format_interval,
+    format_median_interval,
+    format_nrml,
 )
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
-    by_limit_state,
-    checked_limit_states,
-    clusters_of,
-    groups_of,
-    motions_in_words,
-    of_polarities,
-    outcomes_of,
-    passed,
-    pooled,
-    ratios_of,
+    check_limit_states,
+    check_state_mapping,
+    compute_intensities,
+    compute_ratios,
+    compute_units,
+    create_outcome_table,
+    describe_polarities,
+    describe_pool,
+    describe_sample,
+    describe_undecided,
+    exceeds_limit,
+    find_single_block,
+    normalise_positive_weights,
+    number_clusters,
+    number_groups,
     simulate_levels,
-    single_block,
-    undecided_text,
-    units_of,
-    values_of,
-    weights_of,
 )
-from rocking.analysis.risk import Risk, Survival, mean_of_blocks, risk_of
+from rocking.analysis.risk import Risk, Survival, compute_mean_survival, compute_risk
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY, Model
@@ -131,9 +131,9 @@ class Fragility(Result):
                 curve.limit_state,
                 f"{curve.exceeded.sum():.0f} of {curve.trials.sum():.0f}",
                 scale * curve.median,
-                median_text(curve, scale),
+                format_median_interval(curve, scale),
                 curve.dispersion,
-                interval_text(curve.dispersion_interval, 3),
+                format_interval(curve.dispersion_interval, 3),
                 float(f"{curve.goodness.p_value:.2g}"),
             ]
             for curve in self.curves
@@ -153,7 +153,7 @@ class Fragility(Result):
                 + spell(Message('{} "both" counts both', ("polarity",)))
             )
         if not self.curves[0].bounded:
-            notes.append(f"intervals and bands go from 0 to infinity: {self._too_few}")
+            notes.append(f"intervals and bands go from 0 to infinity: {self._few_clusters_text}")
         independent = self.curves[0].independent
         notes += [
             f"{curve.limit_state}: intervals without an end say that the data allow a curve which does not rise with "
@@ -171,7 +171,7 @@ class Fragility(Result):
         return tuple(notes)
 
     @property
-    def _too_few(self) -> str:
+    def _few_clusters_text(self) -> str:
         count = format_count(self.curves[0].clusters, self.source)
         return f"{count} cannot tell how far {self.source}s differ; give 3 or more"
 
@@ -188,8 +188,9 @@ class Fragility(Result):
 
     def _headline(self) -> str:
         curves = ", ".join(
-            f"{one.limit_state}: median {in_units(one.median, self.measure)}, dispersion {one.dispersion:.3g}"
-            for one in self.curves
+            f"{curve.limit_state}: median {format_intensity(curve.median, self.measure)}, "
+            f"dispersion {curve.dispersion:.3g}"
+            for curve in self.curves
         )
         return f"{self.description}; {self.measure.label}; {curves}"
 
@@ -204,7 +205,7 @@ class Fragility(Result):
         The integral of rate(x) dP(x) over all intensities x is evaluated in closed form. For a single power k it equals
         rate(median) exp((k dispersion)^2/2) (Cornell).
         """
-        return risk_of(self.curves, hazard, self.measure, self.description)
+        return compute_risk(self.curves, hazard, self.measure, self.description)
 
     def survival(
         self,
@@ -239,23 +240,26 @@ class Fragility(Result):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        found = Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
+        survival = Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
         if hazard is None or not self.several_blocks or self.outcomes is None:
-            return found
-        mean = mean_of_blocks(self.outcomes, self.measure.column, limit_state, hazard, found.years)
-        return replace(found, mean_probability=mean)
+            return survival
+        mean = compute_mean_survival(self.outcomes, self.measure.column, limit_state, hazard, survival.years)
+        return replace(survival, mean_probability=mean)
 
     @property
     def range(self) -> tuple[float, float]:
         """Lowest and highest intensity of the data, in SI units or a block's own."""
-        held = np.concatenate([curve.intensity for curve in self.curves])
-        return float(held.min()), float(held.max())
+        intensities = np.concatenate([curve.intensity for curve in self.curves])
+        return float(intensities.min()), float(intensities.max())
 
     def _columns(self, table: str) -> list[Column]:
         if table == "curves":
-            at = np.linspace(0.0, self.range[1], _POINTS)
-            values = np.concatenate([[at, curve.probability(at), *curve.band(at)] for curve in self.curves], axis=1)
-            names = [curve.limit_state for curve in self.curves for _ in at]
+            intensities = np.linspace(0.0, self.range[1], _POINTS)
+            values = np.concatenate(
+                [[intensities, curve.probability(intensities), *curve.band(intensities)] for curve in self.curves],
+                axis=1,
+            )
+            names = [curve.limit_state for curve in self.curves for _ in intensities]
             columns = zip((self.measure.column, "probability", "lower", "upper"), values, strict=True)
             return [Column("limit_state", names), *(Column(name, column) for name, column in columns)]
         if self.outcomes is None:
@@ -297,29 +301,29 @@ class Fragility(Result):
         """
         if block is not None:
             bodies_of(block)
-        chosen = self.block if block is None else block
-        imt = openquake_measure(self.measure, chosen, self.model)
-        lifting = None
-        if chosen is not None and imt[0] == "PGA" and not self.with_vertical:
-            lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
-        about = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
-        write_text(path, fragility_model(self.curves, imt, self.range, lifting, taxonomy, self.description, **about))
+        unit_block = self.block if block is None else block
+        imt = find_openquake_measure(self.measure, unit_block, self.model)
+        no_damage = None
+        if unit_block is not None and imt[0] == "PGA" and not self.with_vertical:
+            no_damage = min(unit_block.uplift_thresholds(self.model)) / STANDARD_GRAVITY
+        attributes = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
+        write_text(path, format_nrml(self.curves, imt, self.range, no_damage, taxonomy, self.description, **attributes))
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import fragility_figure
+        from rocking.plot.curves import draw_fragility
 
-        first = self.curves[0]
-        band_text = f"band: {100 * first.confidence:g} % confidence (likelihood)"
-        if not first.bounded:
-            band_text = f"no band: {self._too_few}"
+        first_curve = self.curves[0]
+        band_label = f"band: {100 * first_curve.confidence:g} % confidence (likelihood)"
+        if not first_curve.bounded:
+            band_label = f"no band: {self._few_clusters_text}"
         intensity = np.linspace(0.0, self.range[1], _POINTS)
-        states = [curve.limit_state for curve in self.curves]
-        return fragility_figure(
-            lines=[fragility_line(curve, intensity, self.measure) for curve in self.curves],
+        limit_states = [curve.limit_state for curve in self.curves]
+        return draw_fragility(
+            lines=[create_fragility_line(curve, intensity, self.measure) for curve in self.curves],
             intensity_label=self.measure.label,
-            band_label=band_text,
-            probability_label=f"probability of {'' if states == ['overturning'] else 'exceeding '}"
-            + (states[0] if len(states) == 1 else "the limit state"),
+            band_label=band_label,
+            probability_label=f"probability of {'' if limit_states == ['overturning'] else 'exceeding '}"
+            + (limit_states[0] if len(limit_states) == 1 else "the limit state"),
             title=title or escape_dollars(self.description),
             ax=ax,
             figsize=figsize,
@@ -395,60 +399,67 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    many, how = bodies_of(blocks), Measure.parse(measure)
-    slenderness = slenderness_of(many)
-    shares = weights_of(weights, len(many))
-    mirrored = checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
+    bodies, measure = bodies_of(blocks), Measure.parse(measure)
+    slenderness = slenderness_of(bodies)
+    block_weights = normalise_positive_weights(weights, len(bodies))
+    mirrored = checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and bodies.is_symmetric
     checks.fraction(confidence, "confidence", InvalidOption)
-    states = checked_limit_states(limit_states)
+    states = check_limit_states(limit_states)
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
-        raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
-    shaken = list_motions(motions)
-    values, together, units = values_of(shaken, how), clusters_of(shaken, clusters), units_of(many, how, model)
+        raise InvalidOption(f"{{}} must contain two levels or more; got {stripes.size}", "levels", value=levels)
+    motions = list_motions(motions)
+    values, cluster_numbers, units = (
+        compute_intensities(motions, measure),
+        number_clusters(motions, clusters),
+        compute_units(bodies, measure, model),
+    )
     options: dict[str, Any] = {"chattering": chattering}
     options["polarity"] = "+" if mirrored else polarity
     if stripes is None:
-        table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
+        table = simulate_many(bodies, motions, model=model, **options).expand_dims("level")
         intensity = (values[:, None] / units)[None, :, :, None]
     else:
-        table = simulate_levels(many, shaken, how, stripes, model=model, **options)
+        table = simulate_levels(bodies, motions, measure, stripes, model=model, **options)
         intensity = stripes[:, None, None, None]
     table = table if "polarity" in table.dims else table.expand_dims("polarity")
     table = table.transpose("level", "motion", "block", "polarity")
     missing = table.unfinished.values
-    ratio = ratios_of(table.peak_rotation.values, table.overturned.values, missing, slenderness[:, None])
-    groups = np.broadcast_to(together[None, :, None, None], ratio.shape)
-    x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
-    outcomes = outcomes_of(table, how, x, ratio, states)
+    ratio = compute_ratios(table.peak_rotation.values, table.overturned.values, missing, slenderness[:, None])
+    trial_clusters = np.broadcast_to(cluster_numbers[None, :, None, None], ratio.shape)
+    x, trials = (np.broadcast_to(array, ratio.shape).ravel() for array in (intensity, block_weights[:, None]))
+    outcomes = create_outcome_table(table, measure, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
     # Abandoned simulations and blocks of weight 0 are reported, but excluded from the fit.
-    counts = (trials > 0.0) & ~missing.ravel()
-    x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
-    data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
+    is_counted = (trials > 0.0) & ~missing.ravel()
+    x, trials, trial_clusters = (x[is_counted], trials[is_counted], trial_clusters.ravel()[is_counted])
+    data = {
+        name: (x, trials * exceeds_limit(ratio, limit, name).ravel()[is_counted], trials)
+        for name, limit in states.items()
+    }
     try:
-        curves = [fitted_curve(name, data[name], groups, confidence, how, states[name]) for name in states]
-    except Unfitted as refused:
-        refused.outcomes = outcomes
+        curves = [fit_curve(name, data[name], trial_clusters, confidence, measure, states[name]) for name in states]
+    except Unfitted as error:
+        error.outcomes = outcomes
         raise
     scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
     factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
-    setup = Setup(many, model, chattering_scheme(chattering))
+    setup = Setup(bodies, model, chattering_scheme(chattering))
     kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
-    text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
+    text = f"{describe_pool(blocks, weights)}, {describe_sample(cluster_numbers, clusters)}, {kind}, {model} model"
     return Fragility(
         curves=tuple(curves),
-        measure=how,
-        description=text + of_polarities(polarity, is_symmetric=many.is_symmetric),
-        block=single_block(blocks),
+        measure=measure,
+        description=text + describe_polarities(polarity, is_symmetric=bodies.is_symmetric),
+        block=find_single_block(blocks),
         model=model,
         outcomes=outcomes,
-        one_way=polarity != "both" and not many.is_symmetric,
+        one_way=polarity != "both" and not bodies.is_symmetric,
         with_vertical="vertical" in table.coords,
-        several_blocks=bool(np.count_nonzero(shares) > 1),
+        several_blocks=bool(np.count_nonzero(block_weights) > 1),
         source="motion" if clusters is None else "cluster",
-        undecided=undecided_text(setup, shaken, factors, table.overturned.values),
+        undecided=describe_undecided(setup, motions, factors, table.overturned.values),
         missing=missing_text(missing),
     )
 
@@ -502,7 +513,7 @@ def fit_fragility(
 
     Notes
     -----
-    The likelihood of P = Phi(ln(x/median)/dispersion) assumes independent binomial counts (Baker 2015).
+    The likelihood of P = Phi(ln(x/median)/dispersion) assumes independent binomial counts :cite:p:`baker2015`.
 
     References
     ----------
@@ -515,16 +526,16 @@ def fit_fragility(
     >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
     median 3.1509 m/s^2, dispersion 0.3042
     """
-    how = Measure.parse(measure)
+    measure = Measure.parse(measure)
     x = checks.positive_numbers(intensity, "intensity", InvalidOption)
     for end in (x.min(), x.max()):
         checks.between(float(end), "intensity", InvalidOption, 1e-50, 1e50)
-    count = whole_numbers(trials, "trials", x.size, 1.0, 2.0**53)
-    outcomes = by_limit_state(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
-    groups = None if clusters is None else groups_of(clusters, "clusters", x.size)
+    counts = check_counts(trials, "trials", x.size, 1.0, 2.0**53)
+    outcomes = check_state_mapping(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
+    groups = None if clusters is None else number_groups(clusters, "clusters", x.size)
     checks.fraction(confidence, "confidence", InvalidOption)
     curves = [
-        fitted_curve(name, (x, whole_numbers(values, "exceeded", x.size, 0.0, count), count), groups, confidence, how)
+        fit_curve(name, (x, check_counts(values, "exceeded", x.size, 0.0, counts), counts), groups, confidence, measure)
         for name, values in outcomes.items()
     ]
-    return Fragility(tuple(curves), how, description, block, "nonlinear", None, source="cluster")
+    return Fragility(tuple(curves), measure, description, block, "nonlinear", None, source="cluster")

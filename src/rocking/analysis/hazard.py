@@ -37,14 +37,14 @@ HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
 }
 
 #: OpenQuake's names of intensities: measure and factor to SI units.
-_OPENQUAKE: Final[dict[str, tuple[IntensityName, float]]] = {
+_OPENQUAKE_MEASURES: Final[dict[str, tuple[IntensityName, float]]] = {
     "PGA": ("pga", STANDARD_GRAVITY),
     "PGV": ("pgv", 0.01),
     "SA": ("sa", STANDARD_GRAVITY),
 }
 
 
-_ROOT: Final = math.sqrt(0.5)
+_SQRT_HALF: Final = math.sqrt(0.5)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,8 +97,8 @@ class HazardCurve(Result):
             )
         _check_order("intensities", intensity, 1.0)
         _check_order("rates", rate, -1.0)
-        given: Any = self.measure
-        measure = Measure.parse(given)
+        measure_input: Any = self.measure
+        measure = Measure.parse(measure_input)
         if measure.units == "1":
             raise InvalidOption("a hazard curve is of pga, pgv or sa, which are of the site, not of a block")
         for name, value in (("intensity", intensity), ("rate", rate), ("measure", measure)):
@@ -144,10 +144,10 @@ class HazardCurve(Result):
             raise InvalidOption(f"it cannot be read: {reason}", path=str(file)) from error
         try:
             if lines and "investigation_time" in lines[0]:
-                return cls(*_from_openquake(lines, site, period), file.stem)
+                return cls(*_parse_openquake(lines, site, period), file.stem)
             if site:
                 raise InvalidOption("a table of two columns is of one site; leave {} out", "site")
-            return cls(*_from_table(lines, period), file.stem)
+            return cls(*_parse_table(lines, period), file.stem)
         except InvalidOption as error:
             error.path = str(file)
             raise
@@ -157,11 +157,11 @@ class HazardCurve(Result):
 
         The curve is extrapolated below its first and above its last point.
         """
-        at = check_intensities(intensity)
-        exponents, factors = powers(self)
-        segment = np.clip(np.searchsorted(self.intensity, at, side="right") - 1, 0, len(self.rate) - 2)
+        intensities = check_intensities(intensity)
+        exponents, factors = compute_power_laws(self)
+        segment = np.clip(np.searchsorted(self.intensity, intensities, side="right") - 1, 0, len(self.rate) - 2)
         with np.errstate(divide="ignore", over="ignore"):
-            return unwrap_scalar(np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(at))))
+            return unwrap_scalar(np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(intensities))))
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -176,70 +176,71 @@ class HazardCurve(Result):
         return format_table([self.measure.label, "annual rate", "return period (years)"], rows)
 
     def _headline(self) -> str:
-        low, high = shown_range(self)
+        low, high = convert_range(self)
         return (
             f"{self.name}; {self.measure.label} from {low:.4g} to {high:.4g}, "
             f"annual rate from {self.rate[0]:.3g} to {self.rate[-1]:.3g}"
         )
 
 
-def powers(hazard: HazardCurve) -> tuple[Floats, Floats]:
-    """Return exponent k and logarithm of c of each segment, on which the rate is c intensity^-k."""
+def compute_power_laws(hazard: HazardCurve) -> tuple[Floats, Floats]:
+    """Compute exponent k and logarithm of c of each segment, on which the rate is c intensity^-k."""
     x, y = np.log(hazard.intensity), np.log(hazard.rate)
     exponents = -np.diff(y) / np.diff(x)
     return exponents, y[:-1] + exponents * x[:-1]
 
 
-def shown_range(hazard: HazardCurve) -> tuple[float, float]:
-    """Return the first and the last intensity, in the unit of texts and figures."""
+def convert_range(hazard: HazardCurve) -> tuple[float, float]:
+    """Convert the first and the last intensity to the unit of texts and figures."""
     low, high = hazard.measure.scale * hazard.intensity[[0, -1]]
     return float(low), float(high)
 
 
-def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
-    """Return rates at intensities (SI) for a figure, without 0 and infinity."""
+def create_hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
+    """Create the line of a figure: rates at intensities (SI), without 0 and infinity."""
     from rocking.plot.curves import HazardLine
 
-    return HazardLine(np.clip(hazard.rate_of(intensity), *(1e-200, 1e200)), shown_range(hazard))
+    return HazardLine(np.clip(hazard.rate_of(intensity), *(1e-200, 1e200)), convert_range(hazard))
 
 
-def _check_order(what: str, values: Floats, way: float) -> None:
-    """Check that values are positive, and increase (`way` 1) or decrease (-1)."""
+def _check_order(quantity: str, values: Floats, sign: float) -> None:
+    """Check that values are positive, and increase (`sign` 1) or decrease (-1)."""
     with np.errstate(invalid="ignore"):  # an infinite first value
-        sound = np.isfinite(values) & (values > 0.0) & (way * np.diff(values, prepend=-way * np.inf) > 0.0)
-    if not sound.all():
-        k = int(np.argmin(sound))
-        after = f" after {values[k - 1]:g}" if k else ""
+        is_valid = np.isfinite(values) & (values > 0.0) & (sign * np.diff(values, prepend=-sign * np.inf) > 0.0)
+    if not is_valid.all():
+        k = int(np.argmin(is_valid))
+        predecessor = f" after {values[k - 1]:g}" if k else ""
         raise InvalidOption(
-            f"the {what} of a hazard curve must be positive and {'increase' if way > 0.0 else 'decrease'} from point "
-            f"to point, but that of point {k + 1} is {values[k]:g}{after}; correct it or leave the point out"
+            f"the {quantity} of a hazard curve must be positive and {'increase' if sign > 0.0 else 'decrease'} from "
+            f"point to point, but that of point {k + 1} is {values[k]:g}{predecessor}; correct it or leave "
+            "the point out"
         )
 
 
-def heading_of(cell: str) -> str:
+def normalise_heading(cell: str) -> str:
     """Normalise a column name: "PGA (m/s²)" to pga_m_s2, "PGA (%g)" to pga_percent_g."""
-    plain = cell.lower().replace("^", "").replace("²", "2").replace("%", " percent ")
-    return re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
+    text = cell.lower().replace("^", "").replace("²", "2").replace("%", " percent ")
+    return re.sub(r"[^a-z0-9]+", "_", text).strip("_")
 
 
-def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:
+def _parse_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:
     """Read intensities (SI), annual rates and measure from a table of two columns with comments (#)."""
     (_, header), *rows = read_csv_rows("\n".join("" if line.lstrip().startswith("#") else line for line in lines)) or [
         (1, [])
     ]
-    heading = [heading_of(cell) for cell in header]
-    found = [cell for cell in heading if cell in HEADINGS]
-    if len(found) != 1 or heading.count("annual_rate") != 1:
+    heading = [normalise_heading(cell) for cell in header]
+    intensity_headings = [cell for cell in heading if cell in HEADINGS]
+    if len(intensity_headings) != 1 or heading.count("annual_rate") != 1:
         raise InvalidOption(
             f"a hazard curve needs a heading with annual_rate and one of {', '.join(HEADINGS)}, "
             f"not {', '.join(header) or 'nothing'}"
         )
-    kind, factor = HEADINGS[found[0]]
+    kind, factor = HEADINGS[intensity_headings[0]]
     intensity, rate = np.empty(len(rows)), np.empty(len(rows))
     for k, (line, row) in enumerate(rows):
         try:
             cells = dict(zip(heading, row, strict=True))
-            intensity[k], rate[k] = (float(cells[name]) for name in (found[0], "annual_rate"))
+            intensity[k], rate[k] = (float(cells[name]) for name in (intensity_headings[0], "annual_rate"))
         except ValueError:
             sentence = f"{','.join(row)} is not an intensity and a rate, in {len(heading)} cells as the heading"
             raise InvalidOption(sentence, line=line) from None
@@ -252,44 +253,48 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
         return factor * intensity, rate, measure
 
 
-def _from_openquake(lines: list[str], site: int, period: float | None) -> tuple[Floats, Floats, Measure]:
+def _parse_openquake(lines: list[str], site: int, period: float | None) -> tuple[Floats, Floats, Measure]:
     """Read intensities (SI), annual rates and measure of a site from an OpenQuake file."""
-    said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
-    kind, _, rest = said.get("imt", "").partition("(")
+    fields = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
+    kind, _, period_text = fields.get("imt", "").partition("(")
     header, *rows = [*csv.reader(lines[1:])] or [[]]
     levels = {k: cell.strip()[4:] for k, cell in enumerate(header) if cell.strip().startswith("poe-")}
-    if kind not in _OPENQUAKE or not levels:
-        raise InvalidOption(f"no hazard curve of {', '.join(_OPENQUAKE)}: imt is {said.get('imt', 'not given')}")
+    if kind not in _OPENQUAKE_MEASURES or not levels:
+        raise InvalidOption(
+            f"no hazard curve of {', '.join(_OPENQUAKE_MEASURES)}: imt is {fields.get('imt', 'not given')}"
+        )
     if site >= len(rows):
         raise InvalidOption(f"there is no site {site}; it holds {len(rows)}, counted from 0")
     try:
         intensity = np.array([float(level) for level in levels.values()])
-        exceeded = np.array([float(rows[site][k]) for k in levels])
-        years = float(said["investigation_time"])
-        at = float(rest.rstrip(")")) if kind == "SA" else None
+        probabilities = np.array([float(rows[site][k]) for k in levels])
+        years = float(fields["investigation_time"])
+        spectral_period = float(period_text.rstrip(")")) if kind == "SA" else None
     except (ValueError, IndexError, KeyError) as error:
         raise InvalidOption(f"site {site}: {error}; it is not a whole hazard curve") from None
-    if period not in (None, at):
-        raise InvalidOption(f"{{}} is {period:g} s, and this curve is of {said['imt']}: leave it out", "period")
-    measure_name, factor = _OPENQUAKE[kind]
-    measure = Measure(measure_name) if at is None else Measure("sa", at)
+    if period not in (None, spectral_period):
+        raise InvalidOption(f"{{}} is {period:g} s, and this curve is of {fields['imt']}: leave it out", "period")
+    measure_name, factor = _OPENQUAKE_MEASURES[kind]
+    measure = Measure(measure_name) if spectral_period is None else Measure("sa", spectral_period)
     # Probabilities printed as 0 or 1 contain no information on the rate.
-    useful = (exceeded > 0.0) & (exceeded < 1.0)
-    kept, rate = _corners(-np.log1p(-exceeded[useful]) / checks.positive(years, "investigation_time", InvalidOption))
-    return factor * intensity[useful][kept], rate, measure
+    is_informative = (probabilities > 0.0) & (probabilities < 1.0)
+    indices, rate = _select_corners(
+        -np.log1p(-probabilities[is_informative]) / checks.positive(years, "investigation_time", InvalidOption)
+    )
+    return factor * intensity[is_informative][indices], rate, measure
 
 
-def _corners(rate: Floats) -> tuple[Integers, Floats]:
-    """Return a curve with the first and the last (slightly lowered) point of each plateau only."""
-    lowest = np.minimum.accumulate(rate)
-    falls = np.diff(lowest) < 0.0
-    first, last = np.append(True, falls)[: len(rate)], np.append(falls, False)[: len(rate)]
-    kept = np.flatnonzero(first | last)
-    return kept, np.where(first, lowest, lowest * (1.0 - 1e-9))[kept]
+def _select_corners(rate: Floats) -> tuple[Integers, Floats]:
+    """Select the first and the last (slightly lowered) point of each plateau of a curve."""
+    running_minimum = np.minimum.accumulate(rate)
+    decreases = np.diff(running_minimum) < 0.0
+    is_first, is_last = np.append(True, decreases)[: len(rate)], np.append(decreases, False)[: len(rate)]
+    indices = np.flatnonzero(is_first | is_last)
+    return indices, np.where(is_first, running_minimum, running_minimum * (1.0 - 1e-9))[indices]
 
 
-def log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
-    """Logarithms of integrals below the hazard curve, over each of its segments, and above.
+def compute_log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Compute logarithms of integrals below the hazard curve, over each of its segments, and above.
 
     The shape is (fits, n + 1). On a segment rate(x) = c x^-k, and with P = Phi(z), z = a + b ln x, the part is c exp(k
     a/b + k^2/(2 b^2)) [Phi(z + k/b)]. If both ends lie on one side of z = -k/b, large terms cancel. The scaled erfcx
@@ -297,39 +302,41 @@ def log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
     """
     from scipy.special import erfcx, ndtr
 
-    k, log_c = (_extended(values) for values in powers(hazard))
+    k, log_c = (_repeat_ends(values) for values in compute_power_laws(hazard))
     corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # ends of segments
     ends = corners[:-1], corners[1:]
     a, b = (values[:, None] for values in fits)
     with np.errstate(all="ignore"):
         shift = k / b
         lower, upper = (a + b * end + shift for end in ends)
-        mirrored = lower > 0.0
-        near, far = np.where(mirrored, lower, -upper), np.where(mirrored, upper, -lower)
-        end = np.where(mirrored, *ends)
+        is_mirrored = lower > 0.0
+        near, far = np.where(is_mirrored, lower, -upper), np.where(is_mirrored, upper, -lower)
+        end = np.where(is_mirrored, *ends)
         z = a + b * end
-        fall = np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * erfcx(far * _ROOT) / erfcx(near * _ROOT)
-        tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * erfcx(near * _ROOT)) + np.log1p(-fall)
-        middle = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
+        decay = (
+            np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * erfcx(far * _SQRT_HALF) / erfcx(near * _SQRT_HALF)
+        )
+        tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * erfcx(near * _SQRT_HALF)) + np.log1p(-decay)
+        central = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
     # The weakest motions always exceed the limit of a curve that does not rise, unless its probability is 0.
-    level = np.where(np.isneginf(a), -np.inf, np.inf)
-    return np.where(b > 0.0, np.where(near > 0.0, tail, middle), level)
+    unbounded = np.where(np.isneginf(a), -np.inf, np.inf)
+    return np.where(b > 0.0, np.where(near > 0.0, tail, central), unbounded)
 
 
-def log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
-    """Logarithms of integrals of P(x) |d rate(x)| between the ends of the hazard curve, shape (fits, 1)."""
+def compute_log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Compute logarithms of integrals of P(x) |d rate(x)| between the ends of the hazard curve, shape (fits, 1)."""
     from scipy.special import ndtr
 
     a, b = (values[:, None] for values in fits)
     first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
     # dP is 0 on every segment for a curve that does not rise.
-    between = np.where(fits.slope > 0.0, np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
-    rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
+    inner = np.where(fits.slope > 0.0, np.exp(compute_log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
+    rate = first * hazard.rate[0] - last * hazard.rate[-1] + inner
     return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
 
 
-def log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
-    """Logarithms of integrals of exp(-rate(x) years) dP(x) over the hazard curve, shape (fits, 1)."""
+def compute_log_survival(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
+    """Compute logarithms of integrals of exp(-rate(x) years) dP(x) over the hazard curve, shape (fits, 1)."""
     from scipy.special import log_ndtr
 
     a, b = (values[:, None] for values in fits)
@@ -338,44 +345,46 @@ def log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
         first, last = (np.clip(a + b * end, -38.0, 38.0) for end in log_x[[0, -1]])
         z = first + (last - first) * np.linspace(0.0, 1.0, 4001)
         density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
-        between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
-        # With a curve that does not rise, every block that falls does so under the weakest motions.
-        between = np.where(b > 0.0, between, -np.inf)
-        parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
+        inner = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
+        # With a curve that does not rise, the weakest motions overturn every block that overturns.
+        inner = np.where(b > 0.0, inner, -np.inf)
+        parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], inner, log_ndtr(-last)])
         return np.asarray(np.logaddexp.reduce(parts, axis=1)[:, None])
 
 
-def _extended(values: Floats) -> Floats:
+def _repeat_ends(values: Floats) -> Floats:
     """Repeat the values of the first and the last segment for the extrapolations."""
     return np.concatenate([values[:1], values, values[-1:]])
 
 
-def _log_total(fitted: Probit, hazard: HazardCurve) -> float:
-    return float(np.logaddexp.reduce(log_parts(fitted, hazard)[0]))
+def _compute_log_total(fitted: Probit, hazard: HazardCurve) -> float:
+    return float(np.logaddexp.reduce(compute_log_parts(fitted, hazard)[0]))
 
 
-def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floats, Floats]:
-    """Logarithms of P(x) rate(x), and of k P(x) rate(x) = P(x) |d rate(x)/d ln x|, at logarithms of x."""
+def _compute_log_products(fitted: Probit, hazard: HazardCurve, log_intensity: Floats) -> tuple[Floats, Floats]:
+    """Compute logarithms of P(x) rate(x), and of k P(x) rate(x) = P(x) |d rate(x)/d ln x|, at logarithms of x."""
     from scipy.special import log_ndtr
 
-    segment = np.searchsorted(np.log(hazard.intensity), log_at, side="right")
-    k, log_c = (_extended(values)[segment] for values in powers(hazard))
-    score = fitted.intercept[0] + fitted.slope[0] * log_at
-    product = np.asarray(log_c - k * log_at + log_ndtr(score))
+    segment = np.searchsorted(np.log(hazard.intensity), log_intensity, side="right")
+    k, log_c = (_repeat_ends(values)[segment] for values in compute_power_laws(hazard))
+    score = fitted.intercept[0] + fitted.slope[0] * log_intensity
+    product = np.asarray(log_c - k * log_intensity + log_ndtr(score))
     return product, np.log(k) + product
 
 
-def shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
-    """Shares of the integral of P(x) |d rate(x)| below and above the hazard curve, by parts."""
-    parts, total = log_parts(fitted, hazard)[0], _log_total(fitted, hazard)
-    first, last = _log_seen(fitted, hazard, np.log(hazard.intensity[[0, -1]]))[0]
+def compute_shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
+    """Compute shares of the integral of P(x) |d rate(x)| below and above the hazard curve, by parts."""
+    parts, total = compute_log_parts(fitted, hazard)[0], _compute_log_total(fitted, hazard)
+    first, last = _compute_log_products(fitted, hazard, np.log(hazard.intensity[[0, -1]]))[0]
     with np.errstate(all="ignore"):
         below = np.exp(parts[0] - total) * max(-math.expm1(min(first - parts[0], 0.0)), 0.0)
         above = np.exp(np.logaddexp(parts[-1], last) - total)
     return float(below), float(above)
 
 
-def share_density(fitted: Probit, hazard: HazardCurve, at: Floats) -> Floats:
-    """Density of the rate by ln x, normalised to an integral of 1."""
+def compute_share_density(fitted: Probit, hazard: HazardCurve, intensity: Floats) -> Floats:
+    """Compute the density of the rate by ln x, normalised to an integral of 1."""
     with np.errstate(under="ignore"):
-        return np.asarray(np.exp(_log_seen(fitted, hazard, np.log(at))[1] - _log_total(fitted, hazard)))
+        return np.asarray(
+            np.exp(_compute_log_products(fitted, hazard, np.log(intensity))[1] - _compute_log_total(fitted, hazard))
+        )

@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 from rocking.analysis.levels import (
     MIRROR_NOTE,
     Boundaries,
-    boundaries,
-    described,
-    labels_of,
+    compose_motion_labels,
+    compute_intensities,
+    compute_units,
+    describe_blocks,
+    describe_undecided,
+    find_boundaries,
     simulate_levels,
-    undecided_text,
-    units_of,
-    values_of,
 )
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
@@ -116,41 +116,47 @@ def incremental_dynamic_analysis(
     >>> incremental_dynamic_analysis(block, pulse, measure="pga_ratio").data.band_start.values.round(4).tolist()
     [2.9855, 7.2759]
     """
-    many, how, shaken = bodies_of(blocks), Measure.parse(measure), list_motions(motions)
-    slenderness = slenderness_of(many)
-    values = values_of(shaken, how)
-    if never_rests(many):
+    bodies, measure, motion_list = bodies_of(blocks), Measure.parse(measure), list_motions(motions)
+    slenderness = slenderness_of(bodies)
+    values = compute_intensities(motion_list, measure)
+    if never_rests(bodies):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
-    width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
+    relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model}
-    first = _lowest_uplift(many, shaken, values, how, model)
+    lowest_uplift = _find_lowest_uplift(bodies, motion_list, values, measure, model)
     if levels is None:
-        table = _until_overturned(many, shaken, how, first, options)
+        table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
     else:
-        wanted = checks.increasing_numbers(levels, "levels", InvalidOption)
-        table = simulate_levels(many, shaken, how, wanted, **options)
-    factors = units_of(many, how, model)[None, :] / values[:, None]
+        level_values = checks.increasing_numbers(levels, "levels", InvalidOption)
+        table = simulate_levels(bodies, motion_list, measure, level_values, **options)
+    factors = compute_units(bodies, measure, model)[None, :] / values[:, None]
 
-    def overturned(column: Integers, level: Floats) -> Integers:
-        verdicts = np.empty(column.size, dtype=np.int64)
-        motion, block = np.divmod(column, len(many))
+    def find_overturned(column: Integers, level: Floats) -> Integers:
+        is_overturned = np.empty(column.size, dtype=np.int64)
+        motion, block = np.divmod(column, len(bodies))
         for m in np.unique(motion):
-            here = motion == m
-            factor = level[here] * factors[m, block[here]]
+            selected = motion == m
+            factor = level[selected] * factors[m, block[selected]]
             # Use the scheme of the levels, which determines how often the restitution is drawn.
-            setup = Setup(many.select(block[here]), model, Certified())
-            for task, outcomes in simulate_each(setup, shaken[m], factor):
-                verdicts[np.flatnonzero(here)[task.bodies]] = outcomes["overturned"]
-        return verdicts
+            setup = Setup(bodies.select(block[selected]), model, Certified())
+            for task, outcomes in simulate_each(setup, motion_list[m], factor):
+                is_overturned[np.flatnonzero(selected)[task.bodies]] = outcomes["overturned"]
+        return is_overturned
 
-    grid = table.overturned.transpose("level", "motion", "block").values
-    flat = grid.reshape(len(grid), -1).astype(np.int64)
-    edges = boundaries(table.level.values, flat, overturned, rtol=width)
-    found = _dataset(table, flat, edges, slenderness, how)
-    about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
+    overturned_grid = table.overturned.transpose("level", "motion", "block").values
+    flat_grid = overturned_grid.reshape(len(overturned_grid), -1).astype(np.int64)
+    brackets = find_boundaries(table.level.values, flat_grid, find_overturned, rtol=relative_width)
+    dataset = _combine_bands(table, flat_grid, brackets, slenderness, measure)
+    attributes = {
+        "blocks": describe_blocks(blocks),
+        "lowest_uplift": lowest_uplift,
+        "sides_differ": int(not bodies.is_symmetric),
+    }
     scales = (table.level.values[:, None, None] * factors)[..., None]
-    about["undecided"] = undecided_text(Setup(many, model, Certified()), shaken, scales, grid[..., None])
-    return IncrementalDynamicAnalysis(found.assign_attrs(about))
+    attributes["undecided"] = describe_undecided(
+        Setup(bodies, model, Certified()), motion_list, scales, overturned_grid[..., None]
+    )
+    return IncrementalDynamicAnalysis(dataset.assign_attrs(attributes))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -184,9 +190,9 @@ class IncrementalDynamicAnalysis(DatasetResult):
         part = super()._table(name)
         if name == "levels":
             return part
-        at = self.data.band_motion.values  # the names of the other table permit a join
+        motion_index = self.data.band_motion.values  # the names of the other table permit a join
         labels = {
-            name: ("band", self.data[name].values[at])
+            name: ("band", self.data[name].values[motion_index])
             for name in ("motion", "vertical", "record")
             if name in self.data.coords
         }
@@ -198,31 +204,35 @@ class IncrementalDynamicAnalysis(DatasetResult):
 
         Ends are in SI units or the block's own, NaN beyond the levels.
         """
-        m, b = self._position(motion, "motion"), self._position(block, "block")
-        mine = (self.data.band_motion.values == m) & (self.data.band_block.values == b)
-        starts, ends = self.data.band_start.values[mine], self.data.band_end.values[mine]
+        m, b = self._check_position(motion, "motion"), self._check_position(block, "block")
+        selected = (self.data.band_motion.values == m) & (self.data.band_block.values == b)
+        starts, ends = self.data.band_start.values[selected], self.data.band_end.values[selected]
         return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
-    def _position(self, given: object, name: str) -> int:
-        return checks.integer(given, name, InvalidOption, 0, self.data.sizes[name] - 1)
+    def _check_position(self, position: object, dimension: str) -> int:
+        return checks.integer(position, dimension, InvalidOption, 0, self.data.sizes[dimension] - 1)
 
     def summary(self) -> str:
         data = self.data
-        many = data.sizes["block"] > 1
-        looked_at = _Levels(data.level)
-        what = "record" if "record" in data.coords else "motion"
+        has_several_blocks = data.sizes["block"] > 1
+        level_description = _LevelDescription(data.level)
+        coordinate = "record" if "record" in data.coords else "motion"
         rows = [
-            [label, *([b] if many else []), looked_at.overturning(self.bands(block=b, motion=m))]
-            for m, label in enumerate(labels_of(data, what, with_history=False))
+            [
+                label,
+                *([b] if has_several_blocks else []),
+                level_description.describe_bands(self.bands(block=b, motion=m)),
+            ]
+            for m, label in enumerate(compose_motion_labels(data, coordinate, with_history=False))
             for b in range(data.sizes["block"])
         ]
-        blocks = data.blocks if not many else format_count(data.sizes["block"], "block")
-        table = format_table([what, *(["block"] if many else []), "overturns"], rows)
-        head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
+        blocks = data.blocks if not has_several_blocks else format_count(data.sizes["block"], "block")
+        table = format_table([coordinate, *(["block"] if has_several_blocks else []), "overturns"], rows)
+        headline = f"{blocks}, {data.model} model; {data.level.label} that overturns"
         notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
         notes.append(f"note: {data.undecided}")
         notes += [f"note: {text}"] if (text := missing_text(np.isnan(data.peak_over_alpha.values))) else []
-        return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])
+        return "\n".join([headline, level_description.summary(data.lowest_uplift), "", table, *notes])
 
     def to_dict(self) -> dict[str, Any]:
         data, units = self.data, self.data.level.units
@@ -257,100 +267,106 @@ class IncrementalDynamicAnalysis(DatasetResult):
         self, ax: Axes | None = None, *, block: int = 0, title: str = "", figsize: tuple[float, float] | None = None
     ) -> Figure:
         """Plot level against peak rotation and bands of one block, by position, like `DrawnResult.plot`."""
-        from rocking.plot.curves import ScaledMotion, ida_figure
+        from rocking.plot.curves import ScaledMotion, draw_ida
 
-        data, block = self.data, self._position(block, "block")
+        data, block = self.data, self._check_position(block, "block")
         levels = data.level.scale * data.level.values
         ends = np.array([levels[0], levels[-1]])
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
         motions = []
-        for m, label in enumerate(labels_of(data, with_history=False)):
+        for m, label in enumerate(compose_motion_labels(data, with_history=False)):
             bands = data.level.scale * np.array(self.bands(block=block, motion=m)).reshape(-1, 2)
             bands = np.where(np.isnan(bands), ends, bands)
             motions.append(ScaledMotion(label, levels, peaks[m], bands))
-        what = data.blocks if data.sizes["block"] == 1 else f"block {block}"
-        return ida_figure(
+        block_text = data.blocks if data.sizes["block"] == 1 else f"block {block}"
+        return draw_ida(
             motions=motions,
             level_label=data.level.label,
-            title=title or escape_dollars(f"{what}, {data.model} model"),
+            title=title or escape_dollars(f"{block_text}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )
 
 
-def _lowest_uplift(blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
-    """Return the lowest level at which a motion, scaled with its vertical component, lifts a block."""
-    thresholds, own = thresholds_of(blocks, model)
-    factors = np.array([compute_uplift_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
-    lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
+def _find_lowest_uplift(
+    blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model
+) -> float:
+    """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""
+    thresholds, weight_thresholds = thresholds_of(blocks, model)
+    factors = np.array(
+        [compute_uplift_factors(motion, thresholds, blocks.gravity, weight_thresholds) for motion in motions]
+    )
+    lowest = float(np.min(factors * values[:, None] / compute_units(blocks, measure, model)))
     if math.isinf(lowest):
         raise InvalidOption("no motion lifts a block at any level: none pushes towards a side as its weight allows")
     return lowest
 
 
-def _until_overturned(
+def _simulate_until_overturned(
     blocks: Bodies, motions: Sequence[Motion], measure: Measure, first: float, options: dict[str, Any]
 ) -> xr.Dataset:
-    """Yield chunks of levels up to three times the level by which every motion has overturned each block."""
+    """Simulate levels in steps of 5 % up to three times the level by which every motion overturns each block."""
     import xarray as xr
 
-    whole: list[xr.Dataset] = []
+    tables: list[xr.Dataset] = []
     for start in range(0, 128, _CHUNK):
         levels = first * np.power(1.05, np.arange(start, start + _CHUNK, dtype=np.float64))
-        whole.append(simulate_levels(blocks, motions, measure, levels, **options))
-        fell = xr.concat([part.overturned for part in whole], "level")
-        last = 3.0 * fell.level.where(fell).min("level", skipna=True).max(skipna=False)
+        tables.append(simulate_levels(blocks, motions, measure, levels, **options))
+        overturned = xr.concat([chunk.overturned for chunk in tables], "level")
+        last = 3.0 * overturned.level.where(overturned).min("level", skipna=True).max(skipna=False)
         if last <= levels[-1]:
             break
-    table = xr.concat(whole, "level", data_vars="all", coords="minimal", compat="override", join="override")
-    beyond = np.flatnonzero(table.level.values >= float(last))
-    return table.isel(level=slice(0, beyond[0] + 1 if beyond.size else None))
+    table = xr.concat(tables, "level", data_vars="all", coords="minimal", compat="override", join="override")
+    indices = np.flatnonzero(table.level.values >= float(last))
+    return table.isel(level=slice(0, indices[0] + 1 if indices.size else None))
 
 
-def _dataset(table: xr.Dataset, flat: Integers, edges: Boundaries, alpha: Floats, measure: Measure) -> xr.Dataset:
+def _combine_bands(
+    table: xr.Dataset, flat_grid: Integers, brackets: Boundaries, alpha: Floats, measure: Measure
+) -> xr.Dataset:
     """Pair the levels of outcome changes in a (level, column) grid, NaN for bands beyond it."""
     import xarray as xr
 
     columns, starts, ends = list[int](), list[float](), list[float]()
-    for column in range(flat.shape[1]):
-        mine = edges.column == column
-        above, level = edges.above[mine] == 1, edges.level[mine]
-        starts += [*([np.nan] if flat[0, column] else []), *level[above]]
-        ends += [*level[~above], *([np.nan] if flat[-1, column] else [])]
+    for column in range(flat_grid.shape[1]):
+        selected = brackets.column == column
+        is_start, level = brackets.above[selected] == 1, brackets.level[selected]
+        starts += [*([np.nan] if flat_grid[0, column] else []), *level[is_start]]
+        ends += [*level[~is_start], *([np.nan] if flat_grid[-1, column] else [])]
         columns += [column] * (len(starts) - len(columns))
     motion, block = np.divmod(np.array(columns, dtype=np.int64), len(alpha))
     lowest = np.full((table.sizes["motion"], len(alpha)), np.inf)
     np.minimum.at(lowest, (motion, block), np.array(starts, dtype=float))
     lowest[np.isinf(lowest)] = np.nan
-    level = {"units": measure.units, "long_name": measure.quantity, "label": measure.label, "scale": measure.scale}
-    level |= measure.options()
-    table = table.assign_coords(level=("level", table.level.values, level))
+    attributes = {"units": measure.units, "long_name": measure.quantity, "label": measure.label, "scale": measure.scale}
+    attributes |= measure.options()
+    table = table.assign_coords(level=("level", table.level.values, attributes))
     slenderness = xr.DataArray(alpha, dims="block")
     over_alpha = (table.peak_rotation / slenderness).where(~table.overturned, np.inf).where(~table.unfinished)
     return table[["peak_rotation", "overturned"]].assign(
         peak_over_alpha=over_alpha.assign_attrs(units="1", long_name="peak rotation over slenderness"),
-        overturning_level=(("motion", "block"), lowest, level),
+        overturning_level=(("motion", "block"), lowest, attributes),
         band_motion=("band", motion, {"units": "1", "long_name": "position of the motion"}),
         band_block=("band", block, {"units": "1", "long_name": "position of the block"}),
-        band_start=("band", np.array(starts, dtype=float), level),
-        band_end=("band", np.array(ends, dtype=float), level),
+        band_start=("band", np.array(starts, dtype=float), attributes),
+        band_end=("band", np.array(ends, dtype=float), attributes),
     )
 
 
-class _Levels:
+class _LevelDescription:
     """Description of simulated levels and of bands of them."""
 
     def __init__(self, level: xr.DataArray) -> None:
-        self.scale, self.at = level.scale, level.scale * level.values
+        self.scale, self.values = level.scale, level.scale * level.values
         self.unit = {"m/s^2": " g", "m/s": " m/s", "1": ""}[level.units]
-        low, high = (f"{end:.5g}" for end in self.at[[0, -1]])
+        low, high = (f"{end:.5g}" for end in self.values[[0, -1]])
         self.range = f"{low}{self.unit}" if low == high else f"{low} to {high}{self.unit}"
 
     def summary(self, lowest_uplift: float) -> str:
         """Describe the levels, and whether all of them are below the level (SI) at which a motion lifts a block."""
-        text = f"looked at: {format_count(len(self.at), 'level')}, {self.range}"
-        if len(self.at) > 1:
-            steps, ratios = np.diff(self.at), self.at[1:] / self.at[:-1]
+        text = f"looked at: {format_count(len(self.values), 'level')}, {self.range}"
+        if len(self.values) > 1:
+            steps, ratios = np.diff(self.values), self.values[1:] / self.values[:-1]
             apart = f"up to {steps.max():.5g}{self.unit}"
             if np.allclose(steps, steps[0], rtol=1e-6):
                 apart = f"{steps[0]:.5g}{self.unit}"
@@ -358,17 +374,17 @@ class _Levels:
                 apart = f"{100.0 * (ratios[0] - 1.0):.3g} %"
             text += f", {apart} apart; bands and gaps that lie between two of them are not seen"
         lifting = self.scale * lowest_uplift
-        if self.at[-1] < lifting:
+        if self.values[-1] < lifting:
             text += f"\nnone of them lifts a block; that begins at {lifting:.5g}{self.unit}: are the levels right?"
         return text
 
-    def overturning(self, bands: Sequence[tuple[float, float]]) -> str:
+    def describe_bands(self, bands: Sequence[tuple[float, float]]) -> str:
         """Describe the bands that overturn (SI). NaN marks unknown ends beyond the levels."""
-        return "; ".join(self._band(*(self.scale * end for end in band)) for band in bands) or (
+        return "; ".join(self._describe_band(*(self.scale * end for end in band)) for band in bands) or (
             f"at no level looked at, {self.range}"
         )
 
-    def _band(self, low: float, high: float) -> str:
+    def _describe_band(self, low: float, high: float) -> str:
         if not (math.isnan(low) or math.isnan(high)):
             return f"{low:.5g} to {high:.5g}"
         if math.isnan(low) and math.isnan(high):
@@ -470,31 +486,35 @@ def critical_scale(
     low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
     checks.positive(low, "bounds", InvalidOption)
 
-    def response(scale: float) -> Response:
+    def simulate_scaled(scale: float) -> Response:
         return simulate(
             block, motion * scale, model=model, initial_rotation=initial_rotation, initial_velocity=initial_velocity
         )
 
     for bound, expected in ((low, False), (high, True)):
-        if response(bound).overturned is not expected:
-            does, change = ("does not overturn", "raise") if expected else ("overturns", "lower")
-            raise InvalidOption(f"the block {does} at the scale {bound:g}: {change} it in {{}}", "bounds", value=bounds)
-    _, scale = bisect(low, high, lambda scale: response(scale).overturned)
-    last = response(scale)
-    by_scale = {name: float(last.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")}
-    turned, share = gradient(last, "event", -1), -scale / by_scale["motion"]
-    reason = turned.reason
-    if not abs(by_scale["motion"]) > 1e6:
-        reason, share = _NO_BALANCE, math.nan
-    by_motion = replace(
-        turned,
+        if simulate_scaled(bound).overturned is not expected:
+            behaviour, correction = ("does not overturn", "raise") if expected else ("overturns", "lower")
+            raise InvalidOption(
+                f"the block {behaviour} at the scale {bound:g}: {correction} it in {{}}", "bounds", value=bounds
+            )
+    _, scale = bisect(low, high, lambda scale: simulate_scaled(scale).overturned)
+    response = simulate_scaled(scale)
+    scale_derivatives = {
+        name: float(response.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")
+    }
+    event_gradient, scale_change = gradient(response, "event", -1), -scale / scale_derivatives["motion"]
+    reason = event_gradient.reason
+    if not abs(scale_derivatives["motion"]) > 1e6:
+        reason, scale_change = _NO_BALANCE, math.nan
+    motion_gradient = replace(
+        event_gradient,
         value=scale,
-        coefficients=scale * share * turned.coefficients,
-        vertical=None if turned.vertical is None else scale * share * turned.vertical,
-        initial_rotation=share * turned.initial_rotation,
-        initial_velocity=share * turned.initial_velocity,
+        coefficients=scale * scale_change * event_gradient.coefficients,
+        vertical=None if event_gradient.vertical is None else scale * scale_change * event_gradient.vertical,
+        initial_rotation=scale_change * event_gradient.initial_rotation,
+        initial_velocity=scale_change * event_gradient.initial_velocity,
         reason=reason,
         motion=motion,
     )
-    p, alpha, restitution = (share * by_scale[name] for name in ("p", "alpha", "restitution"))
-    return CriticalScale(scale, by_motion, p, alpha, restitution)
+    p, alpha, restitution = (scale_change * scale_derivatives[name] for name in ("p", "alpha", "restitution"))
+    return CriticalScale(scale, motion_gradient, p, alpha, restitution)

@@ -32,18 +32,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def numbered(labels: Sequence[object]) -> Integers:
+def number_labels(labels: Sequence[object]) -> Integers:
     """Replace labels by integers in the order of first appearance."""
-    places: dict[object, int] = {}
-    return np.array([places.setdefault(label, len(places)) for label in labels], dtype=np.int64)
+    numbers: dict[object, int] = {}
+    return np.array([numbers.setdefault(label, len(numbers)) for label in labels], dtype=np.int64)
 
 
-def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> Integers:
+def number_groups(labels: object, name: str, count: int, item: str = "outcome") -> Integers:
     """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
-    given = checks.items(labels, name, InvalidOption)
-    if len(given) != count or not all(isinstance(label, Hashable) for label in given):
-        raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {each}", name, value=labels)
-    return numbered([(k,) if _is_missing(label) else label for k, label in enumerate(given)])
+    entries = checks.items(labels, name, InvalidOption)
+    if len(entries) != count or not all(isinstance(label, Hashable) for label in entries):
+        raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {item}", name, value=labels)
+    return number_labels([(k,) if _is_missing(label) else label for k, label in enumerate(entries)])
 
 
 def _is_missing(label: object) -> bool:
@@ -52,36 +52,36 @@ def _is_missing(label: object) -> bool:
     return is_none or label == "" or (isinstance(label, float) and math.isnan(label))
 
 
-def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True) -> list[str]:
-    """Names of motions or records, with vertical components and processing."""
-    names = data[of].values
+def compose_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_history: bool = True) -> list[str]:
+    """Compose labels of motions or records, with vertical components and processing."""
+    names = data[coordinate].values
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
     histories = data.histories if with_history else [""] * len(names)
     return [
-        compose_label(str(name), done.split("; ") if done else [], str(vertical))
-        for name, done, vertical in zip(names, histories, verticals, strict=True)
+        compose_label(str(name), history.split("; ") if history else [], str(vertical))
+        for name, history, vertical in zip(names, histories, verticals, strict=True)
     ]
 
 
-def motions_text(data: xr.Dataset) -> str:
-    """Return the name or number of motions, and the numbers of scaled or processed ones."""
-    labels = labels_of(data)
-    changed = sum(bool(done) for done in data.histories)
+def describe_motions(data: xr.Dataset) -> str:
+    """Describe motions by name or number, with the numbers of scaled or processed ones."""
+    labels = compose_motion_labels(data)
+    changed_count = sum(bool(history) for history in data.histories)
     if len(labels) == 1:
         return labels[0]
-    which = "all" if changed == len(labels) else f"{changed} of them"
-    return f"{len(labels)} motions" + (f", {which} scaled or processed" if changed else "")
+    changed_text = "all" if changed_count == len(labels) else f"{changed_count} of them"
+    return f"{len(labels)} motions" + (f", {changed_text} scaled or processed" if changed_count else "")
 
 
-def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
-    """Return names and selections of all slenderness-restitution combinations, or one curve for an ensemble."""
+def split_curves(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Split a spectrum into named curves for each slenderness and restitution, or one for an ensemble."""
     if "block" in data.dims:
         return [(data.blocks, data)]
     stacked = data.stack(curve=[name for name in ("alpha", "restitution") if name in data.dims])
     curves = []
-    for one in (stacked.isel(curve=k) for k in range(stacked.sizes["curve"])):
-        restitution = f", restitution {float(one.restitution):g}" if "restitution" in one.coords else ""
-        curves.append((f"alpha = {float(one.alpha):.5g} rad ({math.degrees(one.alpha):.4g}°){restitution}", one))
+    for curve in (stacked.isel(curve=k) for k in range(stacked.sizes["curve"])):
+        restitution = f", restitution {float(curve.restitution):g}" if "restitution" in curve.coords else ""
+        curves.append((f"alpha = {float(curve.alpha):.5g} rad ({math.degrees(curve.alpha):.4g}°){restitution}", curve))
     return curves
 
 
@@ -92,57 +92,57 @@ MIRROR_NOTE: Final = "the sides differ, so motions that are reversed (scaled by 
 BY_STATION: Final = "station"
 
 
-def described(blocks: Bodies | Body | Sequence[Body]) -> str:
+def describe_blocks(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Describe a block by its sizes or parameters, several by their number."""
-    only = single_block(blocks)
-    if only is None:
+    block = find_single_block(blocks)
+    if block is None:
         return format_count(len(bodies_of(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
-        return only.description
-    return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
+        return block.description
+    return f"block with p = {_format_sides(blocks.p[0])} rad/s, alpha = {_format_sides(blocks.alpha[0])} rad"
 
 
-def pooled(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
+def describe_pool(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
     """Describe blocks with pooled outcomes, and whether their weights differ."""
-    if single_block(blocks) is not None:
-        return described(blocks)
-    return f"{described(blocks)}, {'all of equal weight' if weights is None else 'weighted'}"
+    if find_single_block(blocks) is not None:
+        return describe_blocks(blocks)
+    return f"{describe_blocks(blocks)}, {'all of equal weight' if weights is None else 'weighted'}"
 
 
-def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
-    """Weights of blocks with mean 1, equal by default."""
+def normalise_weights(weights: ArrayLike | None, count: int) -> Floats:
+    """Normalise weights of blocks to mean 1, equal by default."""
     if weights is None:
         return np.ones(count)
-    given = checks.numbers(weights, "weights", InvalidOption)
-    if given.shape != (count,) or not (np.all(np.isfinite(given) & (given >= 0.0)) and np.any(given > 0.0)):
+    values = checks.numbers(weights, "weights", InvalidOption)
+    if values.shape != (count,) or not (np.all(np.isfinite(values) & (values >= 0.0)) and np.any(values > 0.0)):
         raise InvalidOption(f"{{}} must be {count} numbers of 0 or more, not all 0, one for each block", "weights")
-    given = given / given.max()  # otherwise sums of very large or very small weights overflow
-    return np.asarray(given * (count / given.sum()))
+    values = values / values.max()  # otherwise sums of very large or very small weights overflow
+    return np.asarray(values * (count / values.sum()))
 
 
-def single_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
-    """Return the block as described, if there is only one."""
+def find_single_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
+    """Find the only block, or None if there are several."""
     if not isinstance(blocks, Sequence | Bodies):
         return blocks
     return blocks[0] if len(blocks) == 1 else None
 
 
-def _pair(sides: Floats) -> str:
+def _format_sides(sides: Floats) -> str:
     return f"{sides[0]:.4g}" if sides[0] == sides[1] else f"({sides[0]:.4g}, {sides[1]:.4g})"
 
 
-def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
-    """Return the measure of each motion, in SI units."""
+def compute_intensities(motions: Sequence[Motion], measure: Measure) -> Floats:
+    """Compute the measure of each motion, in SI units."""
     return np.array([measure.positive(motion, motion.name) for motion in motions])
 
 
-def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
-    """Cluster numbers of motions with equal labels ("station": of one record) or equal up to a factor."""
-    families, origins = families_of(motions), [motion.description.origin or Origin() for motion in motions]
-    stations = [f"{one.event}, {one.station}" if one.station else "" for one in origins]
+def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integers:
+    """Assign numbers to clusters of motions with equal labels ("station": of one record) or equal up to a factor."""
+    families, origins = number_families(motions), [motion.description.origin or Origin() for motion in motions]
+    stations = [f"{origin.event}, {origin.station}" if origin.station else "" for origin in origins]
     if labels is None:
-        of_records = {family: station for family, station in zip(families, stations, strict=True) if station}
-        if len(of_records) > len(set(of_records.values())):
+        stations_by_family = {family: station for family, station in zip(families, stations, strict=True) if station}
+        if len(stations_by_family) > len(set(stations_by_family.values())):
             sentence = f"components of one station count as independent of each other: {{}} may be {BY_STATION}"
             note(Message(f"{sentence}, which joins them", ("clusters",)))
         return families
@@ -154,41 +154,43 @@ def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
     from scipy.sparse.csgraph import connected_components
 
     count = len(motions)
-    given = groups_of(labels, "clusters", count, "motion")
-    links = coo_array((np.ones(count), (families, count + given)), shape=(2 * count, 2 * count))
-    return numbered(connected_components(links, directed=False)[1][families].tolist())
+    label_numbers = number_groups(labels, "clusters", count, "motion")
+    links = coo_array((np.ones(count), (families, count + label_numbers)), shape=(2 * count, 2 * count))
+    return number_labels(connected_components(links, directed=False)[1][families].tolist())
 
 
-def motions_in_words(clusters: Integers, labels: object) -> str:
-    """Return the number of motions and, if they have labels, of clusters."""
+def describe_sample(clusters: Integers, labels: object) -> str:
+    """Describe the number of motions and, if they have labels, of clusters."""
     text = format_count(len(clusters), "motion")
     return text if labels is None else f"{text} in {format_count(len(np.unique(clusters)), 'cluster')}"
 
 
-def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
-    """Family numbers of motions that are equal up to a factor, also a negative one if ``reversed_too``."""
+def number_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
+    """Assign numbers to families of motions that are equal up to a factor, also a negative one if ``reversed_too``."""
     # Invariants of scale and sign. Only motions with equal invariants are compared in full.
-    alike = np.empty((len(motions), 2))
+    invariants = np.empty((len(motions), 2))
     for k, motion in enumerate(motions):
-        size = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
-        alike[k] = (size / size.max()).mean(), np.sqrt(((size / size.max()) ** 2).mean())
-    firsts: list[int] = []
+        magnitudes = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
+        invariants[k] = (magnitudes / magnitudes.max()).mean(), np.sqrt(((magnitudes / magnitudes.max()) ** 2).mean())
+    representatives: list[int] = []
     families = np.empty(len(motions), dtype=np.int64)
     for k, motion in enumerate(motions):
-        near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= 1e-9, axis=1))
-        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion, reversed_too=reversed_too))
-        families[k] = next(same, len(firsts))
-        if families[k] == len(firsts):
-            firsts.append(k)
+        candidates = np.flatnonzero(np.all(np.abs(invariants[representatives] - invariants[k]) <= 1e-9, axis=1))
+        matches = (
+            int(j) for j in candidates if is_multiple(motions[representatives[j]], motion, reversed_too=reversed_too)
+        )
+        families[k] = next(matches, len(representatives))
+        if families[k] == len(representatives):
+            representatives.append(k)
     return families
 
 
-def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:
-    """Return the unit of the measure for each block (SI): the block's own unit, or 1."""
+def compute_units(blocks: Bodies, measure: Measure, model: Model) -> Floats:
+    """Compute the unit of the measure for each block (SI): the block's own unit, or 1."""
     if not measure.in_block_units:
         return np.ones(len(blocks))
-    lifting = [min(blocks[k].uplift_thresholds(model)) for k in range(len(blocks))]
-    return measure.unit(np.array(lifting), blocks.parameters()["p"][0].min(axis=1))
+    uplift_thresholds = [min(blocks[k].uplift_thresholds(model)) for k in range(len(blocks))]
+    return measure.unit(np.array(uplift_thresholds), blocks.parameters()["p"][0].min(axis=1))
 
 
 def simulate_levels(
@@ -197,88 +199,88 @@ def simulate_levels(
     """Simulate every block under every motion at every level, with the dimension ``level``."""
     import xarray as xr
 
-    units = units_of(blocks, measure, model)
+    units = compute_units(blocks, measure, model)
     groups = [np.flatnonzero(units == unit) for unit in np.unique(units)]
     parts = []
     for group in groups:
         scaled = {"levels": levels * units[group[0]], "measure": measure.alone}
         part = simulate_many(blocks.select(group), motions, model=model, **scaled, **options)
-        part = part.drop_vars(body_coordinates(blocks.select(group)))  # added to the whole
+        part = part.drop_vars(body_coordinates(blocks.select(group)))  # added to the full table
         parts.append(part.assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units})))
-    whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
-    ordered = whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
+    table = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
+    ordered = table.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
     return ordered.assign_coords(body_coordinates(blocks))
 
 
-def ratios_of(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: Floats | float) -> Floats:
-    """Ratio of peak rotation to slenderness: infinite for overturning, NaN for abandoned simulations."""
+def compute_ratios(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: Floats | float) -> Floats:
+    """Compute ratios of peak rotation to slenderness: infinite for overturning, NaN for abandoned simulations."""
     return np.asarray(np.where(unfinished, np.nan, np.where(overturned, np.inf, peak / slenderness)))
 
 
-def passed(ratio: Floats, limit: float, name: str) -> Floats:
-    """Whether the ratio of peak rotation to slenderness exceeds a limit (infinite: overturning), 1 or 0."""
-    limit = checked_limit(limit, name)
+def exceeds_limit(ratio: Floats, limit: float, name: str) -> Floats:
+    """Compare ratios of peak rotation to slenderness with a limit (infinite: overturning); 1 if exceeded, else 0."""
+    limit = check_limit(limit, name)
     return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
 
 
-def checked_limit(limit: float, name: str) -> float:
-    """Validate a limit of the ratio of peak rotation to slenderness."""
-    what = f"the limit {name!r} (rotation over slenderness)"
-    least = checks.real(limit, what, InvalidOption)
-    if not least >= 0.0:
-        raise InvalidOption(f"{{}} must be 0 or more, not {limit!r}", what, value=limit)
-    return least
+def check_limit(limit: float, name: str) -> float:
+    """Check a limit of the ratio of peak rotation to slenderness."""
+    argument = f"the limit {name!r} (rotation over slenderness)"
+    checked = checks.real(limit, argument, InvalidOption)
+    if not checked >= 0.0:
+        raise InvalidOption(f"{{}} must be 0 or more, not {limit!r}", argument, value=limit)
+    return checked
 
 
-def by_limit_state(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Return values by limit state, at least one."""
+def check_state_mapping(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Check values by limit state, at least one."""
     for state in checks.mapping(values, name, InvalidOption, "{'overturning': inf}"):
         checks.text(state, f"name of a limit state in {name}", InvalidOption)
     return values
 
 
-def checked_limit_states(limit_states: Mapping[str, float] | None) -> Mapping[str, float]:
-    """Return limits of the ratio of peak rotation to slenderness by limit state; by default overturning (infinite)."""
-    return {"overturning": math.inf} if limit_states is None else by_limit_state(limit_states, "limit_states")
+def check_limit_states(limit_states: Mapping[str, float] | None) -> Mapping[str, float]:
+    """Check limits of the ratio of peak rotation to slenderness; the default is overturning (infinite)."""
+    return {"overturning": math.inf} if limit_states is None else check_state_mapping(limit_states, "limit_states")
 
 
-def outcomes_of(
+def create_outcome_table(
     table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limit_states: Mapping[str, float]
 ) -> pd.DataFrame:
-    """Table of all simulations (level, motion, block, polarity) with the limits that they exceed."""
+    """Create a table of all simulations (level, motion, block, polarity) with the limits that they exceed."""
     import pandas as pd
 
-    def along(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    def expand(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         return np.broadcast_to(values, ratio.shape).ravel()  # order: level, motion, block, polarity
 
     signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
-    motions = [name for name in ("motion", "vertical") if name in table.coords]
+    motion_names = [name for name in ("motion", "vertical") if name in table.coords]
     return pd.DataFrame(
         {
-            **{name: along(table[name].values[:, None, None]) for name in motions},
-            "block": along(np.arange(table.sizes["block"])[:, None]),
-            "polarity": along(signs),
+            **{name: expand(table[name].values[:, None, None]) for name in motion_names},
+            "block": expand(np.arange(table.sizes["block"])[:, None]),
+            "polarity": expand(signs),
             measure.column: intensity,
             "peak_rotation_rad": table.peak_rotation.values.ravel(),
             "peak_over_alpha": ratio.ravel(),
             "overturned": table.overturned.values.ravel(),
             "unfinished": table.unfinished.values.ravel(),
             **{
-                f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool)
+                f"exceeded_{name}": exceeds_limit(ratio, limit, name).ravel().astype(bool)
                 for name, limit in limit_states.items()
             },
         }
     )
 
 
-def weights_of(weights: ArrayLike | None, count: int) -> Floats:
+def normalise_positive_weights(weights: ArrayLike | None, count: int) -> Floats:
     """Normalise weights to mean 1 over blocks of positive weight, so that zero weights do not change the count."""
-    shares = normalised_weights(weights, count)
-    return np.asarray(shares / shares[shares > 0.0].mean())
+    normalised = normalise_weights(weights, count)
+    return np.asarray(normalised / normalised[normalised > 0.0].mean())
 
 
-def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
-    """Append the polarities to a description if both were requested."""
+def describe_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
+    """Describe the polarities if both were requested."""
     if polarity != "both":
         return ""
     return ", one polarity, since a symmetric block does the same in both" if is_symmetric else ", both polarities"
@@ -290,24 +292,24 @@ def note_missing(unfinished: Flags) -> None:
         note(f"{text}, and each counts as half overturned")
 
 
-def undecided_text(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags) -> str:
+def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags) -> str:
     """Describe how many outcomes of a sample change when motions are scaled by 1 +- 3e-6.
 
     Factors of the motions and outcomes are over (level, motion, block, polarity).
     """
-    drawn = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
-    _, motion, block, _ = np.unravel_index(drawn, overturned.shape)
-    factor, was = np.broadcast_to(factors, overturned.shape).ravel()[drawn], overturned.ravel()[drawn]
-    near = factors_near(RELATIVE, COUNT)
+    indices = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
+    _, motion, block, _ = np.unravel_index(indices, overturned.shape)
+    factor, original = np.broadcast_to(factors, overturned.shape).ravel()[indices], overturned.ravel()[indices]
+    scales = factors_near(RELATIVE, COUNT)
     tasks = (
         Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
         for k, (m, b) in enumerate(zip(motion, block, strict=True))
-        for scale in (near[0], near[-1])
+        for scale in (scales[0], scales[-1])
     )
-    found = simulate_tasks(setup, tasks)
-    changed = {task.key for task, outcomes in found if outcomes["overturned"][0] != was[task.key[0]]}
-    sample = format_count(len(drawn), "outcome")
-    return f"undecided within {percent(near[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
+    results = simulate_tasks(setup, tasks)
+    changed = {task.key for task, outcomes in results if outcomes["overturned"][0] != original[task.key[0]]}
+    sample = format_count(len(indices), "outcome")
+    return f"undecided within {percent(scales[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,8 +328,8 @@ class Boundaries:
         return bisection.find_middles(self.low, self.high)
 
 
-def boundaries(
-    levels: Floats, outcome: Integers, outcome_of: Callable[[Integers, Floats], Integers], *, rtol: float
+def find_boundaries(
+    levels: Floats, outcome: Integers, find_outcome: Callable[[Integers, Floats], Integers], *, rtol: float
 ) -> Boundaries:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
@@ -335,33 +337,41 @@ def boundaries(
     Changes between two levels of equal outcome are not detected.
     """
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
-    here = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
-    origin = np.arange(len(here.level))
-    left = _halvings(here, rtol)
-    with Progress("refining", left) as bar:
-        while (wide := bisection.is_wide(here.low, here.high, rtol)).any():
-            found = here.below.copy()
-            found[wide] = outcome_of(here.column[wide], here.level[wide])
-            here, origin = _halved(here, wide, found, origin)
-            # A third outcome adds brackets, which the bar waits for.
-            before, left = left, min(left, _halvings(here, rtol))
-            bar.advance(before - left)
-    order = np.lexsort((here.low, here.column))
-    return Boundaries(*(values[order] for values in vars(here).values()))
+    brackets = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
+    origin = np.arange(len(brackets.level))
+    remaining = _count_bisections(brackets, rtol)
+    with Progress("refining", remaining) as bar:
+        while (is_wide := bisection.is_wide(brackets.low, brackets.high, rtol)).any():
+            outcomes = brackets.below.copy()
+            outcomes[is_wide] = find_outcome(brackets.column[is_wide], brackets.level[is_wide])
+            brackets, origin = _bisect_brackets(brackets, is_wide, outcomes, origin)
+            # A third outcome adds brackets, for which the progress bar does not move back.
+            previous, remaining = remaining, min(remaining, _count_bisections(brackets, rtol))
+            bar.advance(previous - remaining)
+    order = np.lexsort((brackets.low, brackets.column))
+    return Boundaries(*(values[order] for values in vars(brackets).values()))
 
 
-def _halvings(here: Boundaries, rtol: float) -> int:
-    """Count the remaining bisections of the present brackets."""
-    return int(np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (rtol * here.high)))).sum())
+def _count_bisections(brackets: Boundaries, rtol: float) -> int:
+    """Count the bisections that brackets still need."""
+    return int(np.ceil(np.log2(np.maximum(1.0, (brackets.high - brackets.low) / (rtol * brackets.high)))).sum())
 
 
-def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
+def _bisect_brackets(
+    brackets: Boundaries, is_wide: Flags, outcomes: Integers, origin: Integers
+) -> tuple[Boundaries, Integers]:
     """Bisect wide brackets, and split those with a third outcome."""
-    few = np.bincount(origin)[origin] < 64
-    third = wide & few & (found != here.below) & (found != here.above)
-    up = wide & (found == here.below)
-    low, high = bisection.halve(here.low, here.high, up, wide & ~up)
-    lower = Boundaries(here.column, low, high, here.below, np.where(third, found, here.above))
-    upper = Boundaries(here.column[third], here.level[third], here.high[third], found[third], here.above[third])
+    has_few_changes = np.bincount(origin)[origin] < 64
+    is_third = is_wide & has_few_changes & (outcomes != brackets.below) & (outcomes != brackets.above)
+    moves_up = is_wide & (outcomes == brackets.below)
+    low, high = bisection.halve(brackets.low, brackets.high, moves_up, is_wide & ~moves_up)
+    lower = Boundaries(brackets.column, low, high, brackets.below, np.where(is_third, outcomes, brackets.above))
+    upper = Boundaries(
+        brackets.column[is_third],
+        brackets.level[is_third],
+        brackets.high[is_third],
+        outcomes[is_third],
+        brackets.above[is_third],
+    )
     both = (np.concatenate(pair) for pair in zip(vars(lower).values(), vars(upper).values(), strict=True))
-    return Boundaries(*both), np.concatenate([origin, origin[third]])
+    return Boundaries(*both), np.concatenate([origin, origin[is_third]])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.analysis.levels import Boundaries, boundaries
+from rocking.analysis.levels import Boundaries, find_boundaries
 from rocking.block import Block, Blocks, one_block
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
@@ -61,7 +61,7 @@ class OverturningMode(IntEnum):
     ROCKS = -1
 
 
-_NAMES: Final = {
+_MODE_NAMES: Final = {
     OverturningMode.UNFINISHED: "not finished",
     OverturningMode.OVERTURNS_AFTER_REST: "overturns after a rest",
     OverturningMode.NO_UPLIFT: "no uplift",
@@ -75,7 +75,7 @@ _NAMES: Final = {
 PULSES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
 #: Largest relative difference of two motions of one shape, as in samples at a constant step.
-_SAME: Final = 0.02
+_SHAPE_TOLERANCE: Final = 0.02
 
 
 def overturning_map(
@@ -153,24 +153,24 @@ def overturning_map(
     levels = checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption)
     ratios = checks.increasing_numbers(frequencies, "frequencies", InvalidOption)
     checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
-    width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
+    relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     one_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption(
             "a block with {} 1 never comes to rest; an overturning map needs one below 1", "restitution"
         )
-    slowest = min(side.p for side in block.sides)
-    made, own = _pulse_function(pulse, parameters), slowest / (2.0 * math.pi)
-    unit = _called(made, 1.0, own)
+    min_p = min(side.p for side in block.sides)
+    create_pulse, frequency = _create_pulse_function(pulse, parameters), min_p / (2.0 * math.pi)
+    unit = _call_pulse(create_pulse, 1.0, frequency)
     for ratio in {float(ratios[0]), float(ratios[-1])}:
-        stronger = 1.0 + ratio
-        other = _called(made, stronger, ratio * own)
-        pairs = (unit, other), (unit.vertical, other.vertical)
-        if not all(_is_alike(first, second, stronger, ratio) for first, second in pairs):
+        amplitude = 1.0 + ratio
+        scaled_pulse = _call_pulse(create_pulse, amplitude, ratio * frequency)
+        pairs = (unit, scaled_pulse), (unit.vertical, scaled_pulse.vertical)
+        if not all(_is_alike(first, second, amplitude, ratio) for first, second in pairs):
             raise InvalidOption(
                 "the {} must have one shape: a function of amplitude and frequency whose motion is proportional to the "
-                f"amplitude, and over in half the time at twice the frequency; that of {own:g} Hz is another one "
-                f"than that of {ratio * own:g} Hz",
+                f"amplitude, and over in half the time at twice the frequency; that of {frequency:g} Hz is another one "
+                f"than that of {ratio * frequency:g} Hz",
                 "pulse",
             )
     p, alpha, restitution = (
@@ -178,24 +178,26 @@ def overturning_map(
     )
     # Blocks of one shape with values of p that correspond to the ratios for a pulse of the block's frequency.
     blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
-    setup, threshold = Setup(blocks, model, Certified(width * unit.end)), min(block.uplift_thresholds(model))
+    setup, threshold = (Setup(blocks, model, Certified(relative_width * unit.end)), min(block.uplift_thresholds(model)))
 
-    def followed(
-        column: Integers, level: Floats, done: Callable[[int], None] = lambda count: None
+    def simulate_modes(
+        column: Integers, level: Floats, advance: Callable[[int], None] = lambda count: None
     ) -> tuple[Integers, Floats]:
-        """OverturningMode and peak rotation of each block, selected by column, at its level."""
-        ends = np.empty(column.size, dtype=OUTCOME)
-        here = replace(setup, bodies=setup.bodies.select(column))
-        for task, outcomes in simulate_each(here, unit, threshold * level):
-            ends[task.bodies] = outcomes
-            done(len(outcomes))
-        return np.where(ends["unfinished"], OverturningMode.UNFINISHED, modes_of(ends, unit.end)), ends["peak_rotation"]
+        """Simulate the block of each column at its level, and return modes and peak rotations."""
+        records = np.empty(column.size, dtype=OUTCOME)
+        selection = replace(setup, bodies=setup.bodies.select(column))
+        for task, outcomes in simulate_each(selection, unit, threshold * level):
+            records[task.bodies] = outcomes
+            advance(len(outcomes))
+        return np.where(records["unfinished"], OverturningMode.UNFINISHED, classify_modes(records, unit.end)), records[
+            "peak_rotation"
+        ]
 
     row, column = (index.ravel() for index in np.indices((levels.size, ratios.size)))
     with Progress("mapping", row.size) as bar:
-        modes, peaks = followed(column, levels[row], bar.advance)
+        modes, peaks = simulate_modes(column, levels[row], bar.advance)
     modes, peaks = modes.reshape(levels.size, -1), peaks.reshape(levels.size, -1)
-    edges = boundaries(levels, modes, lambda *at: followed(*at)[0], rtol=width)
+    brackets = find_boundaries(levels, modes, lambda *arguments: simulate_modes(*arguments)[0], rtol=relative_width)
     attributes = {
         "program": f"rocking {VERSION}",
         "model": model,
@@ -204,18 +206,18 @@ def overturning_map(
         "restitution": [side.restitution for side in block.sides],
         "pulse": f"{unit.name}: {unit.description.text}",
         "pulse_name": unit.name,
-        "rtol": width,
+        "rtol": relative_width,
     }
-    return OverturningMap(_dataset(levels, ratios, modes, peaks, edges, attributes))
+    return OverturningMap(_combine_modes(levels, ratios, modes, peaks, brackets, attributes))
 
 
 def mode_name(mode: int) -> str:
-    """Return the description of a `OverturningMode` or of a number of impacts before overturning.
+    """Return the description of an `OverturningMode` or of a number of impacts before overturning.
 
     Parameters
     ----------
     mode : int
-        OverturningMode in the results of `overturning_map`.
+        Mode in the results of `overturning_map`.
 
     Returns
     -------
@@ -228,23 +230,25 @@ def mode_name(mode: int) -> str:
     ('rests before the pulse is over', 'overturns without impact', 'overturns after 1 impact')
     """
     if mode <= 0:
-        return _NAMES[int(mode)]
+        return _MODE_NAMES[int(mode)]
     return f"overturns after {mode} impact{'s' if mode > 1 else ''}"
 
 
-def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
-    """Modes of blocks under a motion of given duration (s), from the engine's results."""
-    rested = (ends["uplifts"] > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= duration))
-    modes = np.where(
-        ends["uplifts"] == 0, OverturningMode.NO_UPLIFT, np.where(rested, OverturningMode.RESTS, OverturningMode.ROCKS)
+def classify_modes(records: NDArray[np.void], duration: float) -> Integers:
+    """Classify the outcomes of blocks under a motion with a duration (s) from the engine's results."""
+    has_rested = (records["uplifts"] > 1) | ((records["rests"] > 0) & (records["last_rest"] <= duration))
+    standing_modes = np.where(
+        records["uplifts"] == 0,
+        OverturningMode.NO_UPLIFT,
+        np.where(has_rested, OverturningMode.RESTS, OverturningMode.ROCKS),
     )
-    overturns = np.where(ends["uplifts"] > 1, OverturningMode.OVERTURNS_AFTER_REST, ends["impacts"])
-    return np.where(ends["overturned"], overturns, modes)
+    overturning_modes = np.where(records["uplifts"] > 1, OverturningMode.OVERTURNS_AFTER_REST, records["impacts"])
+    return np.where(records["overturned"], overturning_modes, standing_modes)
 
 
-def _overturns(modes: Integers) -> Flags:
-    found: Flags = (modes >= 0) | (modes == OverturningMode.OVERTURNS_AFTER_REST)
-    return found
+def _is_overturning(modes: Integers) -> Flags:
+    is_overturning: Flags = (modes >= 0) | (modes == OverturningMode.OVERTURNS_AFTER_REST)
+    return is_overturning
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -256,10 +260,10 @@ class OverturningMap(DatasetResult):
     Attributes
     ----------
     data : xarray.Dataset
-        Over (amplitude, frequency): mode (a `OverturningMode`, or the number of impacts before overturning), and peak_rotation
-        (rad, pi/2 for overturning). Over (frequency): overturning_amplitude, the lowest that overturns, or NaN if none
-        or already the first does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and
-        above the boundary.
+        Over (amplitude, frequency): mode (an `OverturningMode`, or the number of impacts before overturning), and
+        peak_rotation (rad, pi/2 for overturning). Over (frequency): overturning_amplitude, the lowest that overturns,
+        or NaN if none or already the first does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes
+        below and above the boundary.
 
     See Also
     --------
@@ -276,9 +280,9 @@ class OverturningMap(DatasetResult):
 
     @staticmethod
     def _restrict(data: xr.Dataset) -> xr.Dataset:
-        at, level = data.boundary_frequency.values, data.boundary_amplitude.values
+        frequency, amplitude = data.boundary_frequency.values, data.boundary_amplitude.values
         low, high = data.amplitude.values.min(), data.amplitude.values.max()
-        return data.isel(boundary=np.isin(at, data.frequency.values) & (low < level) & (level <= high))
+        return data.isel(boundary=np.isin(frequency, data.frequency.values) & (low < amplitude) & (amplitude <= high))
 
     def summary(self) -> str:
         modes, counts = np.unique(self.data.mode, return_counts=True)
@@ -287,7 +291,7 @@ class OverturningMap(DatasetResult):
             (mode_name(int(mode)), f"{percent:.1f} %" if percent >= 0.1 else "below 0.1 %")
             for mode, percent in zip(modes, percents, strict=True)
         ]
-        rows = [(float(ratio), self._lowest(k)) for k, ratio in enumerate(self.data.frequency)]
+        rows = [(float(ratio), self._describe_lowest(k)) for k, ratio in enumerate(self.data.frequency)]
         return "\n\n".join(
             [
                 f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model",
@@ -301,12 +305,12 @@ class OverturningMap(DatasetResult):
             ]
         )
 
-    def _lowest(self, k: int) -> str:
+    def _describe_lowest(self, k: int) -> str:
         """Describe the lowest amplitude of the grid's range that overturns at a frequency."""
         lowest, amplitudes = float(self.data.overturning_amplitude[k]), self.data.amplitude.values
         if not math.isnan(lowest):
             return format_cell(lowest)
-        is_open_below = _overturns(self.data.mode.values[0, k])
+        is_open_below = _is_overturning(self.data.mode.values[0, k])
         return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -325,16 +329,16 @@ class OverturningMap(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.maps import regions_figure
+        from rocking.plot.maps import draw_regions
 
         data = self.data
         modes = data.mode.values
         columns = [data.boundary_frequency.values == ratio for ratio in data.frequency.values]
-        return regions_figure(
+        return draw_regions(
             x=data.frequency.values,
             y_range=(float(data.amplitude[0]), float(data.amplitude[-1])),
-            edges=[data.boundary_amplitude.values[here] for here in columns],
-            regions=[[modes[0, k], *data.mode_above.values[here]] for k, here in enumerate(columns)],
+            edges=[data.boundary_amplitude.values[is_column] for is_column in columns],
+            regions=[[modes[0, k], *data.mode_above.values[is_column]] for k, is_column in enumerate(columns)],
             names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
             x_label="2πf/p, with the frequency f of the pulse",
             y_label="amplitude over the smallest that lifts the block",
@@ -353,14 +357,15 @@ class OverturningMap(DatasetResult):
         return f"alpha = {alpha} rad, restitution = {restitution}"
 
 
-def _pulse_function(
+def _create_pulse_function(
     pulse: str | Callable[[float, float], Motion], parameters: dict[str, Any]
 ) -> Callable[[float, float], Motion]:
-    """Return a function of amplitude (m/s^2, peak for named pulses) and frequency (Hz) that creates a pulse."""
+    """Create a function of amplitude (m/s^2, peak for named pulses) and frequency (Hz) that returns a pulse."""
     if callable(pulse):
         if parameters:
             raise InvalidOption(
-                f"a {{}} given as a function takes no {', '.join(parameters)}: bind them to it", "pulse"
+                f"{{}} is a function, so no parameters are accepted; got {', '.join(parameters)}: bind them to it",
+                "pulse",
             )
         return pulse
     family = find_family(pulse)
@@ -369,14 +374,14 @@ def _pulse_function(
             f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse", value=pulse
         )
 
-    def named_pulse(amplitude: float, frequency: float) -> Motion:
-        made = family.create_motion({"amplitude": 1.0, "frequency": frequency} | parameters)
-        return made.scaled_to(amplitude) if family.is_of_velocity else made.scaled(amplitude)
+    def create_named_pulse(amplitude: float, frequency: float) -> Motion:
+        motion = family.create_motion({"amplitude": 1.0, "frequency": frequency} | parameters)
+        return motion.scaled_to(amplitude) if family.is_of_velocity else motion.scaled(amplitude)
 
-    return named_pulse
+    return create_named_pulse
 
 
-def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
+def _call_pulse(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
     motion = check_motion(pulse(amplitude, frequency))
     if motion is None:
         raise InvalidMotion(
@@ -389,41 +394,44 @@ def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio:
     """Whether one component equals the other up to a factor and a ratio of durations, or both are missing."""
     if first is None or second is None:
         return first is second
-    if abs(ratio * second.duration - first.duration) > _SAME * first.duration:
+    if abs(ratio * second.duration - first.duration) > _SHAPE_TOLERANCE * first.duration:
         return False
     phases = (np.arange(400) + 0.5) / 400
-    one, other = first.acceleration(phases * first.duration), second.acceleration(phases * second.duration) / factor
-    return bool(np.abs(other - one).mean() <= _SAME * np.abs(one).max())
+    first_values, second_values = (
+        first.acceleration(phases * first.duration),
+        second.acceleration(phases * second.duration) / factor,
+    )
+    return bool(np.abs(second_values - first_values).mean() <= _SHAPE_TOLERANCE * np.abs(first_values).max())
 
 
-def _dataset(
-    levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, edges: Boundaries, attributes: dict[str, Any]
+def _combine_modes(
+    levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, brackets: Boundaries, attributes: dict[str, Any]
 ) -> xr.Dataset:
     import xarray as xr
 
     lowest = np.full(ratios.size, np.inf)
-    overturns = _overturns(edges.above) & ~_overturns(edges.below)
-    np.minimum.at(lowest, edges.column[overturns], edges.level[overturns])
-    lowest[np.isinf(lowest) | _overturns(modes[0])] = np.nan
+    overturns = _is_overturning(brackets.above) & ~_is_overturning(brackets.below)
+    np.minimum.at(lowest, brackets.column[overturns], brackets.level[overturns])
+    lowest[np.isinf(lowest) | _is_overturning(modes[0])] = np.nan
     meaning = (
         "-5: not finished, -4: overturns after a rest, -3: no uplift, -2: rests before the pulse is over, -1: rocks, "
         "n >= 0: overturns after n impacts"
     )
-    over = "over the smallest acceleration that lifts the block"
+    normalisation = "over the smallest acceleration that lifts the block"
     return xr.Dataset(
         {
             "mode": variable(("amplitude", "frequency"), modes, meaning),
             "peak_rotation": variable(("amplitude", "frequency"), peaks, "largest rotation in size", "rad"),
             "overturning_amplitude": variable(
-                "frequency", lowest, f"lowest amplitude that overturns the block, {over}", "1"
+                "frequency", lowest, f"lowest amplitude that overturns the block, {normalisation}", "1"
             ),
-            "boundary_frequency": variable("boundary", ratios[edges.column], unit="1"),
-            "boundary_amplitude": variable("boundary", edges.level, unit="1"),
-            "mode_below": variable("boundary", edges.below, meaning),
-            "mode_above": variable("boundary", edges.above, meaning),
+            "boundary_frequency": variable("boundary", ratios[brackets.column], unit="1"),
+            "boundary_amplitude": variable("boundary", brackets.level, unit="1"),
+            "mode_below": variable("boundary", brackets.below, meaning),
+            "mode_above": variable("boundary", brackets.above, meaning),
         },
         {
-            "amplitude": variable("amplitude", levels, f"amplitude of the pulse {over}", "1"),
+            "amplitude": variable("amplitude", levels, f"amplitude of the pulse {normalisation}", "1"),
             "frequency": variable("frequency", ratios, "2 pi times the pulse's frequency, over p", "1"),
         },
         attributes,

@@ -16,7 +16,7 @@ import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
 
-_ITERATIONS: Final = 100
+_MAX_ITERATIONS: Final = 100
 
 
 #: Slope that represents a step.
@@ -24,16 +24,16 @@ STEEP: Final = 1e9
 
 #: Minimum number of outcomes in a group of the test of fit, and maximum number of groups of binary outcomes (Hosmer and
 #: Lemeshow).
-_GROUP: Final = 5
+_MIN_GROUP_SIZE: Final = 5
 
 #: Directions that discretise a region, which loses 4e-5 of an interval's width.
-_RAYS: Final = 360
+_RAY_COUNT: Final = 360
 
 #: Relative tolerance of the end of a ray.
-_SAME: Final = 1e-9
+_RAY_TOLERANCE: Final = 1e-9
 
 #: Minimum number of clusters for an estimate of their differences.
-_FEWEST: Final = 3
+_MIN_CLUSTERS: Final = 3
 
 
 class Outcomes(NamedTuple):
@@ -47,9 +47,9 @@ class Outcomes(NamedTuple):
         """Return one data set with an additional dimension of length 1."""
         return Outcomes(self.z, self.exceeded[None, :], self.trials[None, :])
 
-    def select(self, sets: Flags) -> Outcomes:
+    def select(self, is_selected: Flags) -> Outcomes:
         """Return selected data sets."""
-        return Outcomes(self.z, self.exceeded[sets], self.trials[sets])
+        return Outcomes(self.z, self.exceeded[is_selected], self.trials[is_selected])
 
 
 class Probit(NamedTuple):
@@ -71,23 +71,25 @@ class Probit(NamedTuple):
 
 
 #: Level curves at 0 and 1, and steps below and above all possible intensities.
-_STEPS_AT: Final = 1000.0 * STEEP
-_WHOLE_PLANE: Final = Probit(np.array([-np.inf, np.inf, _STEPS_AT, -_STEPS_AT]), np.array([0.0, 0.0, STEEP, STEEP]))
+_STEP_INTERCEPT: Final = 1000.0 * STEEP
+_WHOLE_PLANE: Final = Probit(
+    np.array([-np.inf, np.inf, _STEP_INTERCEPT, -_STEP_INTERCEPT]), np.array([0.0, 0.0, STEEP, STEEP])
+)
 
 
-def normal_scores(fits: Probit, z: Floats) -> Floats:
-    """Return normal scores of the probability at logarithms of the intensity, shape (fits, len(z)), -inf at 0."""
+def compute_normal_scores(fits: Probit, z: Floats) -> Floats:
+    """Compute normal scores of the probability at logarithms of the intensity, shape (fits, len(z)), -inf at 0."""
     finite = np.isfinite(z)
-    at = fits.intercept[:, None] + fits.slope[:, None] * np.where(finite, z, 0.0)
-    return np.where(finite, at, z)
+    scores = fits.intercept[:, None] + fits.slope[:, None] * np.where(finite, z, 0.0)
+    return np.where(finite, scores, z)
 
 
-def probabilities(fits: Probit, z: Floats) -> Floats:
-    """Return probabilities at logarithms of the intensity, shape (fits, len(z))."""
+def compute_probabilities(fits: Probit, z: Floats) -> Floats:
+    """Compute probabilities at logarithms of the intensity, shape (fits, len(z))."""
     from scipy.special import ndtr
 
-    result: Floats = ndtr(normal_scores(fits, z))
-    return result
+    values: Floats = ndtr(compute_normal_scores(fits, z))
+    return values
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ class Goodness:
     statistic : float
         Sum over groups of (seen - expected)^2/variance.
     degrees_of_freedom : int
-        Degrees of degrees_of_freedom: number of groups minus two.
+        Number of groups minus two.
     p_value : float
         Probability of a larger statistic if the lognormal is right, or NaN for fewer than three groups or dependent
         outcomes.
@@ -114,30 +116,33 @@ def merge_equal_intensities(intensity: Floats) -> Floats:
     """Merge intensities that differ by rounding only, for example after scaling."""
     order = np.argsort(intensity, kind="stable")
     ordered = intensity[order]
-    grows = np.diff(np.log(ordered), prepend=-np.inf) > 1e-9
-    found = np.empty_like(ordered)
-    found[order] = ordered[grows][np.cumsum(grows) - 1]
-    return found
+    is_larger = np.diff(np.log(ordered), prepend=-np.inf) > 1e-9
+    merged = np.empty_like(ordered)
+    merged[order] = ordered[is_larger][np.cumsum(is_larger) - 1]
+    return merged
 
 
-def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
-    """Return the reason why no rising lognormal fits a data set, with intensities formatted by `shown`, or None."""
+def explain_missing_fit(data: Outcomes, format_intensity: Callable[[float], str]) -> str | None:
+    """Explain why no rising lognormal fits a data set, or return None if one does."""
     z, exceeded, trials = data
-    yes, no, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
-    if not yes.size or not no.size:
-        which, wanted = ("no", "stronger") if not yes.size else ("every", "weaker")
-        return f"{which} outcome of {count} exceeds the limit, {_tried(z, shown)}: {wanted} motions are needed"
-    if z.min() == z.max():
-        return f"all outcomes are at one intensity, {shown(math.exp(z[0]))}: others are needed"
-    if no.max() <= yes.min() + _overlap(z):
-        low, high = math.exp(no.max()), math.exp(yes.min())
-        last, first = ("below", "above it") if low >= high else ("up to", f"from {shown(high)} on")
-        where = f"{last} {shown(low)} and all do {first}"
+    exceeded_z, other_z, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
+    if not exceeded_z.size or not other_z.size:
+        quantifier, remedy = ("no", "stronger") if not exceeded_z.size else ("every", "weaker")
         return (
-            f"the outcomes are separated, none exceeds the limit {where}: the fragility is a step there, and motions "
+            f"{quantifier} outcome of {count} exceeds the limit, {_describe_range(z, format_intensity)}: "
+            f"{remedy} motions are needed"
+        )
+    if z.min() == z.max():
+        return f"all outcomes are at one intensity, {format_intensity(math.exp(z[0]))}: others are needed"
+    if other_z.max() <= exceeded_z.min() + _compute_overlap(z):
+        low, high = math.exp(other_z.max()), math.exp(exceeded_z.min())
+        start, rest = ("below", "above it") if low >= high else ("up to", f"from {format_intensity(high)} on")
+        gap = f"{start} {format_intensity(low)} and all do {rest}"
+        return (
+            f"the outcomes are separated, none exceeds the limit {gap}: the fragility is a step there, and motions "
             "near it are needed"
         )
-    if not _rises(data.alone())[0]:
+    if not _is_rising(data.alone())[0]:
         return (
             "the outcomes contradict a curve that rises, the limit is exceeded no more often at higher intensities: "
             "another measure or more motions are needed"
@@ -145,30 +150,30 @@ def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
     return None
 
 
-def _tried(z: Floats, shown: Callable[[float], str]) -> str:
+def _describe_range(z: Floats, format_intensity: Callable[[float], str]) -> str:
     """Describe the range of intensities."""
-    low, high = (shown(math.exp(end)) for end in (z.min(), z.max()))
+    low, high = (format_intensity(math.exp(end)) for end in (z.min(), z.max()))
     return f"at {low}" if low == high else f"at {low} to {high}"
 
 
 def fit(data: Outcomes) -> Probit:
-    """Fit several data sets that are not `unidentified` by maximum likelihood (Fisher's scoring)."""
+    """Fit several data sets that have one (`explain_missing_fit`) by maximum likelihood (Fisher's scoring)."""
     centre, spread = data.z.mean(), data.z.std()
     scaled = data._replace(z=(data.z - centre) / spread)
     beta = np.zeros((len(data.trials), 2))
-    now = likelihood(scaled, beta)
+    current = compute_log_likelihood(scaled, beta)
     powers = np.stack([np.ones_like(scaled.z), scaled.z])
-    most = np.einsum("fn,jn,kn->fjk", data.trials, powers, powers)
-    for _ in range(_ITERATIONS):
+    full_information = np.einsum("fn,jn,kn->fjk", data.trials, powers, powers)
+    for _ in range(_MAX_ITERATIONS):
         with np.errstate(all="ignore"):
-            gradient, information = _scores(scaled, beta)
-            step = _solved(information, gradient)
+            gradient, information = _differentiate(scaled, beta)
+            step = _solve_pairs(information, gradient)
         # Far from the maximum the information may vanish by rounding. The step of the complete data (EM) still
         # increases the likelihood.
-        lost = ~np.isfinite(step).all(axis=1)
-        step[lost] = _solved(most[lost], gradient[lost])
-        step, then = _uphill(scaled, beta, step, now)
-        beta, now = beta + step, then
+        is_singular = ~np.isfinite(step).all(axis=1)
+        step[is_singular] = _solve_pairs(full_information[is_singular], gradient[is_singular])
+        step, following = _shorten_steps(scaled, beta, step, current)
+        beta, current = beta + step, following
         if np.all(np.abs(step) <= 1e-11 * np.abs(beta).max(axis=1, keepdims=True)):
             break
     slope = beta[:, 1] / spread
@@ -180,129 +185,132 @@ def fit_or_limits(data: Outcomes) -> Probit:
     from scipy.special import ndtri
 
     z, exceeded, trials = data
-    lowest_yes = np.where(exceeded > 0, z, np.inf).min(axis=1)
-    highest_no = np.where(exceeded < trials, z, -np.inf).max(axis=1)
-    step = np.isfinite(highest_no - lowest_yes) & (highest_no <= lowest_yes + _overlap(z))
+    min_exceeded = np.where(exceeded > 0, z, np.inf).min(axis=1)
+    max_other = np.where(exceeded < trials, z, -np.inf).max(axis=1)
+    is_step = np.isfinite(max_other - min_exceeded) & (max_other <= min_exceeded + _compute_overlap(z))
     # If the best curve would fall, the limit is level: one probability, 0 or 1 if all outcomes are equal.
-    fits = Probit(ndtri(exceeded.sum(axis=1) / trials.sum(axis=1)), np.where(step, STEEP, 0.0))
-    fits.intercept[step] = -0.5 * STEEP * (highest_no + lowest_yes)[step]
-    if (regular := ~step & _rises(data)).any():
-        fits.intercept[regular], fits.slope[regular] = fit(data.select(regular))
+    fits = Probit(ndtri(exceeded.sum(axis=1) / trials.sum(axis=1)), np.where(is_step, STEEP, 0.0))
+    fits.intercept[is_step] = -0.5 * STEEP * (max_other + min_exceeded)[is_step]
+    if (is_regular := ~is_step & _is_rising(data)).any():
+        fits.intercept[is_regular], fits.slope[is_regular] = fit(data.select(is_regular))
     return fits
 
 
-def likelihood(data: Outcomes, beta: Floats) -> Floats:
-    """Log-likelihood of parameters (fits, 2), without binomial coefficients."""
+def compute_log_likelihood(data: Outcomes, beta: Floats) -> Floats:
+    """Compute the log-likelihood of parameters (fits, 2), without binomial coefficients."""
     from scipy.special import log_ndtr
 
     z, exceeded, trials = data
-    at = beta[:, :1] + beta[:, 1:] * z
-    terms = np.where(exceeded > 0, exceeded * log_ndtr(at), 0.0)
-    terms += np.where(exceeded < trials, (trials - exceeded) * log_ndtr(-at), 0.0)
+    scores = beta[:, :1] + beta[:, 1:] * z
+    terms = np.where(exceeded > 0, exceeded * log_ndtr(scores), 0.0)
+    terms += np.where(exceeded < trials, (trials - exceeded) * log_ndtr(-scores), 0.0)
     total: Floats = terms.sum(axis=1)
     return total
 
 
-def covariance(data: Outcomes, fitted: Probit) -> Floats:
-    """Inverse of Fisher's expected information of intercept and slope for one fit, shape (2, 2)."""
-    scaled, about, centre, spread = _standardised(data, fitted)
+def compute_covariance(data: Outcomes, fitted: Probit) -> Floats:
+    """Compute the inverse of Fisher's expected information of intercept and slope for one fit, shape (2, 2)."""
+    scaled, scaled_fit, centre, spread = _standardise(data, fitted)
     counts = scaled._replace(exceeded=np.zeros_like(data.trials))
-    change = np.array([[1.0, -centre / spread], [0.0, 1.0 / spread]])
+    transform = np.array([[1.0, -centre / spread], [0.0, 1.0 / spread]])
     return np.asarray(
-        change @ np.linalg.inv(_scores(counts, np.column_stack(about))[1][0]) @ change.T, dtype=np.float64
+        transform @ np.linalg.inv(_differentiate(counts, np.column_stack(scaled_fit))[1][0]) @ transform.T,
+        dtype=np.float64,
     )
 
 
-def _standardised(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
+def _standardise(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
     """Standardise z in data and fits for accuracy, and return mean and deviation of z as well."""
     centre, spread = float(data.z.mean()), float(data.z.std())
     scaled = data._replace(z=(data.z - centre) / spread)
     return scaled, Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread), centre, spread
 
 
-def groups(z: Floats, trials: Floats) -> Integers:
-    """Group of each outcome: its intensity if all have five outcomes or more, else one of up to ten equal groups."""
-    level = np.unique(z, return_inverse=True)[1]
-    held = np.bincount(level, trials)
-    if held.min() >= _GROUP:
-        return np.asarray(level, dtype=np.int64)
-    wanted = min(10, int(trials.sum()) // _GROUP)
-    middle = (np.cumsum(held) - 0.5 * held) / held.sum()
-    _, group = np.unique((middle * wanted).astype(np.int64), return_inverse=True)
-    return np.asarray(group[level], dtype=np.int64)
+def group_outcomes(z: Floats, trials: Floats) -> Integers:
+    """Assign outcomes to groups: by intensity if each has five outcomes or more, else up to ten equal groups."""
+    intensity_index = np.unique(z, return_inverse=True)[1]
+    trial_counts = np.bincount(intensity_index, trials)
+    if trial_counts.min() >= _MIN_GROUP_SIZE:
+        return np.asarray(intensity_index, dtype=np.int64)
+    group_count = min(10, int(trials.sum()) // _MIN_GROUP_SIZE)
+    midpoints = (np.cumsum(trial_counts) - 0.5 * trial_counts) / trial_counts.sum()
+    _, group = np.unique((midpoints * group_count).astype(np.int64), return_inverse=True)
+    return np.asarray(group[intensity_index], dtype=np.int64)
 
 
-def goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
-    """Test the fit by Pearson's statistic of its `groups`."""
+def compute_goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
+    """Test the fit by Pearson's statistic of groups of outcomes."""
     from scipy.special import gammaincc
 
-    group = groups(data.z, data.trials)
-    chance = probabilities(fitted, data.z)[0]
-    expected, variance = (np.bincount(group, data.trials * terms) for terms in (chance, chance * (1.0 - chance)))
-    seen = np.bincount(group, data.exceeded)
-    degrees_of_freedom = len(seen) - 2
+    groups = group_outcomes(data.z, data.trials)
+    probability = compute_probabilities(fitted, data.z)[0]
+    expected, variance = (
+        np.bincount(groups, data.trials * terms) for terms in (probability, probability * (1.0 - probability))
+    )
+    observed = np.bincount(groups, data.exceeded)
+    degrees_of_freedom = len(observed) - 2
     if degrees_of_freedom < 1:
         return Goodness(math.nan, max(degrees_of_freedom, 0), math.nan)
     # If a group's variance vanishes, the fitted probability is 0 or 1, as observed.
     with np.errstate(over="ignore"):
-        statistic = float(np.sum((seen - expected) ** 2 / np.maximum(variance, np.finfo(float).tiny)))
-    chance_of_more = float(gammaincc(0.5 * degrees_of_freedom, 0.5 * statistic)) if independent else math.nan
-    return Goodness(statistic, degrees_of_freedom, chance_of_more)
+        statistic = float(np.sum((observed - expected) ** 2 / np.maximum(variance, np.finfo(float).tiny)))
+    p_value = float(gammaincc(0.5 * degrees_of_freedom, 0.5 * statistic)) if independent else math.nan
+    return Goodness(statistic, degrees_of_freedom, p_value)
 
 
-def _overlap(z: Floats) -> float:
-    """Largest overlap of both kinds of outcomes that is too narrow to determine a slope."""
+def _compute_overlap(z: Floats) -> float:
+    """Compute the largest overlap of both kinds of outcomes that is too narrow to determine a slope."""
     return 1e-6 * float(z.max() - z.min())
 
 
-def _rises(data: Outcomes) -> Flags:
+def _is_rising(data: Outcomes) -> Flags:
     """Whether the likelihood of each data set increases with the slope of a level curve."""
     z, exceeded, trials = data
     centred = z - z.mean()
     share = exceeded.sum(axis=1, keepdims=True) / trials.sum(axis=1, keepdims=True)
-    pull = np.sum((exceeded - trials * share) * centred, axis=1)
-    return np.asarray(pull > 1e-12 * np.sum(trials * np.abs(centred), axis=1))
+    score = np.sum((exceeded - trials * share) * centred, axis=1)
+    return np.asarray(score > 1e-12 * np.sum(trials * np.abs(centred), axis=1))
 
 
-def _solved(matrix: Floats, right: Floats) -> Floats:
+def _solve_pairs(matrix: Floats, right_side: Floats) -> Floats:
     """Solve symmetric positive systems of two equations, shapes (fits or 1, 2, 2) and (fits, 2)."""
     a, b, c = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 1]
     ratio = b / a
-    second = (right[:, 1] - ratio * right[:, 0]) / (c - ratio * b)
-    return np.stack([right[:, 0] / a - ratio * second, second], axis=1)
+    second = (right_side[:, 1] - ratio * right_side[:, 0]) / (c - ratio * b)
+    return np.stack([right_side[:, 0] / a - ratio * second, second], axis=1)
 
 
-def _scores(data: Outcomes, beta: Floats) -> tuple[Floats, Floats]:
-    """Gradient of the likelihood and Fisher's expected information, shapes (fits, 2) and (fits, 2, 2)."""
+def _differentiate(data: Outcomes, beta: Floats) -> tuple[Floats, Floats]:
+    """Compute score and Fisher's expected information, shapes (fits, 2) and (fits, 2, 2)."""
     z, exceeded, trials = data
-    density, below, above = _logarithms(beta[:, :1] + beta[:, 1:] * z)
-    pull = exceeded * np.exp(density - below) - (trials - exceeded) * np.exp(density - above)
-    weight = trials * np.exp(2.0 * density - below - above)
+    density, log_below, log_above = _compute_log_normals(beta[:, :1] + beta[:, 1:] * z)
+    residual = exceeded * np.exp(density - log_below) - (trials - exceeded) * np.exp(density - log_above)
+    weight = trials * np.exp(2.0 * density - log_below - log_above)
     powers = np.stack([np.ones_like(z), z])
-    return np.einsum("fn,jn->fj", pull, powers), np.einsum("fn,jn,kn->fjk", weight, powers, powers)
+    return np.einsum("fn,jn->fj", residual, powers), np.einsum("fn,jn,kn->fjk", weight, powers, powers)
 
 
-def _logarithms(at: Floats) -> tuple[Floats, Floats, Floats]:
-    """Logarithms of the normal density, and of the probabilities below and above."""
+def _compute_log_normals(scores: Floats) -> tuple[Floats, Floats, Floats]:
+    """Compute logarithms of the normal density, and of the probabilities below and above."""
     from scipy.special import log_ndtr
 
-    return -0.5 * at * at - 0.5 * math.log(2.0 * math.pi), log_ndtr(at), log_ndtr(-at)
+    return -0.5 * scores * scores - 0.5 * math.log(2.0 * math.pi), log_ndtr(scores), log_ndtr(-scores)
 
 
-def _uphill(data: Outcomes, beta: Floats, step: Floats, now: Floats) -> tuple[Floats, Floats]:
+def _shorten_steps(data: Outcomes, beta: Floats, step: Floats, current: Floats) -> tuple[Floats, Floats]:
     """Halve steps until the likelihood does not decrease, and return steps and likelihoods."""
-    then = likelihood(data, beta + step)
-    for _ in range(_ITERATIONS):
-        falling = ~(then >= now - 1e-12 * np.abs(now))
-        if not falling.any():
+    following = compute_log_likelihood(data, beta + step)
+    for _ in range(_MAX_ITERATIONS):
+        is_lower = ~(following >= current - 1e-12 * np.abs(current))
+        if not is_lower.any():
             break
-        step[falling] *= 0.5
-        then[falling] = likelihood(data.select(falling), (beta + step)[falling])
-    return step, then
+        step[is_lower] *= 0.5
+        following[is_lower] = compute_log_likelihood(data.select(is_lower), (beta + step)[is_lower])
+    return step, following
 
 
-def likely_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
-    """Return fits on the boundary of the confidence region, without curves that fall.
+def find_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
+    """Find fits on the boundary of the confidence region, without curves that fall.
 
     Intervals are extremes in this region, as for the profile likelihood. For clusters of several outcomes the region is
     stretched to their covariance (Chandler and Bate 2007) with Student's distribution. For fewer than three clusters it
@@ -310,85 +318,89 @@ def likely_region(data: Outcomes, fitted: Probit, clusters: Integers | None, con
     """
     from scipy.special import chdtri, stdtrit
 
-    scaled, best, centre, spread = _standardised(data, fitted)
+    scaled, best, centre, spread = _standardise(data, fitted)
     if clusters is None:
-        around = _around(scaled, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
-    elif (count := int(clusters.max()) + 1) < _FEWEST:
+        boundary = _trace_region(scaled, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
+    elif (cluster_count := int(clusters.max()) + 1) < _MIN_CLUSTERS:
         return _WHOLE_PLANE
     else:
-        around = _around(scaled, best, 0.5 * float(stdtrit(count - 1.0, 0.5 + 0.5 * confidence)) ** 2)
-        around = np.column_stack(best) + (around - np.column_stack(best)) @ _stretch(scaled, clusters, best).T
-    intercepts, slopes = _cut_where_level(around).T
+        boundary = _trace_region(scaled, best, 0.5 * float(stdtrit(cluster_count - 1.0, 0.5 + 0.5 * confidence)) ** 2)
+        boundary = (
+            np.column_stack(best) + (boundary - np.column_stack(best)) @ _compute_stretch(scaled, clusters, best).T
+        )
+    intercepts, slopes = _cut_at_zero_slope(boundary).T
     slopes = slopes / spread
     return Probit(intercepts - slopes * centre, slopes)
 
 
-def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
-    """Points around the maximum at which the log-likelihood is lower by `drop`, shape (rays, 2)."""
-    z, level = np.unique(data.z, return_inverse=True)
-    yes, trials = (
-        np.broadcast_to(np.bincount(level, counts).astype(np.float64), (_RAYS, z.size)) for counts in data[1:]
+def _trace_region(data: Outcomes, best: Probit, drop: float) -> Floats:
+    """Trace the points around the maximum at which the log-likelihood is lower by `drop`, shape (rays, 2)."""
+    z, index = np.unique(data.z, return_inverse=True)
+    exceeded, trials = (
+        np.broadcast_to(np.bincount(index, counts).astype(np.float64), (_RAY_COUNT, z.size)) for counts in data[1:]
     )
-    rays = Outcomes(z, yes, trials)
-    top = np.column_stack(best)
-    floor = likelihood(Outcomes(z, yes[:1], trials[:1]), top)[0] - drop
-    angle = np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False)
-    wide = np.linalg.cholesky(covariance(Outcomes(z, yes[0], trials[0]), best))
-    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ wide.T
-    reach = np.ones(_RAYS)
+    rays = Outcomes(z, exceeded, trials)
+    maximum = np.column_stack(best)
+    floor = compute_log_likelihood(Outcomes(z, exceeded[:1], trials[:1]), maximum)[0] - drop
+    angle = np.linspace(0.0, 2.0 * math.pi, _RAY_COUNT, endpoint=False)
+    root = np.linalg.cholesky(compute_covariance(Outcomes(z, exceeded[0], trials[0]), best))
+    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ root.T
+    distance = np.ones(_RAY_COUNT)
     for _ in range(100):
-        short = likelihood(rays, top + reach[:, None] * directions) > floor
-        if not short.any():
+        is_inside = compute_log_likelihood(rays, maximum + distance[:, None] * directions) > floor
+        if not is_inside.any():
             break
-        reach[short] *= 2.0
+        distance[is_inside] *= 2.0
     # From outside, Newton's method does not overshoot the root of a concave function.
     for _ in range(80):
-        here = top + reach[:, None] * directions
-        above = likelihood(rays, here) - floor
+        points = maximum + distance[:, None] * directions
+        excess = compute_log_likelihood(rays, points) - floor
         with np.errstate(over="ignore", invalid="ignore"):
-            fall = -np.sum(_scores(rays, here)[0] * directions, axis=1)
-        beyond = (above < 0.0) & (fall > 0.0)
-        step = above[beyond] / fall[beyond]
-        reach[beyond] += step
-        if np.all(np.abs(step) <= _SAME * reach[beyond]):
+            descent = -np.sum(_differentiate(rays, points)[0] * directions, axis=1)
+        is_outside = (excess < 0.0) & (descent > 0.0)
+        step = excess[is_outside] / descent[is_outside]
+        distance[is_outside] += step
+        if np.all(np.abs(step) <= _RAY_TOLERANCE * distance[is_outside]):
             break
-    return np.asarray(top + reach[:, None] * directions)
+    return np.asarray(maximum + distance[:, None] * directions)
 
 
-def _cut_where_level(around: Floats) -> Floats:
+def _cut_at_zero_slope(boundary: Floats) -> Floats:
     """Cut the region off at slope 0."""
-    after = np.roll(around, -1, axis=0)
-    (intercept, slope), (next_intercept, next_slope) = around.T, after.T
-    up = slope >= 0.0
-    cut = up != (next_slope >= 0.0)
-    share = slope[cut] / (slope[cut] - next_slope[cut])
-    corners = intercept[cut] + share * (next_intercept[cut] - intercept[cut])
-    return np.vstack([around[up], np.column_stack([corners, np.zeros(share.size)])])
+    following = np.roll(boundary, -1, axis=0)
+    (intercept, slope), (next_intercept, next_slope) = boundary.T, following.T
+    is_rising = slope >= 0.0
+    is_crossing = is_rising != (next_slope >= 0.0)
+    share = slope[is_crossing] / (slope[is_crossing] - next_slope[is_crossing])
+    corners = intercept[is_crossing] + share * (next_intercept[is_crossing] - intercept[is_crossing])
+    return np.vstack([boundary[is_rising], np.column_stack([corners, np.zeros(share.size)])])
 
 
-def _stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats:
-    """Linear map from the covariance of the likelihood to the covariance of the clusters."""
-    pulls, bends = _by_cluster(data, clusters, best)
-    count = len(pulls)
-    root = np.linalg.cholesky(np.linalg.inv(bends.sum(axis=0)))
+def _compute_stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats:
+    """Compute the linear map from the covariance of the likelihood to the covariance of the clusters."""
+    scores, informations = _sum_by_cluster(data, clusters, best)
+    count = len(scores)
+    root = np.linalg.cholesky(np.linalg.inv(informations.sum(axis=0)))
     # Without the cluster, the information is smaller by its leverage, so that its score moves the parameters further.
-    leverage, axes = np.linalg.eigh(root.T @ bends @ root)
-    freed = np.einsum("cij,cj,ckj->cik", axes, 1.0 / (1.0 - np.minimum(leverage, 0.9)), axes)
-    moved = np.einsum("cij,cj->ci", freed, pulls @ root)
-    variance, axis = np.linalg.eigh(moved.T @ moved * (count - 1.0) / count)
-    wide = axis * np.sqrt(np.maximum(variance, 0.0)) @ axis.T
-    return np.asarray(root @ wide @ np.linalg.inv(root))
+    leverage, axes = np.linalg.eigh(root.T @ informations @ root)
+    corrections = np.einsum("cij,cj,ckj->cik", axes, 1.0 / (1.0 - np.minimum(leverage, 0.9)), axes)
+    shifts = np.einsum("cij,cj->ci", corrections, scores @ root)
+    variance, axis = np.linalg.eigh(shifts.T @ shifts * (count - 1.0) / count)
+    deviation = axis * np.sqrt(np.maximum(variance, 0.0)) @ axis.T
+    return np.asarray(root @ deviation @ np.linalg.inv(root))
 
 
-def _by_cluster(data: Outcomes, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
-    """Score and observed information of each cluster, shapes (clusters, 2) and (clusters, 2, 2)."""
+def _sum_by_cluster(data: Outcomes, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
+    """Sum score and observed information of each cluster, shapes (clusters, 2) and (clusters, 2, 2)."""
     z, exceeded, trials = data
-    at = fitted.intercept + fitted.slope * z
-    density, below, above = _logarithms(at)
-    up, down = np.exp(density - below), np.exp(density - above)
-    pull = exceeded * up - (trials - exceeded) * down
-    bend = exceeded * up * (up + at) + (trials - exceeded) * down * (down - at)
-    pulls = np.stack([np.bincount(clusters, pull * power) for power in (np.ones_like(z), z)], axis=1)
-    level, mixed, square = (np.bincount(clusters, bend * power) for power in (np.ones_like(z), z, z * z))
-    bends = np.stack([level, mixed, mixed, square], axis=1).reshape(-1, 2, 2)
-    return np.asarray(pulls, dtype=np.float64), np.asarray(bends, dtype=np.float64)
+    z_scores = fitted.intercept + fitted.slope * z
+    density, log_below, log_above = _compute_log_normals(z_scores)
+    ratio_below, ratio_above = np.exp(density - log_below), np.exp(density - log_above)
+    score = exceeded * ratio_below - (trials - exceeded) * ratio_above
+    information = exceeded * ratio_below * (ratio_below + z_scores) + (trials - exceeded) * ratio_above * (
+        ratio_above - z_scores
+    )
+    scores = np.stack([np.bincount(clusters, score * power) for power in (np.ones_like(z), z)], axis=1)
+    level, mixed, square = (np.bincount(clusters, information * power) for power in (np.ones_like(z), z, z * z))
+    informations = np.stack([level, mixed, mixed, square], axis=1).reshape(-1, 2, 2)
+    return np.asarray(scores, dtype=np.float64), np.asarray(informations, dtype=np.float64)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.analysis.curve import FragilityCurve, extremes, in_units
+from rocking.analysis.curve import FragilityCurve, find_extremes, format_intensity
 from rocking.analysis.hazard import (
     HazardCurve,
-    hazard_line,
-    log_parts,
-    log_rate_within,
-    log_standing,
-    share_density,
-    shares_beyond,
+    compute_log_parts,
+    compute_log_rate_within,
+    compute_log_survival,
+    compute_share_density,
+    compute_shares_beyond,
+    create_hazard_line,
 )
 from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
 from rocking.core import checks
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Probabilities of exceedance for the intensities in the table of a survival, and for the limits of its figure.
-_CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
-_SHOWN: Final = (0.01, 0.999)
+_PROBABILITIES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
+_FIGURE_RANGE: Final = (0.01, 0.999)
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Rate:
 
     def in_words(self) -> str:
         """Return the period and its interval as "once in ... years", with the significant digits."""
-        period, between = self._period_digits()
+        period, between = self._format_period()
         return f"once in {period} year{'' if period == '1' else 's'} ({between})"
 
     def probability(self, years: float) -> float:
@@ -91,20 +91,20 @@ class Rate:
     @property
     def return_period(self) -> float:
         """Mean time between exceedances, years."""
-        return _period(self.annual_rate)
+        return _compute_period(self.annual_rate)
 
     @property
     def return_interval(self) -> tuple[float, float]:
         """Confidence interval of the return period, years."""
         low, high = self.interval
-        return _period(high), _period(low)
+        return _compute_period(high), _compute_period(low)
 
-    def _period_digits(self) -> tuple[str, str]:
+    def _format_period(self) -> tuple[str, str]:
         low, high = self.bounds
-        return format_digits(self.return_period, self.return_interval, (_period(high), _period(low)))
+        return format_digits(self.return_period, self.return_interval, (_compute_period(high), _compute_period(low)))
 
 
-def _period(rate: float) -> float:
+def _compute_period(rate: float) -> float:
     with np.errstate(over="ignore"):
         return float(np.divide(1.0, rate)) if rate > 0.0 else math.inf
 
@@ -146,21 +146,25 @@ class Risk(Result):
 
     def rate(self, limit_state: str) -> Rate:
         """Return the rate of a limit state."""
-        rates = {one.limit_state: one for one in self.rates}
+        rates = {rate.limit_state: rate for rate in self.rates}
         return rates[checks.choice(limit_state, "limit_state", InvalidOption, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
         """Return rates, return periods, and probabilities in a time (years) as a text table."""
         years = checks.positive(years, "years", InvalidOption)
         confidence, rows = 100 * self.curves[0].confidence, []
-        for one in self.rates:
-            chances = [-math.expm1(-rate * years) for rate in (one.annual_rate, *one.interval, *one.bounds)]
+        for rate in self.rates:
+            probabilities = [
+                -math.expm1(-annual_rate * years) for annual_rate in (rate.annual_rate, *rate.interval, *rate.bounds)
+            ]
             rows.append(
                 [
-                    one.limit_state,
-                    *format_digits(one.annual_rate, one.interval, one.bounds),
-                    *one._period_digits(),
-                    *format_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
+                    rate.limit_state,
+                    *format_digits(rate.annual_rate, rate.interval, rate.bounds),
+                    *rate._format_period(),
+                    *format_digits(
+                        probabilities[0], (probabilities[1], probabilities[2]), (probabilities[3], probabilities[4])
+                    ),
                 ]
             )
         between = f"{confidence:g} % between"
@@ -168,8 +172,8 @@ class Risk(Result):
             "limit state", "annual rate", between, "once in (years)", between,
             f"probability in {format_count(years, 'year')}", between,
         ]  # fmt: skip
-        notes = [note for one in self.rates for note in beyond_notes(one)]
-        if any(one.interval[0] == 0.0 or math.isinf(one.interval[1]) for one in self.rates):
+        notes = [note for rate in self.rates for note in describe_extrapolated_shares(rate)]
+        if any(rate.interval[0] == 0.0 or math.isinf(rate.interval[1]) for rate in self.rates):
             notes.append("intervals are those of the fragility, whose summary says why they have no end")
         return "\n".join([format_table(header, rows), *notes])
 
@@ -181,32 +185,35 @@ class Risk(Result):
             "years": years,
             "rates": [
                 {
-                    "limit_state": one.limit_state,
-                    "annual_rate": one.annual_rate,
-                    "annual_rate_interval": list(one.interval),
+                    "limit_state": rate.limit_state,
+                    "annual_rate": rate.annual_rate,
+                    "annual_rate_interval": list(rate.interval),
                     "confidence": self.curves[0].confidence,
-                    "return_period_years": one.return_period,
-                    "return_period_interval_years": list(one.return_interval),
-                    "probability": one.probability(years),
-                    "share_below_hazard_curve": one.below,
-                    "share_above_hazard_curve": one.above,
+                    "return_period_years": rate.return_period,
+                    "return_period_interval_years": list(rate.return_interval),
+                    "probability": rate.probability(years),
+                    "share_below_hazard_curve": rate.below,
+                    "share_above_hazard_curve": rate.above,
                 }
-                for one in self.rates
+                for rate in self.rates
             ],
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import RiskLine, risk_figure
+        from rocking.plot.curves import RiskLine, draw_risk
 
         # Limit the figure to intensities that contribute to the rates.
         low, high = self.hazard.intensity[[0, -1]]
-        at = np.geomspace(1e-2 * low, 1e2 * high, 800)
-        return risk_figure(
-            intensity=self.hazard.measure.scale * at,
-            hazard=hazard_line(self.hazard, at),
+        intensity = np.geomspace(1e-2 * low, 1e2 * high, 800)
+        return draw_risk(
+            intensity=self.hazard.measure.scale * intensity,
+            hazard=create_hazard_line(self.hazard, intensity),
             lines=[
-                RiskLine(f"{one.limit_state}: {one.in_words()}", share_density(curve.fitted, self.hazard, at))
-                for one, curve in zip(self.rates, self.curves, strict=True)
+                RiskLine(
+                    f"{rate.limit_state}: {rate.in_words()}",
+                    compute_share_density(curve.fitted, self.hazard, intensity),
+                )
+                for rate, curve in zip(self.rates, self.curves, strict=True)
             ],
             intensity_label=self.hazard.measure.label,
             title=title or escape_dollars(self.description),
@@ -215,11 +222,11 @@ class Risk(Result):
         )
 
     def _headline(self) -> str:
-        rates = ", ".join(f"{one.limit_state}: {one.in_words()}" for one in self.rates)
+        rates = ", ".join(f"{rate.limit_state}: {rate.in_words()}" for rate in self.rates)
         return f"{self.description}; {self.hazard.name}; {rates}"
 
 
-def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
+def compute_risk(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
     """Integrate fragility curves of a measure over a hazard curve."""
     if not isinstance(hazard, HazardCurve):
         raise InvalidOption(
@@ -228,14 +235,14 @@ def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Meas
             value=hazard,
         )
     check_measure(hazard, measure)
-    return Risk(tuple(_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
+    return Risk(tuple(_compute_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
 
 
-def beyond_notes(rate: Rate) -> list[str]:
+def describe_extrapolated_shares(rate: Rate) -> list[str]:
     """Describe the share of a rate from extrapolations of the hazard curve."""
     return [
-        f"{rate.limit_state}: {100 * share:.{0 if share > 0.1 else 1}f} % of the rate is from {what} the hazard curve"
-        for share, what in ((rate.below, "below"), (rate.above, "above"))
+        f"{rate.limit_state}: {100 * share:.{0 if share > 0.1 else 1}f} % of the rate is from {side} the hazard curve"
+        for share, side in ((rate.below, "below"), (rate.above, "above"))
         if share > 0.01
     ]
 
@@ -249,20 +256,20 @@ def check_measure(hazard: HazardCurve, measure: Measure) -> None:
         )
 
 
-def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
-    parts = log_parts(curve.fitted, hazard)[0]
+def _compute_rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
+    parts = compute_log_parts(curve.fitted, hazard)[0]
     total = np.logaddexp.reduce(parts)
 
-    def logarithm(fits: Probit) -> Floats:
-        return np.asarray(np.logaddexp.reduce(log_parts(fits, hazard), axis=1)[:, None])
+    def compute_log_rate(fits: Probit) -> Floats:
+        return np.asarray(np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1)[:, None])
 
-    low, high = extremes(curve.region, logarithm)
+    low, high = find_extremes(curve.region, compute_log_rate)
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
-    below, above = shares_beyond(curve.fitted, hazard)
+    below, above = compute_shares_beyond(curve.fitted, hazard)
     # Motions above the last point add no more than its rate. If most of the rate is theirs, only this bound is known.
-    least = (1.0 - above) * rate + float(hazard.rate[-1]) if above > 0.5 else 0.0
-    bounds = least, max(least, float(hazard.rate[0]))
+    min_rate = (1.0 - above) * rate + float(hazard.rate[-1]) if above > 0.5 else 0.0
+    bounds = min_rate, max(min_rate, float(hazard.rate[0]))
     return Rate(curve.limit_state, rate, (lower, upper), below, above, bounds)
 
 
@@ -316,7 +323,7 @@ class Survival(Result):
     @property
     def intensity(self) -> Floats:
         """Intensities (SI) that exceed the limit with probabilities of 0.05, 0.16, 0.5, 0.84 and 0.95."""
-        return np.array([self.curve.intensity_of(chance) for chance in _CHANCES])
+        return np.array([self.curve.intensity_of(probability) for probability in _PROBABILITIES])
 
     @property
     def unlikely(self) -> float:
@@ -353,15 +360,15 @@ class Survival(Result):
 
         This is the upper end of the interval, without the extrapolations of the hazard curve below its first and above
         its last point. For several blocks, a single block has stood all the time, and the intensity alone determines
-        whether it falls, which yields the integral of exp(-rate(x) years) dP(x).
+        whether it overturns, which yields the integral of exp(-rate(x) years) dP(x).
         """
         if self.hazard is None:
             return math.nan
         hazard, years = self.hazard, self.years
         if self.several_blocks:
-            _, high = extremes(self.curve.region, lambda fits: log_standing(fits, hazard, years))
+            _, high = find_extremes(self.curve.region, lambda fits: compute_log_survival(fits, hazard, years))
             return math.exp(min(float(high[0]), 0.0))
-        low, _ = extremes(self.curve.region, lambda fits: log_rate_within(fits, hazard))
+        low, _ = find_extremes(self.curve.region, lambda fits: compute_log_rate_within(fits, hazard))
         return math.exp(-math.exp(float(low[0])) * years)
 
     @property
@@ -370,11 +377,11 @@ class Survival(Result):
         return self.most_probable < 1.0 - self.confidence
 
     def summary(self) -> str:
-        measure, share = self.measure, f"{100.0 * self.confidence:g} %"
+        measure, percent = self.measure, f"{100.0 * self.confidence:g} %"
         header = [measure.label, "probability", "at most a year", "at most once in (years)"]
         columns: list[list[Any]] = [
-            [format_within(x, self._known, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
-            [*_CHANCES],
+            [format_within(x, self._known_range, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
+            [*_PROBABILITIES],
             [f"{rate:.2g}" for rate in self.largest_rate],
             [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
         ]
@@ -382,75 +389,83 @@ class Survival(Result):
             header += ["hazard curve, a year", "survival at most"]
             highest, lowest = self.hazard.rate[[0, -1]]
             rates = self.hazard.rate_of(self.intensity)
-            known = np.where(rates < lowest, 0.0, np.minimum(rates, highest))
+            resolved = np.where(rates < lowest, 0.0, np.minimum(rates, highest))
             columns += [
                 [format_within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
-                [f"{chance:.2g}" for chance in np.exp(-self.years * known * _CHANCES)],
+                [f"{probability:.2g}" for probability in np.exp(-self.years * resolved * _PROBABILITIES)],
             ]
         return "\n".join(
             [
                 f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
-                f"most likely never {self._never}: one such motion would have exceeded the limit with {share}",
+                f"most likely never {self._never_text}: one such motion would have exceeded the limit with {percent}",
                 f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
-                f"exceeded with {share}" + (", if each met another of the blocks" if self.several_blocks else ""),
+                f"exceeded with {percent}" + (", if each met another of the blocks" if self.several_blocks else ""),
                 "",
                 format_table(header, [*map(list, zip(*columns, strict=True))]),
-                *([] if self.rate is None else ["", self._verdict(self.rate), *beyond_notes(self.rate)]),
+                *(
+                    []
+                    if self.rate is None
+                    else ["", self._describe_survival(self.rate), *describe_extrapolated_shares(self.rate)]
+                ),
             ]
         )
 
     @property
-    def _known(self) -> tuple[float, float]:
+    def _known_range(self) -> tuple[float, float]:
         """Lowest and highest intensity (SI) of the data and of the hazard curve."""
-        known = np.concatenate([self.curve.intensity, [] if self.hazard is None else self.hazard.intensity])
-        return float(known.min()), float(known.max())
+        intensities = np.concatenate([self.curve.intensity, [] if self.hazard is None else self.hazard.intensity])
+        return float(intensities.min()), float(intensities.max())
 
     @property
-    def _never(self) -> str:
-        text = in_units(min(self.unlikely, self._known[1]), self.measure)
-        return f"some intensity above {text}, beyond the data" if self.unlikely > self._known[1] else f"{text} or more"
+    def _never_text(self) -> str:
+        text = format_intensity(min(self.unlikely, self._known_range[1]), self.measure)
+        return (
+            f"some intensity above {text}, beyond the data"
+            if self.unlikely > self._known_range[1]
+            else f"{text} or more"
+        )
 
-    def _verdict(self, rate: Rate) -> str:
+    def _describe_survival(self, rate: Rate) -> str:
         """Describe the probability of the survival under the hazard curve."""
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
         chance, between = format_digits(self.probability, self.interval, bounds)
-        said, likely = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})", self.probability
+        estimate, likeliest = (f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})", self.probability)
         if self.several_blocks:
-            said = (
-                f"at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {said} if each "
+            estimate = (
+                f"at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {estimate} if each "
                 "motion met another of them"
             )
         if not math.isnan(self.mean_probability):
-            likely = self.mean_probability
-            said = f"{likely:.2g} in the mean and {said}"
+            likeliest = self.mean_probability
+            estimate = f"{likeliest:.2g} in the mean and {estimate}"
         name = "" if self.hazard is None else self.hazard.name
         years = format_count(self.years, "year")
-        text = f"under the hazard curve {name!r} the probability of {years} without it is {said}"
-        least = f"{1.0 - self.confidence:.3g}"
-        if likely >= 1.0 - self.confidence:
+        text = f"under the hazard curve {name!r} the probability of {years} without it is {estimate}"
+        threshold = f"{1.0 - self.confidence:.3g}"
+        if likeliest >= 1.0 - self.confidence:
             return f"{text}, so they do not contradict each other"
         if not self.contradicts:
-            return f"{text}; below {least} they would contradict each other, which is not settled"
+            return f"{text}; below {threshold} they would contradict each other, which is not settled"
         return (
-            f"{text}; all of that is below {least}, so they contradict each other: the hazard curve is too high, or "
-            "the block stronger than its fragility, or younger"
+            f"{text}; all of that is below {threshold}, so they contradict each other: the hazard curve is "
+            "too high, or the block stronger than its fragility, or younger"
         )
 
     def to_dict(self) -> dict[str, Any]:
         column = self.measure.column
-        found = {
+        result = {
             "limit_state": self.curve.limit_state,
             "years": self.years,
             "confidence": self.confidence,
             f"most_likely_never_{column}": self.unlikely,
-            "probability_of_exceedance": [*_CHANCES],
+            "probability_of_exceedance": [*_PROBABILITIES],
             column: self.intensity,
             "largest_annual_rate": self.largest_rate,
         }
         if self.hazard is None:
-            return found
-        return found | {
+            return result
+        return result | {
             "hazard_annual_rate": self.hazard.rate_of(self.intensity),
             "probability": self.probability,
             "probability_interval": [*self.interval],
@@ -462,21 +477,21 @@ class Survival(Result):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import survival_figure
+        from rocking.plot.curves import draw_survival
 
-        ends = [end for end in map(self.curve.intensity_of, _SHOWN) if 0.0 < end < math.inf]
-        if len(ends) < len(_SHOWN):  # the ends of a very wide curve are not finite numbers
+        ends = [end for end in map(self.curve.intensity_of, _FIGURE_RANGE) if 0.0 < end < math.inf]
+        if len(ends) < len(_FIGURE_RANGE):  # the ends of a very wide curve are not finite numbers
             ends = [self.curve.intensity.min(), self.curve.intensity.max()]
         if self.hazard is not None:
             ends += self.hazard.intensity[[0, -1]].tolist()
-        at = np.geomspace(min(ends), max(ends), 200)
-        at = at[self.curve.probability(at) > _SHOWN[0] * 0.1]
-        return survival_figure(
-            intensity=self.measure.scale * at,
-            largest=self.curve.largest_rate(at, self.years, self.confidence),
+        intensity = np.geomspace(min(ends), max(ends), 200)
+        intensity = intensity[self.curve.probability(intensity) > _FIGURE_RANGE[0] * 0.1]
+        return draw_survival(
+            intensity=self.measure.scale * intensity,
+            largest=self.curve.largest_rate(intensity, self.years, self.confidence),
             largest_label=f"at most, with {format_count(self.years, 'year')} without {self.curve.limit_state} "
             f"({100.0 * self.confidence:g} %)",
-            hazard=None if self.hazard is None else hazard_line(self.hazard, at),
+            hazard=None if self.hazard is None else create_hazard_line(self.hazard, intensity),
             intensity_label=self.measure.label,
             title=title or escape_dollars(self.description),
             ax=ax,
@@ -484,11 +499,15 @@ class Survival(Result):
         )
 
     def _headline(self) -> str:
-        return f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; most likely never {self._never}"
+        return (
+            f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; most likely never {self._never_text}"
+        )
 
 
-def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:
-    """Mean survival probability of blocks, each with a curve fitted to its own outcomes."""
+def compute_mean_survival(
+    outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float
+) -> float:
+    """Compute the mean survival probability of blocks, each with a curve fitted to its own outcomes."""
     table = outcomes.sort_values("block", kind="stable")
     blocks = table.drop_duplicates("block")
     intensity, exceeded, missing = (
@@ -497,6 +516,6 @@ def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard
     )
     fits = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, 1.0 - missing))
     # For a curve that does not rise, the rate below the hazard curve is unbounded and therefore omitted.
-    rising = np.logaddexp.reduce(log_parts(fits, hazard), axis=1)
-    rates = np.exp(np.where(fits.slope > 0.0, rising, log_rate_within(fits, hazard)[:, 0]))
+    rising = np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1)
+    rates = np.exp(np.where(fits.slope > 0.0, rising, compute_log_rate_within(fits, hazard)[:, 0]))
     return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.levels import curves_of, labels_of, motions_text, normalised_weights, pooled, ratios_of
+from rocking.analysis.levels import (
+    compose_motion_labels,
+    compute_ratios,
+    describe_motions,
+    describe_pool,
+    normalise_weights,
+    split_curves,
+)
 from rocking.block import Blocks
 from rocking.block.bodies import rates_of
 from rocking.block.body import Bodies, Body
@@ -34,9 +41,9 @@ if TYPE_CHECKING:
 Abscissa = Literal["p", "period", "size"]
 
 
-_HALF: Final = np.array([0.5])
+_MEDIAN_SHARE: Final = np.array([0.5])
 
-_SIMULATED: Final = ("peak_rotation", "overturned", "unfinished")
+_OUTCOME_NAMES: Final = ("peak_rotation", "overturned", "unfinished")
 
 _AXES: Final = ("p", "period", "size", "alpha", "restitution", "fractile")
 
@@ -112,75 +119,81 @@ def rocking_spectrum(
     >>> rocking_spectrum(blocks, motions).data.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
     [0.367, inf, inf]
     """
-    each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
-    shares = np.array([checks.fraction(value, "each of fractiles", InvalidOption) for value in each])
+    values = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
+    shares = np.array([checks.fraction(value, "each of fractiles", InvalidOption) for value in values])
     options: dict[str, Any] = {"model": model, "chattering": chattering}
-    gathered, shaken = bodies_of(blocks), list_motions(motions)
-    if not isinstance(gathered, Blocks):
-        raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {gathered.kind}")
-    if (axes := gathered.axes) is not None and p is None and size is None and weights is None:
-        checks.grid_size({"motions": len(shaken), "blocks": len(gathered)}, InvalidOption)
+    bodies, motions = bodies_of(blocks), list_motions(motions)
+    if not isinstance(bodies, Blocks):
+        raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {bodies.kind}")
+    if (axes := bodies.axes) is not None and p is None and size is None and weights is None:
+        checks.grid_size({"motions": len(motions), "blocks": len(bodies)}, InvalidOption)
         names, shape = (*(name for name in axes if name != "p"), "p"), [*map(len, axes.values())]
-        table = simulate_many(gathered, shaken, **options)
+        table = simulate_many(bodies, motions, **options)
         peak, overturned, unfinished = (
-            np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in _SIMULATED
+            np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in _OUTCOME_NAMES
         )
-        ratio = ratios_of(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
-        found = names, fractiles_of(ratio, shares), overturned_share(ratio)
-        return RockingSpectrum(_dataset(table, names, (peak, overturned, ratio), found, axes, shares, gathered.gravity))
-    weight = normalised_weights(weights, len(gathered))
-    median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
-    rates = median * np.geomspace(0.5, 2.0, 25)
+        ratio = compute_ratios(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
+        statistics = names, compute_fractiles(ratio, shares), compute_overturned_share(ratio)
+        return RockingSpectrum(
+            _combine_peaks(table, names, (peak, overturned, ratio), statistics, axes, shares, bodies.gravity)
+        )
+    weight = normalise_weights(weights, len(bodies))
+    median = float(compute_weighted_fractiles(bodies.p.mean(axis=1), weight, _MEDIAN_SHARE)[0])
+    p_values = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
-        rates = checks.positive_numbers(rates_of(p, size, gathered.gravity), "p", InvalidOption)
-    count, n = len(rates), len(gathered)
-    checks.grid_size({"motions": len(shaken), "blocks": n, "p": count}, InvalidOption)
-    resized = gathered.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(rates / median, n))
-    table = simulate_many(resized, shaken, **options)
+        p_values = checks.positive_numbers(rates_of(p, size, bodies.gravity), "p", InvalidOption)
+    count, n = len(p_values), len(bodies)
+    checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, InvalidOption)
+    resized = bodies.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(p_values / median, n))
+    table = simulate_many(resized, motions, **options)
     peak, overturned, unfinished = (
-        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED
+        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _OUTCOME_NAMES
     )
-    ratio = ratios_of(peak, overturned, unfinished, gathered.alpha.min(axis=1)[:, None])
-    flat, each = ratio.reshape(-1, count), np.tile(weight, len(ratio))
-    found = ("p",), weighted_fractiles(flat, each, shares), overturned_share(flat, each)
-    data = _dataset(table, ("block", "p"), (peak, overturned, ratio), found, {"p": rates}, shares, gathered.gravity)
-    return RockingSpectrum(data.assign_coords(weight=("block", weight)).assign_attrs(blocks=pooled(gathered, weights)))
+    ratio = compute_ratios(peak, overturned, unfinished, bodies.alpha.min(axis=1)[:, None])
+    flat, tiled = ratio.reshape(-1, count), np.tile(weight, len(ratio))
+    statistics = ("p",), compute_weighted_fractiles(flat, tiled, shares), compute_overturned_share(flat, tiled)
+    data = _combine_peaks(
+        table, ("block", "p"), (peak, overturned, ratio), statistics, {"p": p_values}, shares, bodies.gravity
+    )
+    return RockingSpectrum(
+        data.assign_coords(weight=("block", weight)).assign_attrs(blocks=describe_pool(bodies, weights))
+    )
 
 
-def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
+def compute_fractiles(peaks: Floats, shares: Floats) -> Floats:
     """Interpolate fractiles (k, ...) of peaks (n, ...) without NaN, infinite if either neighbour is."""
     ordered = np.sort(peaks, axis=0)  # NaN last
-    known = np.maximum(np.count_nonzero(~np.isnan(peaks), axis=0), 1)
-    place = shares.reshape(-1, *[1] * known.ndim) * (known - 1)
+    counts = np.maximum(np.count_nonzero(~np.isnan(peaks), axis=0), 1)
+    position = shares.reshape(-1, *[1] * counts.ndim) * (counts - 1)
     # Rounding must not select the next higher value, which may be infinite: 0.28 * 25 > 7.
-    nearest = np.rint(place)
-    place = np.where(np.abs(place - nearest) <= 1e-12 * np.maximum(nearest, 1.0), nearest, place)
-    below = np.floor(place).astype(np.int64)
-    low, high = (np.take_along_axis(ordered, at, axis=0) for at in (below, np.ceil(place).astype(np.int64)))
-    weight = place - below
-    level = (weight == 0.0) | (low == high)
-    between: Floats = low + weight * (np.where(level, 0.0, high) - np.where(level, 0.0, low))
-    return between
+    nearest = np.rint(position)
+    position = np.where(np.abs(position - nearest) <= 1e-12 * np.maximum(nearest, 1.0), nearest, position)
+    floor = np.floor(position).astype(np.int64)
+    low, high = (np.take_along_axis(ordered, index, axis=0) for index in (floor, np.ceil(position).astype(np.int64)))
+    weight = position - floor
+    is_level = (weight == 0.0) | (low == high)
+    interpolated: Floats = low + weight * (np.where(is_level, 0.0, high) - np.where(is_level, 0.0, low))
+    return interpolated
 
 
-def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
-    """Return the lowest values (n, ...) not exceeded by k shares of the weight, without NaN, shape (k, ...)."""
+def compute_weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
+    """Compute the lowest values (n, ...) not exceeded by k shares of the weight, without NaN, shape (k, ...)."""
     order = np.argsort(values, axis=0, kind="stable")
     ordered = np.take_along_axis(values, order, axis=0)
-    passed = np.cumsum(weights[order] * ~np.isnan(ordered), axis=0)
+    cumulative = np.cumsum(weights[order] * ~np.isnan(ordered), axis=0)
     # Tolerance, so that rounding does not miss a share that is reached.
-    enough = passed[None] >= shares.reshape(-1, *[1] * values.ndim) * passed[-1] * (1.0 - 1e-12)
-    return np.asarray(np.take_along_axis(ordered, np.argmax(enough, axis=1), axis=0))
+    is_reached = cumulative[None] >= shares.reshape(-1, *[1] * values.ndim) * cumulative[-1] * (1.0 - 1e-12)
+    return np.asarray(np.take_along_axis(ordered, np.argmax(is_reached, axis=1), axis=0))
 
 
-def overturned_share(peaks: Floats, weights: Floats | None = None) -> Floats:
-    """Return the share of infinite peaks (n, ...) along the first axis, without NaN."""
-    known, fell = ~np.isnan(peaks), np.isinf(peaks)
-    if weights is not None and known.all():
-        return np.asarray(np.average(fell, axis=0, weights=weights))
-    counts = known if weights is None else known * weights.reshape(-1, *[1] * (peaks.ndim - 1))
+def compute_overturned_share(peaks: Floats, weights: Floats | None = None) -> Floats:
+    """Compute the share of infinite peaks (n, ...) along the first axis, without NaN."""
+    is_finished, is_overturned = ~np.isnan(peaks), np.isinf(peaks)
+    if weights is not None and is_finished.all():
+        return np.asarray(np.average(is_overturned, axis=0, weights=weights))
+    counts = is_finished if weights is None else is_finished * weights.reshape(-1, *[1] * (peaks.ndim - 1))
     with np.errstate(invalid="ignore"):
-        return np.asarray((fell * counts).sum(axis=0) / counts.sum(axis=0))
+        return np.asarray((is_overturned * counts).sum(axis=0) / counts.sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -212,15 +225,15 @@ class RockingSpectrum(DatasetResult):
 
     def summary(self) -> str:
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
-        parts = [f"peak rotation over slenderness, {motions_text(self.data)}, {self.data.model} model"]
-        for title, one in curves_of(self.data):
-            fractiles = one.fractile_over_alpha.transpose("p", "fractile").values
+        parts = [f"peak rotation over slenderness, {describe_motions(self.data)}, {self.data.model} model"]
+        for title, curve in split_curves(self.data):
+            fractiles = curve.fractile_over_alpha.transpose("p", "fractile").values
             rows = [
                 [
-                    float(one.p[j]),
-                    float(one["size"][j]),
+                    float(curve.p[j]),
+                    float(curve["size"][j]),
                     *("overturns" if np.isinf(value) else float(value) for value in fractiles[j]),
-                    f"{100 * float(one.overturned_share[j]):.0f} %",
+                    f"{100 * float(curve.overturned_share[j]):.0f} %",
                 ]
                 for j in range(self.data.sizes["p"])
             ]
@@ -234,7 +247,7 @@ class RockingSpectrum(DatasetResult):
         return {
             "motions": data.motion.values,
             **({"verticals": data.vertical.values} if "vertical" in data.coords else {}),
-            **({"blocks": data.sizes["block"], "weights": data.weight.values} if self._of_ensemble else {}),
+            **({"blocks": data.sizes["block"], "weights": data.weight.values} if self._is_ensemble else {}),
             "model": data.model,
             "chattering": data.chattering,
             **{add_unit(name, data[name].units): data[name].values for name in _AXES if name in data.coords},
@@ -256,51 +269,55 @@ class RockingSpectrum(DatasetResult):
         For more than two combinations of slenderness and restitution, only the fractiles nearest to the median are
         drawn, and for more than four, no single motions. See also `DrawnResult.plot`.
         """
-        from rocking.plot.curves import SpectrumCurves, spectrum_figure
+        from rocking.plot.curves import SpectrumCurves, draw_spectrum
 
         checks.choice(against, "against", InvalidOption, get_args(Abscissa))
         # Lines are drawn in the order of the abscissa, whatever the order of p.
         data = self.data.sortby("p") if "p" in self.data.dims else self.data
-        named_curves = curves_of(data)
-        alone = len(named_curves) == 1
+        named_curves = split_curves(data)
+        is_single = len(named_curves) == 1
         curves = [
             SpectrumCurves(
-                "" if alone else name,
-                self._peaks_of_motions(one),
-                one.fractile_over_alpha.transpose("fractile", "p").values,
-                one.overturned_share.values,
+                "" if is_single else name,
+                self._select_peaks(curve),
+                curve.fractile_over_alpha.transpose("fractile", "p").values,
+                curve.overturned_share.values,
             )
-            for name, one in named_curves
+            for name, curve in named_curves
         ]
-        shown = [motions_text(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
-        return spectrum_figure(
+        title_parts = [
+            describe_motions(self.data),
+            *([named_curves[0][0]] if is_single else []),
+            f"{self.data.model} model",
+        ]
+        return draw_spectrum(
             x=data[against].values,
             curves=curves,
             fractiles=self.data.fractile.values.tolist(),
-            motions=labels_of(self.data),
+            motions=compose_motion_labels(self.data),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
-            title=title or escape_dollars(", ".join(shown)),
+            title=title or escape_dollars(", ".join(title_parts)),
             ax=ax,
             figsize=figsize,
         )
 
     @property
-    def _of_ensemble(self) -> bool:
+    def _is_ensemble(self) -> bool:
         return "block" in self.data.dims
 
-    def _peaks_of_motions(self, one: xr.Dataset) -> Floats:
-        """Peaks under each motion, shape (motions, p), or their medians for an ensemble."""
-        if not self._of_ensemble:
-            return np.asarray(one.peak_over_alpha.transpose("motion", "p").values)
-        peaks = one.peak_over_alpha.transpose("block", "motion", "p").values
-        return np.asarray(weighted_fractiles(peaks, one.weight.values, _HALF)[0])
+    def _select_peaks(self, curve: xr.Dataset) -> Floats:
+        """Select peaks under each motion, shape (motions, p), or their medians for an ensemble."""
+        if not self._is_ensemble:
+            return np.asarray(curve.peak_over_alpha.transpose("motion", "p").values)
+        peaks = curve.peak_over_alpha.transpose("block", "motion", "p").values
+        return np.asarray(compute_weighted_fractiles(peaks, curve.weight.values, _MEDIAN_SHARE)[0])
 
 
-def _dataset(
+def _combine_peaks(
     table: xr.Dataset,
     names: tuple[str, ...],
     peaks: tuple[Floats, Floats, Floats],
-    found: tuple[tuple[str, ...], Floats, Floats],
+    statistics: tuple[tuple[str, ...], Floats, Floats],
     axes: dict[str, Floats],
     shares: Floats,
     gravity: float,
@@ -308,15 +325,15 @@ def _dataset(
     """Combine peaks, outcomes and ratios over (motion, *names) with fractiles and shares over their dimensions."""
     import xarray as xr
 
-    (peak, overturned, over_alpha), (dims, fractiles, share) = peaks, found
-    words = "over the slenderness; infinite where the block overturns"
+    (peak, overturned, over_alpha), (dims, fractiles, share) = peaks, statistics
+    normalisation = "over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
             "peak_rotation": variable(("motion", *names), peak, "peak rotation; pi/2: overturns", "rad"),
-            "peak_over_alpha": variable(("motion", *names), over_alpha, f"peak rotation {words}", "1"),
+            "peak_over_alpha": variable(("motion", *names), over_alpha, f"peak rotation {normalisation}", "1"),
             "overturned": (("motion", *names), overturned, table.overturned.attrs),
             "fractile_over_alpha": variable(
-                ("fractile", *dims), fractiles, f"fractile of the peak rotation {words}", "1"
+                ("fractile", *dims), fractiles, f"fractile of the peak rotation {normalisation}", "1"
             ),
             "overturned_share": variable(dims, share, "share of the motions that overturn the block", "1"),
         },

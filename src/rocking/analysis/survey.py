@@ -25,7 +25,7 @@ from rocking.simulation.ensemble import body_coordinates, verticals_of
 from rocking.simulation.simulate import simulate
 
 #: Columns of the printed table. Files contain all columns.
-_SHOWN: Final = {
+_TABLE_COLUMNS: Final = {
     "record": "record",
     add_unit("pga", "g"): "PGA, g",
     "peak_over_{}": "peak/{}",
@@ -34,7 +34,7 @@ _SHOWN: Final = {
     "verdict": "verdict",
 }
 
-_SLIDING: Final = add_unit("sliding_time", "s")
+_SLIDING_TIME: Final = add_unit("sliding_time", "s")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,16 +58,18 @@ class BlockUnderRecords(Result):
     def _columns(self, table: str) -> list[Column]:
         return records_to_columns(self.rows(), self.skipped)
 
-    def _labels(self) -> list[dict[str, Any]]:
-        """First columns of each row: record, motion, block."""
+    def _create_labels(self) -> list[dict[str, Any]]:
+        """Create the first columns of each row: record, motion, block."""
         columns = body_coordinates(self.block.alone())
-        numbers = {add_unit(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
-        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
+        numbers = {
+            add_unit(name, attributes["units"]): float(values[0]) for name, (_, values, attributes) in columns.items()
+        }
+        labels = create_record_columns(self.records, [require_motion(response) for response in self.responses])
         return [{**label, "block": self.block.description, **numbers} for label in labels]
 
     def _headline(self) -> str:
         """Summarise the number of records that overturn the block."""
-        overturned = sum(one.overturned and one.perturbed().is_decided for one in self.responses)
+        overturned = sum(response.overturned and response.perturbed().is_decided for response in self.responses)
         return f"{self.block.description}: {format_count(len(self.records), 'record')}, overturned by {overturned}"
 
 
@@ -92,21 +94,21 @@ class Survey(BlockUnderRecords):
 
     def rows(self) -> list[dict[str, Any]]:
         friction, rows = self.friction, []
-        for label, response in zip(self._labels(), self.responses, strict=True):
-            sliding = {} if friction is None else {"friction": friction, _SLIDING: response.sliding_time(friction)}
-            rows.append(label | _row(response, self.precision) | sliding)
+        for label, response in zip(self._create_labels(), self.responses, strict=True):
+            sliding = {} if friction is None else {"friction": friction, _SLIDING_TIME: response.sliding_time(friction)}
+            rows.append(label | _create_row(response, self.precision) | sliding)
         return rows
 
     def summary(self) -> str:
         limit = self.block.coordinate.limit
-        known = [{f"peak_over_{limit}": float(ratio_text(response))} for response in self.responses]
-        rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
-        shown = {name.format(limit): title.format(limit) for name, title in _SHOWN.items()}
+        ratio_columns = [{f"peak_over_{limit}": float(ratio_text(response))} for response in self.responses]
+        rows = [row | ratio_column for row, ratio_column in zip(self.rows(), ratio_columns, strict=True)]
+        titles = {name.format(limit): title.format(limit) for name, title in _TABLE_COLUMNS.items()}
         if self.friction is not None:
-            shown |= {_SLIDING: f"with friction {self.friction:g} slides at, s"}
+            titles |= {_SLIDING_TIME: f"with friction {self.friction:g} slides at, s"}
         if any(row["processing"] for row in rows):
-            shown = shown | {"processing": "done to the record"}
-        table = format_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
+            titles = titles | {"processing": "done to the record"}
+        table = format_table(list(titles.values()), [[row[name] for name in titles] for row in rows])
         return f"{self._headline()}\n\n{table}"
 
     def _headline(self) -> str:
@@ -114,9 +116,9 @@ class Survey(BlockUnderRecords):
             response.stopped or response.unfinished or not response.perturbed().is_decided
             for response in self.responses
         )
-        known = f", undecided under {undecided}" if undecided else ""
-        unread = f"; {format_count(len(self.skipped), 'record')} skipped" if self.skipped else ""
-        return super()._headline() + known + unread
+        undecided_text = f", undecided under {undecided}" if undecided else ""
+        skipped_text = f"; {format_count(len(self.skipped), 'record')} skipped" if self.skipped else ""
+        return super()._headline() + undecided_text + skipped_text
 
     def to_dict(self) -> dict[str, Any]:
         numbers = self.block.alone().parameters().items()
@@ -151,39 +153,40 @@ class Check(BlockUnderRecords):
 
     @property
     def falls_under_less(self) -> tuple[bool, ...]:
-        """Whether the block stands under each motion, but falls under the same motion scaled down."""
-        each = zip(self.responses, self.margins, strict=True)
-        return tuple(margin > 1.0 and not (one.overturned or one.unfinished) for one, margin in each)
+        """Whether the block stands under each motion, but overturns under the same motion scaled down."""
+        pairs = zip(self.responses, self.margins, strict=True)
+        return tuple(margin > 1.0 and not (response.overturned or response.unfinished) for response, margin in pairs)
 
     def rows(self) -> list[dict[str, Any]]:
         return [
             {
                 **label,
-                add_unit("pga", "g"): round_decimal(motion_of(response).pga / STANDARD_GRAVITY),
-                add_unit("pgv", "m/s"): motion_of(response).pgv,
+                add_unit("pga", "g"): round_decimal(require_motion(response).pga / STANDARD_GRAVITY),
+                add_unit("pgv", "m/s"): require_motion(response).pgv,
                 **ratios,
                 "simulated": margin,
                 "lowest_factor": 1.0 / margin,
                 "peak_over_slenderness": response.peak_over_slenderness,
                 "overturned": response.overturned,
-                "falls_under_less": less,
-                "verdict": in_brief(response, PRECISION) + (f"; overturns at x {_short(1.0 / margin)}" if less else ""),
+                "falls_under_less": overturns_under_less,
+                "verdict": in_brief(response, PRECISION)
+                + (f"; overturns at x {_format_factor(1.0 / margin)}" if overturns_under_less else ""),
             }
-            for label, response, ratios, margin, less in zip(
-                self._labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
+            for label, response, ratios, margin, overturns_under_less in zip(
+                self._create_labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
             )
         ]
 
     def summary(self) -> str:
         rules = [*self.ratios[0]]
-        shown = {"record": "record", add_unit("pga", "g"): "PGA, g", add_unit("pgv", "m/s"): "PGV, m/s"}
-        shown |= {rule: title_of(rule) for rule in rules}
-        shown |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
-        known = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
-        rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
+        titles = {"record": "record", add_unit("pga", "g"): "PGA, g", add_unit("pgv", "m/s"): "PGV, m/s"}
+        titles |= {rule: format_rule_name(rule) for rule in rules}
+        titles |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
+        ratio_columns = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
+        rows = [row | ratio_column for row, ratio_column in zip(self.rows(), ratio_columns, strict=True)]
         # Rules of thumb are accurate to three digits at most.
-        cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in shown] for row in rows]
-        table = format_table(list(shown.values()), cells)
+        cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in titles] for row in rows]
+        table = format_table(list(titles.values()), cells)
         return "\n".join(
             [
                 str(self.block),
@@ -191,49 +194,52 @@ class Check(BlockUnderRecords):
                 "the motion that was found to overturn the block, in steps of 5 %",
                 "",
                 table,
-                *(["", *self._disagreements(rules)] if rules else []),
-                *(f"note: {note}" for note in self._notes()),
+                *(["", *self._count_disagreements(rules)] if rules else []),
+                *(f"note: {note}" for note in self._list_notes()),
             ]
         )
 
     def to_dict(self) -> dict[str, Any]:
-        return super().to_dict() | {"notes": self._notes()}
+        return super().to_dict() | {"notes": self._list_notes()}
 
-    def _notes(self) -> list[str]:
+    def _list_notes(self) -> list[str]:
         return [] if self.block.alone().is_symmetric else [MIRROR_NOTE]
 
     def _headline(self) -> str:
         return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
 
-    def _disagreements(self, rules: list[str]) -> list[str]:
+    def _count_disagreements(self, rules: list[str]) -> list[str]:
         """Count the errors of each rule, without records for which no single number can be right."""
-        lines, less = [], self.falls_under_less
-        kept = [
+        lines, excluded = [], self.falls_under_less
+        compared = [
             (ratios, response.overturned)
-            for ratios, response, is_left_out in zip(self.ratios, self.responses, less, strict=True)
-            if not (is_left_out or response.unfinished)
+            for ratios, response, is_ambiguous in zip(self.ratios, self.responses, excluded, strict=True)
+            if not (is_ambiguous or response.unfinished)
         ]
         for rule in rules:
-            unsafe = sum(ratios[rule] < 1.0 and fell for ratios, fell in kept)
-            wary = sum(ratios[rule] >= 1.0 and not fell for ratios, fell in kept)
-            right = len(kept) - unsafe - wary
-            lines.append(f"{title_of(rule)}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(kept)}")
-        if any(less):
+            unsafe = sum(ratios[rule] < 1.0 and overturned for ratios, overturned in compared)
+            conservative = sum(ratios[rule] >= 1.0 and not overturned for ratios, overturned in compared)
+            correct = len(compared) - unsafe - conservative
             lines.append(
-                f"not counted: {sum(less)} of {len(less)}, where the block stands under the motion as it is, but falls "
-                "under the same motion scaled down"
+                f"{format_rule_name(rule)}: right {correct}, unsafe {unsafe}, "
+                f"over-conservative {conservative} of {len(compared)}"
+            )
+        if any(excluded):
+            lines.append(
+                f"not counted: {sum(excluded)} of {len(excluded)}, where the block stands under the motion as it is, "
+                "but falls under the same motion scaled down"
             )
         if unfinished := sum(response.unfinished for response in self.responses):
-            lines.append(f"not counted: {unfinished} of {len(less)}, whose simulation was not finished")
+            lines.append(f"not counted: {unfinished} of {len(excluded)}, whose simulation was not finished")
         return lines
 
 
-def title_of(rule: str) -> str:
-    """Return the usual name of a rule of thumb."""
+def format_rule_name(rule: str) -> str:
+    """Format the usual name of a rule of thumb."""
     return "ASCE 43-05" if rule == "asce_43_05" else rule.capitalize()
 
 
-def _short(factor: float) -> str:
+def _format_factor(factor: float) -> str:
     """Format a factor below 1, with more digits near 1."""
     return f"{factor:.2f}" if factor < 0.985 else f"{factor:.4f}"
 
@@ -276,8 +282,8 @@ def survey(
     --------
     >>> import rocking
     >>> block = rocking.Block(width=0.24, height=1.1)
-    >>> found = survey(block, {"clc": rocking.records.load("ridgecrest-clc-090")})
-    >>> len(found.responses)
+    >>> result = survey(block, {"clc": rocking.records.load("ridgecrest-clc-090")})
+    >>> len(result.responses)
     1
     """
     named_motions = index_motions(motions)
@@ -289,24 +295,26 @@ def survey(
     with Progress("simulating", total=len(named_motions)) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, **options))
-            _row(responses[-1], precision)  # the response caches the expensive results while the progress bar is shown
+            _create_row(
+                responses[-1], precision
+            )  # the response caches the expensive results while the progress bar is shown
             bar.advance()
     return Survey(block, tuple(named_motions), tuple(responses), friction, precision)
 
 
-def folder_names(records: Sequence[str]) -> list[str]:
-    """Return a unique folder name for each record."""
+def create_folder_names(records: Sequence[str]) -> list[str]:
+    """Create a unique folder name for each record."""
     names: dict[str, None] = {}
     for record in records:
         # Names of pulses contain a colon, which some file systems do not allow.
         stem = Path(record).stem.replace(":", "-") if record != "-" else "standard-input"
-        others = (f"{stem}-{k}" for k in range(2, len(records) + 2))
-        names[stem if stem not in names else next(name for name in others if name not in names)] = None
+        alternatives = (f"{stem}-{k}" for k in range(2, len(records) + 2))
+        names[stem if stem not in names else next(name for name in alternatives if name not in names)] = None
     return list(names)
 
 
-def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
-    """Return the name of each record as requested, and of its motion as in other analyses."""
+def create_record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
+    """Create columns with the requested name of each record, and the name of its motion as in other analyses."""
     names, verticals = list_motion_names(motions), verticals_of(motions)
     return [
         {"record": record, "motion": names[k], **{name: column[1][k] for name, column in verticals.items()}}
@@ -314,15 +322,15 @@ def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[di
     ]
 
 
-def motion_of(response: Response) -> Motion:
+def require_motion(response: Response) -> Motion:
     """Return the motion of a response that has one."""
     assert response.motion is not None
     return response.motion
 
 
-def _row(response: Response, precision: float) -> dict[str, Any]:
-    motion = motion_of(response)
-    near, further = response.perturbed(), response.perturbed(*steps_within(precision))
+def _create_row(response: Response, precision: float) -> dict[str, Any]:
+    motion = require_motion(response)
+    nearby, within_precision = response.perturbed(), response.perturbed(*steps_within(precision))
     return {
         add_unit("duration", "s"): motion.duration,
         add_unit("pga", "g"): round_decimal(motion.pga / STANDARD_GRAVITY),
@@ -330,10 +338,10 @@ def _row(response: Response, precision: float) -> dict[str, Any]:
         "processing": "; ".join(motion.history),
         "verdict": in_brief(response, precision),
         "overturned": response.overturned,
-        "decided": near.is_decided,
-        "overturned_share": float(near.overturned.mean()),
+        "decided": nearby.is_decided,
+        "overturned_share": float(nearby.overturned.mean()),
         "precision": precision,
-        "overturned_share_at_precision": float(further.overturned.mean()),
+        "overturned_share_at_precision": float(within_precision.overturned.mean()),
         "unfinished": response.unfinished,
         "stopped": response.stopped,
         "leans": response.leans,

@@ -121,12 +121,12 @@ class HistoryCalibration(Result):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import measured_figure
+        from rocking.plot.curves import draw_measured_history
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
         end = min(float(self.times[-1]), self.response.duration)
         between = drawing_times(self.response, float(self.times[0]), end)
-        return measured_figure(
+        return draw_measured_history(
             time=self.times,
             measured=simulated + self.residuals,
             residual=self.residuals,

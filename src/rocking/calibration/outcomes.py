@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.analysis.fragility import Fragility, fragility
-from rocking.analysis.levels import groups_of, note_missing
+from rocking.analysis.levels import note_missing, number_groups
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.block import Blocks
 from rocking.block.body import Bodies
@@ -247,9 +247,9 @@ class Calibration(Result):
         return [*columns, Column("weight", self.weights), Column("model", [self.model] * len(self.weights))]
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import outcomes_figure
+        from rocking.plot.curves import draw_outcomes
 
-        return outcomes_figure(
+        return draw_outcomes(
             probabilities=self.probabilities,
             overturned=self.observed,
             parameters=[self._parameter(name) for name in self._evidence.candidates.space.unknown],
@@ -292,7 +292,7 @@ def chances_of(share: Floats, effective: float, outlier_probability: float) -> F
 
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
     """Return the group of each motion, numbered from 0. By default each motion is a group."""
-    labels = groups_of(range(count) if groups is None else groups, "groups", count)
+    labels = number_groups(range(count) if groups is None else groups, "groups", count)
     checks.integer(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
 

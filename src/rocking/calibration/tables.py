@@ -10,8 +10,8 @@ from typing import Any, Final, get_args
 
 import numpy as np
 
-from rocking.analysis.hazard import HEADINGS, heading_of
-from rocking.analysis.levels import families_of
+from rocking.analysis.hazard import HEADINGS, normalise_heading
+from rocking.analysis.levels import number_families
 from rocking.block import Blocks
 from rocking.calibration.validate import ShakeTest
 from rocking.core import checks
@@ -249,7 +249,7 @@ def read_observed(
     motion (see `read_tests`). Column "group" labels outcomes that belong together. Outcomes under one motion, and
     groups with a common motion, always do. A row without label belongs to no group.
     """
-    table = read_table(path, heading_of)
+    table = read_table(path, normalise_heading)
     columns = table.columns
     found = [name for name in columns if name in HEADINGS]
     if "overturned" not in columns or len(found) + ("motion" in columns) != 1:
@@ -288,7 +288,7 @@ def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, A
         raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
     motions = _motions_of(table, **files)
     of_name = {row["motion"]: motion for (_, row), motion in zip(table.rows, motions, strict=True) if motion.pga > 0.0}
-    families = dict(zip(of_name, families_of([*of_name.values()]), strict=True)) if of_name else {}
+    families = dict(zip(of_name, number_families([*of_name.values()]), strict=True)) if of_name else {}
     intensity = [measure.value(motion) for motion in motions]
     return {"intensity": intensity, "measure": measure, "clusters": _clusters(table, families)}
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis import levels
-from rocking.analysis.levels import normalised_weights, pooled
+from rocking.analysis.levels import describe_pool, normalise_weights
 from rocking.block.body import Bodies, Body
 from rocking.calibration.diagnostics import Scores, log_losses
 from rocking.calibration.outcomes import Calibration, Validation, chances_of, overturned_under
@@ -232,10 +232,10 @@ class ModelValidation(Result):
         return records_to_columns([asdict(test) for test in self.tests], {})
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import reliability_figure
+        from rocking.plot.curves import draw_reliability
 
         columns = ("predicted", "observed", "band_lower", "band_upper")
-        return reliability_figure(
+        return draw_reliability(
             **{name: np.array([getattr(row, name) for row in self.reliability]) for name in columns},
             title=title or escape_dollars(self._headline()),
             ax=ax,
@@ -328,7 +328,7 @@ def validate(
         checks.between(outlier_probability, "outlier_probability", InvalidOption, 0.0, 0.5)
     distinct, which = find_distinct_motions([test.motion for test in given])
     observed = np.array([test.overturned for test in given], dtype=bool)
-    clusters = levels.numbered(
+    clusters = levels.number_labels(
         [("group", test.group) if test.group else ("motion", k) for test, k in zip(given, which, strict=True)]
     )
     description, how = "predictions of tests that were left out", ""
@@ -343,10 +343,10 @@ def validate(
             shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
             outlier_probability = blocks.outlier_probability if outlier_probability is None else outlier_probability
         else:
-            description, how = pooled(blocks, weights), model or "nonlinear"
+            description, how = describe_pool(blocks, weights), model or "nonlinear"
             bodies = bodies_of(blocks)
             slenderness_of(bodies)  # checked before the simulations
-            shares = normalised_weights(weights, len(bodies)) / len(bodies)
+            shares = normalise_weights(weights, len(bodies)) / len(bodies)
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
         fell = overturned_under(bodies, distinct, how)
         probabilities = chances_of(shares @ fell, effective, outlier_probability or 0.0)[which]

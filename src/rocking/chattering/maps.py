@@ -244,11 +244,11 @@ class ChatteringMap(DatasetResult):
         Colours show the outcomes of the first rocking, and hatching marks later overturning. `labels` replace the names
         of the parameters on the axes.
         """
-        from rocking.plot.maps import outcome_figure
+        from rocking.plot.maps import draw_outcome_map
 
         first, second = self.data.outcome.dims
         axis_labels = labels or {}
-        return outcome_figure(
+        return draw_outcome_map(
             x=self.data[second].values,
             y=self.data[first].values,
             outcome=self.data.outcome.values,

@@ -99,12 +99,12 @@ class ChatteringReport(Result):
         return format_some_rows(header, rows)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.orbits import intervals_figure
+        from rocking.plot.orbits import draw_intervals
 
         values = self.values
         rest = values["chattering_time"]["exact"]
         end = "incomplete" if math.isnan(rest) else f"at rest at p t = {rest:.6g}"
-        return intervals_figure(
+        return draw_intervals(
             intervals=self.impacts["interval"],
             eta=values["eta"],
             title=title or f"a = {values['a']:g}, ω = {values['omega']:g}, η = {values['eta']:g}: {end}",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
-from rocking.analysis.curve import check_names
+from rocking.analysis.curve import check_nrml_names
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.fragility import fragility as run
 from rocking.analysis.hazard import HazardCurve
@@ -113,8 +113,8 @@ def fragility(
     curve = _hazard(hazard, site, years, measure.period)
     states = parse_limit_states(limit_states)
     if output.out is not None:
-        check_names([taxonomy], "taxonomy")
-        check_names(states, "a limit state")
+        check_nrml_names([taxonomy], "taxonomy")
+        check_nrml_names(states, "a limit state")
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
         not_passed = _limit_of_standing([*states])

@@ -255,9 +255,9 @@ class ReadRecords(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the records and skipped files for JSON."""
-        from rocking.analysis.survey import record_columns
+        from rocking.analysis.survey import create_record_columns
 
-        return {"records": record_columns([*self.motions], [*self.motions.values()]), "skipped": self.skipped}
+        return {"records": create_record_columns([*self.motions], [*self.motions.values()]), "skipped": self.skipped}
 
 
 def refusal(name: str, error: RockingError) -> str:

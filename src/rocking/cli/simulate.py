@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rocking.analysis.survey import folder_names, survey
+from rocking.analysis.survey import create_folder_names, survey
 from rocking.cli.options import (
     BLOCK,
     MODEL,
@@ -107,7 +107,7 @@ def simulate(
                 with left_out("summary.xlsx"):
                     found.to_excel(folder / "summary.xlsx")
             if folder is not None and each:
-                folders = folder_names(found.records)
+                folders = create_folder_names(found.records)
                 for name, record, response in zip(folders, found.records, found.responses, strict=True):
                     _result(response, record, shown, subfolder(folder, name), energy)
             result, text = found.to_dict(), found.summary()

@@ -105,12 +105,12 @@ class Basins(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.maps import basins_figure
+        from rocking.plot.maps import draw_basins
 
         data = self.data
         x, v = (data[name] for name in (str(data.outcome.dims[1]), str(data.outcome.dims[0])))
         names = [str(name) for name in data.attractor.values]
-        return basins_figure(
+        return draw_basins(
             x=x.values,
             y=v.values,
             outcome=data.outcome.values,

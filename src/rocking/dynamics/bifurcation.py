@@ -131,11 +131,11 @@ class BifurcationDiagram(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.orbits import bifurcation_figure
+        from rocking.plot.orbits import draw_bifurcation
 
         data = self.data
         overturned = (data.period.values == OVERTURNED).all(axis=(0, 2))
-        return bifurcation_figure(
+        return draw_bifurcation(
             value=data.value.values,
             states={
                 direction: data.coordinate.sel(direction=direction).values.reshape(data.sizes["value"], -1)

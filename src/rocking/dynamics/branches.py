@@ -209,7 +209,7 @@ class Branch(Result):
         solid lines, unstable orbits dashed, and bifurcations are marked. `others` are further branches along the same
         parameter, for example of twice the period.
         """
-        from rocking.plot.orbits import branch_figure
+        from rocking.plot.orbits import draw_branches
 
         body, _ = self.family(float(self.values[0]))
         coordinate, branches = body.coordinate, [self, *others]
@@ -221,7 +221,7 @@ class Branch(Result):
         quantity = f"{coordinate.name} at the start of a period" if has_constant_peak else f"largest {coordinate.name}"
         periods = ", ".join(str(period) for period in sorted({branch.period for branch in branches}))
         headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
-        return branch_figure(
+        return draw_branches(
             values=_join_with_gaps([branch.values for branch in branches]),
             heights=_join_with_gaps(
                 [branch.states[:, 0] if has_constant_peak else branch.peaks for branch in branches]

@@ -182,11 +182,11 @@ class PeriodicOrbit(Result):
         return times
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.orbits import orbit_figure
+        from rocking.plot.orbits import draw_orbit
 
         times, coordinate = self._compute_times(), self.body.coordinate
         states = self.response.states(times)
-        return orbit_figure(
+        return draw_orbit(
             time=times / self._map.forcing_period,
             coordinate=states[:, 0],
             velocity=states[:, 1],

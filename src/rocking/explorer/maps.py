@@ -10,8 +10,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.analysis.levels import ratios_of
-from rocking.analysis.overturning import modes_of
+from rocking.analysis.levels import compute_ratios
+from rocking.analysis.overturning import classify_modes
 from rocking.block import Blocks
 from rocking.block.sides import housner_restitution
 from rocking.chattering.duration import critical_amplitude
@@ -142,10 +142,10 @@ def simulate_grid(grid: MapGrid) -> Generator[MapPart]:
         quantities = {
             "outcome": outcome,
             "rest": np.where(results["rests"] > 0, rest_duration, np.nan),
-            "peak": ratios_of(
+            "peak": compute_ratios(
                 results["peak_rotation"], results["overturned"], results["unfinished"], alpha.min(axis=1)
             ),
-            "mode": np.where(results["unfinished"], np.nan, modes_of(results, grid.motion.duration)),
+            "mode": np.where(results["unfinished"], np.nan, classify_modes(results, grid.motion.duration)),
         }
         values = np.array([quantities[name] for name in QUANTITIES], np.float32)
         yield MapPart(task.key[0], indices, values)

@@ -238,10 +238,10 @@ class Motion(Processable):
 
         In `ax` only the horizontal acceleration is drawn. The default title is the label of the motion.
         """
-        from rocking.plot.curves import motion_figure
+        from rocking.plot.curves import draw_motion
 
         times = self.drawing_times(0.0, self.end)
-        return motion_figure(
+        return draw_motion(
             time=times,
             acceleration_g=self.acceleration(times) / STANDARD_GRAVITY,
             vertical_g=None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY,

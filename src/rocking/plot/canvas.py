@@ -38,7 +38,7 @@ CURVES: Final[tuple[dict[str, Any], ...]] = (
 )
 
 #: Lightest value of a colour scale that is visible on white.
-_LIGHTEST: Final = 0.85
+_MAX_LIGHTNESS: Final = 0.85
 
 STYLE: Final[dict[Any, Any]] = {
     "font.size": 8.0,
@@ -59,26 +59,26 @@ STYLE: Final[dict[Any, Any]] = {
 #: A number with too many decimals.
 _LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
 
-#: Letter width relative to the font size: mean, and for short labels; letters that the handle
-#: and gaps of a legend line take.
-_LETTER: Final = 0.52
-_WIDE_LETTER: Final = 0.53
-_HANDLE: Final = 5
+#: Letter width relative to the font size: mean, and for short labels; letters in place of the
+#: handle and the gaps of a legend line.
+_LETTER_WIDTH: Final = 0.52
+_WIDE_LETTER_WIDTH: Final = 0.53
+_HANDLE_LETTERS: Final = 5
 
 #: Maximum label length relative to its axis; the vertical axis is shortened later by title and legend.
-_LINE: Final = (0.9, 0.6)
-_FEWEST_LETTERS: Final = 12
+_LABEL_LENGTHS: Final = (0.9, 0.6)
+_MIN_LETTERS: Final = 12
 
 #: Tick values of each decade on axes of less than one decade, and of more.
 _DIGITS: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 _FEW_DIGITS: Final = (1.0, 2.0, 5.0)
 
 #: Left end of titles, in widths of the figure.
-_TITLE_AT: Final = 0.02
+_TITLE_X: Final = 0.02
 
 
 @contextmanager
-def figure_for(
+def open_figure(
     ax: Axes | None, default: tuple[float, float], figsize: tuple[float, float] | None = None, title: str = ""
 ) -> Iterator[Figure]:
     """Yield the figure to draw in: the figure of `ax`, if any, in its own style, else a new one in the package's style.
@@ -89,13 +89,13 @@ def figure_for(
     Elsewhere no global state refers to the figure, and it is freed with its last reference. A notebook shows each
     figure once, as the value of a cell or at its end.
     """
-    short = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title)
+    short_title = _LONG_NUMBER.sub(lambda match: f"{float(match[0]):.4g}", title)
     if ax is not None:
         if not hasattr(ax, "get_figure"):
             raise InvalidOption(f"{{}} must be axes of Matplotlib's to draw in, not {ax!r}", "ax", value=ax)
         figure = ax.get_figure(root=True)
         assert figure is not None
-        ax.set_title(short, wrap=True)
+        ax.set_title(short_title, wrap=True)
         yield figure
         _show_once(figure)
         return
@@ -103,18 +103,18 @@ def figure_for(
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):
-        figure = _new_figure(_size(default if figsize is None else figsize))
-        if short:
-            line = textwrap.fill(short, _letters((1.0 - 2.0 * _TITLE_AT) * figure.bbox.width, figure.dpi))
-            figure.suptitle(line, x=_TITLE_AT, ha="left")
+        figure = _create_figure(_check_size(default if figsize is None else figsize))
+        if short_title:
+            lines = textwrap.fill(short_title, _count_letters((1.0 - 2.0 * _TITLE_X) * figure.bbox.width, figure.dpi))
+            figure.suptitle(lines, x=_TITLE_X, ha="left")
         yield figure
-        _make_ticks(figure)
+        _create_ticks(figure)
         interactive = mpl.is_interactive()
     # The context would undo the notebook's setting to show figures at the end of a cell if pyplot was loaded in it.
     mpl.interactive(interactive)
 
 
-class Place(TypedDict, total=False):
+class FigureOptions(TypedDict, total=False):
     """Options of every figure: axes, title and size."""
 
     title: str
@@ -127,75 +127,75 @@ class Page:
 
     def __init__(self, figure: Figure, ax: Axes | None) -> None:
         self.figure, self.ax = figure, ax
-        self.drawn: list[Axes] = []
+        self.panel_axes: list[Axes] = []
         self.handles: list[Any] | None = None
 
-    def panels(self, places: Any = "A", **options: Any) -> list[Axes]:
+    def create_panels(self, mosaic: Any = "A", **options: Any) -> list[Axes]:
         """Create panels at the letters of a mosaic, the main one first, or return the caller's axes alone."""
-        self.drawn = [self.ax] if self.ax else [*self.figure.subplot_mosaic(places, **options).values()]
-        return self.drawn
+        self.panel_axes = [self.ax] if self.ax else [*self.figure.subplot_mosaic(mosaic, **options).values()]
+        return self.panel_axes
 
 
 @contextmanager
-def page_for(default: tuple[float, float], **place: Unpack[Place]) -> Iterator[Page]:
-    """Yield a page on a figure of `figure_for`; its legend lists all labelled artists of the panels."""
-    ax = place.get("ax")
-    with figure_for(ax, default, place.get("figsize"), place.get("title", "")) as figure:
+def open_page(default: tuple[float, float], **options: Unpack[FigureOptions]) -> Iterator[Page]:
+    """Yield a page on a figure of `open_figure`; its legend lists all labelled artists of the panels."""
+    ax = options.get("ax")
+    with open_figure(ax, default, options.get("figsize"), options.get("title", "")) as figure:
         page = Page(figure, ax)
         yield page
-        add_legend(figure, ax, handles_of(*page.drawn) if page.handles is None else page.handles)
+        add_legend(figure, ax, collect_handles(*page.panel_axes) if page.handles is None else page.handles)
 
 
-def _letters(width: float, dpi: float, letter: float = _LETTER) -> int:
-    """Return the number of letters in the style's font that fit in a width in pixels."""
-    return max(_FEWEST_LETTERS, int(width / (letter * dpi * float(STYLE["font.size"]) / 72.0)))
+def _count_letters(width: float, dpi: float, letter_width: float = _LETTER_WIDTH) -> int:
+    """Count the letters in the style's font that fit in a width in pixels."""
+    return max(_MIN_LETTERS, int(width / (letter_width * dpi * float(STYLE["font.size"]) / 72.0)))
 
 
-def magnified(largest: float) -> tuple[float, str]:
-    """Return a power of a thousand that scales values up to `largest`, and its words for a label."""
+def find_magnification(largest: float) -> tuple[float, str]:
+    """Find a power of a thousand that scales values up to `largest`, and its words for a label."""
     power = 3 * max(0, math.ceil((-math.log10(largest) - 0.5) / 3.0)) if largest > 0.0 else 0
     return 10.0**power, f"$10^{{{power}}}$ " if power else ""
 
 
 def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
     """Label both axes, with lines about as long as the axes."""
-    lengths = _LINE[0] * axes.bbox.width, _LINE[1] * axes.bbox.height
-    for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
-        axis.set_label_text(textwrap.fill(label, _letters(length, axes.figure.dpi), break_long_words=False))
+    max_lengths = _LABEL_LENGTHS[0] * axes.bbox.width, _LABEL_LENGTHS[1] * axes.bbox.height
+    for axis, label, max_length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), max_lengths, strict=True):
+        axis.set_label_text(textwrap.fill(label, _count_letters(max_length, axes.figure.dpi), break_long_words=False))
 
 
-def styles_of(count: int) -> list[dict[str, Any]]:
-    """Return a colour and dashes for each curve; more than four go from dark to light in order."""
+def choose_styles(count: int) -> list[dict[str, Any]]:
+    """Choose a colour and dashes for each curve; more than four go from dark to light in order."""
     if count <= len(CURVES):
         return [*CURVES[:count]]
     from matplotlib import colormaps
 
-    colours = colormaps["cividis"](np.linspace(0.0, _LIGHTEST, count))
+    colours = colormaps["cividis"](np.linspace(0.0, _MAX_LIGHTNESS, count))
     dashes = [style["linestyle"] for style in CURVES]
     return [{"color": colour, "linestyle": dashes[k % len(dashes)]} for k, colour in enumerate(colours)]
 
 
-def write(axes: Axes, text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> None:
+def add_text(axes: Axes, text: str, position: tuple[Any, Any], offset: tuple[float, float], **style: Any) -> None:
     """Write a text at an offset in points from a position."""
-    axes.annotate(text, at, xytext=off, textcoords="offset points", **look)
+    axes.annotate(text, position, xytext=offset, textcoords="offset points", **style)
 
 
-def add_ticks(axes: Axes, places: Floats, height: float, marker: str = "|", **look: Any) -> None:
+def add_ticks(axes: Axes, positions: Floats, height: float, marker: str = "|", **options: Any) -> None:
     """Mark positions along an axis at one height, relative to the axes; short ticks by default."""
-    shown: dict[str, Any] = {"color": INK, "markersize": 6, "markeredgewidth": 0.5} | look
-    axes.plot(places, np.full(places.size, height), marker, transform=axes.get_xaxis_transform(), **shown)
+    style: dict[str, Any] = {"color": INK, "markersize": 6, "markeredgewidth": 0.5} | options
+    axes.plot(positions, np.full(positions.size, height), marker, transform=axes.get_xaxis_transform(), **style)
 
 
-def cell_edges(x: Floats) -> Floats:
-    """Return the edges of the cells around positions: the midpoints, or a tenth away from a single position."""
+def find_cell_edges(x: Floats) -> Floats:
+    """Compute the edges of the cells around positions: the midpoints, or a tenth away from a single position."""
     if x.size == 1:
-        half = max(0.1 * abs(float(x[0])), 1e-9)
-        return np.array([x[0] - half, x[0] + half])
+        half_width = max(0.1 * abs(float(x[0])), 1e-9)
+        return np.array([x[0] - half_width, x[0] + half_width])
     middles = 0.5 * (x[1:] + x[:-1])
     return np.concatenate([[2.0 * x[0] - middles[0]], middles, [2.0 * x[-1] - middles[-1]]])
 
 
-def scale_by_ratio(axes: Axes, x: Floats) -> None:
+def set_log_axis(axes: Axes, x: Floats) -> None:
     """Make the axis of these numbers logarithmic, with as many tick labels as fit."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -211,44 +211,44 @@ def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> No
     if ax is not None and handles:
         ax.legend(handles=handles)
     elif handles:
-        space = _letters(figure.bbox.width, figure.dpi, _WIDE_LETTER)
-        labels = [textwrap.fill(str(handle.get_label()), space - _HANDLE) for handle in handles]
-        longest = _HANDLE + max(len(line) for label in labels for line in label.splitlines())
-        columns = min(max(1, space // longest), len(handles))
+        max_letters = _count_letters(figure.bbox.width, figure.dpi, _WIDE_LETTER_WIDTH)
+        labels = [textwrap.fill(str(handle.get_label()), max_letters - _HANDLE_LETTERS) for handle in handles]
+        max_label = _HANDLE_LETTERS + max(len(line) for label in labels for line in label.splitlines())
+        columns = min(max(1, max_letters // max_label), len(handles))
         figure.legend(handles, labels, ncols=columns, loc="outside lower center")
 
 
-def handles_of(*panels: Axes) -> list[Artist]:
+def collect_handles(*panels: Axes) -> list[Artist]:
     """Collect the handles of labelled artists, each label once."""
-    named: dict[str, Artist] = {}
+    handles: dict[str, Artist] = {}
     for panel in panels:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
-    return [*named.values()]
+            handles.setdefault(label, handle)
+    return [*handles.values()]
 
 
-def _size(figsize: tuple[float, float]) -> tuple[float, float]:
+def _check_size(figsize: tuple[float, float]) -> tuple[float, float]:
     sides = checks.positive_numbers(figsize, "figsize", InvalidOption)
     if sides.size != 2:
         raise InvalidOption("{} must be (width, height), in inches", "figsize", value=figsize)
     return float(sides[0]), float(sides[1])
 
 
-def _new_figure(figsize: tuple[float, float]) -> Figure:
-    if not _is_shown():
+def _create_figure(figsize: tuple[float, float]) -> Figure:
+    if not _is_displayable():
         from matplotlib.figure import Figure
 
         return Figure(figsize=figsize, layout="constrained")
     import matplotlib.pyplot as plt
 
     figure = plt.figure(figsize=figsize, layout="constrained")
-    if _shows_at_the_end_of_cells():
+    if _is_shown_at_cell_end():
         # The cell shows the figure as its value, so pyplot must not show it again.
         plt.close(figure)
     return figure
 
 
-def _shows_at_the_end_of_cells() -> bool:
+def _is_shown_at_cell_end() -> bool:
     """Whether a notebook shows and then closes pyplot's figures at the end of a cell."""
     pyplot: Any = sys.modules.get("matplotlib.pyplot")
     return pyplot is not None and "inline" in pyplot.get_backend()
@@ -256,11 +256,11 @@ def _shows_at_the_end_of_cells() -> bool:
 
 def _show_once(figure: Figure) -> None:
     """Make pyplot forget a figure when it is first shown, so that cells do not show it twice."""
-    if _shows_at_the_end_of_cells():
-        vars(figure)["_ipython_display_"] = functools.partial(_show, figure)
+    if _is_shown_at_cell_end():
+        vars(figure)["_ipython_display_"] = functools.partial(_display_figure, figure)
 
 
-def _show(figure: Figure) -> None:
+def _display_figure(figure: Figure) -> None:
     import IPython.display
     import matplotlib.pyplot as plt
 
@@ -270,7 +270,7 @@ def _show(figure: Figure) -> None:
     display(figure)
 
 
-def _is_shown() -> bool:
+def _is_displayable() -> bool:
     """Whether pyplot can show the figure; windows require the main thread."""
     ipython = sys.modules.get("IPython")
     in_notebook = ipython is not None and hasattr(ipython.get_ipython(), "kernel")
@@ -278,9 +278,9 @@ def _is_shown() -> bool:
     return is_main and ("matplotlib.pyplot" in sys.modules or in_notebook)
 
 
-def _make_ticks(figure: Figure) -> None:
+def _create_ticks(figure: Figure) -> None:
     """Create the first tick of every axis in the current style, which all later ticks copy."""
-    for axes in (one for panel in figure.axes for one in (panel, *panel.child_axes)):
+    for axes in (child for panel in figure.axes for child in (panel, *panel.child_axes)):
         for axis in (axes.xaxis, axes.yaxis):
             axis.get_major_ticks(1)
             axis.get_minor_ticks(1)

@@ -9,19 +9,29 @@ import numpy as np
 
 from rocking.core.arrays import Flags, Floats, select_evenly
 from rocking.core.tables import escape_dollars
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, page_for, scale_by_ratio, styles_of
+from rocking.plot.canvas import (
+    ABOVE,
+    CURVES,
+    GROUND,
+    INK,
+    FigureOptions,
+    add_labels,
+    choose_styles,
+    open_page,
+    set_log_axis,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_DOT: Final[dict[str, Any]] = {"markersize": 4.0, "markerfacecolor": "none"}
+_GROUP_MARKER: Final[dict[str, Any]] = {"markersize": 4.0, "markerfacecolor": "none"}
 
 
 class FragilityLine(NamedTuple):
     """Fitted curve with its confidence band, and the observed fractions in groups of similar intensity.
 
-    seen_at, seen (groups,) : mean intensity of each group of outcomes, and its fraction that exceeds the limit
+    group_intensity, observed (groups,) : mean intensity of each group, and its fraction that exceeds the limit
     """
 
     label: str
@@ -29,42 +39,44 @@ class FragilityLine(NamedTuple):
     probability: Floats
     lower: Floats
     upper: Floats
-    seen_at: Floats
-    seen: Floats
+    group_intensity: Floats
+    observed: Floats
 
 
-def fragility_figure(
+def draw_fragility(
     *,
     lines: Sequence[FragilityLine],
     intensity_label: str,
     band_label: str,
     probability_label: str = "probability",
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw fitted fragility curves with their confidence bands and the observed fractions."""
-    with page_for((5.6, 4.2), **place) as page:
-        (axes,) = page.panels()
+    with open_page((5.6, 4.2), **options) as page:
+        (axes,) = page.create_panels()
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
             axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
             axes.plot(line.intensity, line.probability, linewidth=1.5, label=escape_dollars(line.label), **style)
             # Every limit state has its own marker.
-            axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
+            axes.plot(
+                line.group_intensity, line.observed, "os^D"[k % 4], color=style["color"], clip_on=False, **_GROUP_MARKER
+            )
         is_bounded = any(np.any(line.lower < line.upper) for line in lines)
         axes.fill_between([], [], color=GROUND, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
-        axes.plot([], [], "o", color=GROUND, label="dot: share of outcomes at about its intensity", **_DOT)
+        axes.plot([], [], "o", color=GROUND, label="dot: share of outcomes at about its intensity", **_GROUP_MARKER)
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid(True)
         add_labels(axes, intensity_label, probability_label)
     return page.figure
 
 
-def dispersions_figure(
-    *, names: Sequence[str], dispersion: Floats, low: Floats, high: Floats, **place: Unpack[Place]
+def draw_dispersions(
+    *, names: Sequence[str], dispersion: Floats, low: Floats, high: Floats, **options: Unpack[FigureOptions]
 ) -> Figure:
     """Draw the dispersion of the overturning intensity, with its interval, for each named measure."""
-    with page_for((5.6, 0.8 + 0.32 * len(names)), **place) as page:
-        (axes,) = page.panels()
+    with open_page((5.6, 0.8 + 0.32 * len(names)), **options) as page:
+        (axes,) = page.create_panels()
         row = np.arange(len(names))
         axes.hlines(row, low, high, color=INK, linewidth=1.0)
         axes.plot(dispersion, row, color=INK, linestyle="none", marker="o", markersize=4.5)
@@ -78,17 +90,17 @@ def dispersions_figure(
 
 
 #: Fractions of a rate are shown from this part of the largest fraction on.
-_LEAST = 1e-3
+_MIN_SHARE = 1e-3
 
 #: Range of the shown rates: factors on the lowest and highest rate of the hazard curve.
-_MARGIN = 10.0
+_RATE_MARGIN = 10.0
 
 
 class HazardLine(NamedTuple):
     """Annual exceedance rates of intensities, and the ends of the curve, beyond which it is extrapolated."""
 
     rate: Floats
-    known: tuple[float, float]
+    known_range: tuple[float, float]
 
 
 class RiskLine(NamedTuple):
@@ -98,81 +110,86 @@ class RiskLine(NamedTuple):
     share: Floats
 
 
-def risk_figure(
-    *, intensity: Floats, hazard: HazardLine, lines: Sequence[RiskLine], intensity_label: str, **place: Unpack[Place]
+def draw_risk(
+    *,
+    intensity: Floats,
+    hazard: HazardLine,
+    lines: Sequence[RiskLine],
+    intensity_label: str,
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw a hazard curve, and below it the contributions to each limit state's rate."""
-    with page_for((5.6, 5.2), **place) as page:
-        *curves, shares = page.panels("A;B", sharex=True)
-        for axes in curves:
-            _draw_hazard(axes, intensity, hazard)
+    with open_page((5.6, 5.2), **options) as page:
+        *hazard_axes, share_axes = page.create_panels("A;B", sharex=True)
+        for panel in hazard_axes:
+            _draw_hazard(panel, intensity, hazard)
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
-            shares.plot(intensity, line.share, linewidth=1.5, label=escape_dollars(line.label), **style)
-            shares.fill_between(intensity, 0.0, line.share, color=style["color"], alpha=0.12, linewidth=0.0)
-        shown = _inside(intensity, hazard.known)
+            share_axes.plot(intensity, line.share, linewidth=1.5, label=escape_dollars(line.label), **style)
+            share_axes.fill_between(intensity, 0.0, line.share, color=style["color"], alpha=0.12, linewidth=0.0)
+        is_visible = _is_inside(intensity, hazard.known_range)
         for line in lines:
-            shown |= line.share > _LEAST * line.share.max()
-        for axes in curves:
-            axes.set_ylim(0.5 * float(hazard.rate[shown].min()), 2.0 * float(hazard.rate[shown].max()))
-        scale_by_ratio(shares, intensity[shown])
-        shares.set(xlim=(float(intensity[shown][0]), float(intensity[shown][-1])))
-        shares.set_ylim(bottom=0.0)
-        shares.grid(True)
-        add_labels(shares, intensity_label, "share of the rate per factor of e")
+            is_visible |= line.share > _MIN_SHARE * line.share.max()
+        for panel in hazard_axes:
+            panel.set_ylim(0.5 * float(hazard.rate[is_visible].min()), 2.0 * float(hazard.rate[is_visible].max()))
+        set_log_axis(share_axes, intensity[is_visible])
+        share_axes.set(xlim=(float(intensity[is_visible][0]), float(intensity[is_visible][-1])))
+        share_axes.set_ylim(bottom=0.0)
+        share_axes.grid(True)
+        add_labels(share_axes, intensity_label, "share of the rate per factor of e")
     return page.figure
 
 
-def survival_figure(
+def draw_survival(
     *,
     intensity: Floats,
     largest: Floats,
     largest_label: str,
     hazard: HazardLine | None,
     intensity_label: str,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw a hazard curve and the largest annual rates consistent with a standing block."""
-    with page_for((5.6, 3.6), **place) as page:
-        (axes,) = page.panels()
-        scale_by_ratio(axes, intensity)
+    with open_page((5.6, 3.6), **options) as page:
+        (axes,) = page.create_panels()
+        set_log_axis(axes, intensity)
         if hazard is not None:
             _draw_hazard(axes, intensity, hazard)
-            above: dict[str, Any] = {"color": ABOVE, "alpha": 0.2, "label": "more often than the block allows"}
-            axes.fill_between(intensity, largest, np.maximum(largest, hazard.rate), linewidth=0.0, **above)
+            style: dict[str, Any] = {"color": ABOVE, "alpha": 0.2, "label": "more often than the block allows"}
+            axes.fill_between(intensity, largest, np.maximum(largest, hazard.rate), linewidth=0.0, **style)
         axes.plot(intensity, largest, label=largest_label, linewidth=1.5, **CURVES[1])
         rate = largest[largest < np.inf] if hazard is None else hazard.rate
-        lowest, highest = 0.5 * min(float(largest.min()), float(rate.min())), _MARGIN * float(rate.max())
+        lowest, highest = 0.5 * min(float(largest.min()), float(rate.min())), _RATE_MARGIN * float(rate.max())
         axes.set(yscale="log", xlim=(intensity[0], intensity[-1]), ylim=(lowest, min(highest, 10.0)))
         axes.grid(True)
         add_labels(axes, intensity_label, "exceeded, times a year")
     return page.figure
 
 
-def _inside(intensity: Floats, known: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    return np.asarray((intensity >= known[0]) & (intensity <= known[1]))
+def _is_inside(intensity: Floats, bounds: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return np.asarray((intensity >= bounds[0]) & (intensity <= bounds[1]))
 
 
 def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
     """Draw a hazard curve, dotted where it is extrapolated."""
-    inside = _inside(intensity, hazard.known)
-    label = "hazard curve (dotted: extended)" if not inside.all() else "hazard curve"
+    is_inside = _is_inside(intensity, hazard.known_range)
+    label = "hazard curve (dotted: extended)" if not is_inside.all() else "hazard curve"
     axes.plot(intensity, hazard.rate, color=GROUND, linewidth=1.0, linestyle=":")
-    axes.plot(intensity[inside], hazard.rate[inside], color=GROUND, linewidth=2.0, label=label)
+    axes.plot(intensity[is_inside], hazard.rate[is_inside], color=GROUND, linewidth=2.0, label=label)
     axes.set_yscale("log")
     axes.grid(True)
     add_labels(axes, "", "exceeded, times a year")
 
 
 #: Maximum number of curves that are drawn with all fractiles, and with every motion.
-_WITH_ALL_FRACTILES: Final = 2
-_WITH_ALL_MOTIONS: Final = 4
+_MAX_CURVES_WITH_FRACTILES: Final = 2
+_MAX_CURVES_WITH_MOTIONS: Final = 4
 
 #: Maximum number of curves in the legend.
-_NAMED: Final = 8
+_MAX_NAMED_CURVES: Final = 8
 
 #: Marker at the end of a line beyond which blocks overturn.
-_END: Final[dict[str, Any]] = {"marker": "x", "linestyle": "none", "markersize": 4.0, "markeredgewidth": 1.0}
+_END_MARKER: Final[dict[str, Any]] = {"marker": "x", "linestyle": "none", "markersize": 4.0, "markeredgewidth": 1.0}
 
 
 class SpectrumCurves(NamedTuple):
@@ -190,14 +207,14 @@ class SpectrumCurves(NamedTuple):
     overturned: Floats
 
 
-def spectrum_figure(
+def draw_spectrum(
     *,
     x: Floats,
     curves: Sequence[SpectrumCurves],
     fractiles: Sequence[float],
     motions: Sequence[str],
     x_label: str,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw peak rotations against the abscissa, and below them the fraction of motions that overturn the block.
 
@@ -206,31 +223,31 @@ def spectrum_figure(
     motion, ends in a cross if the block of the next point overturns. In `ax`, only the peak rotations are drawn.
     """
     middle = min(fractiles, key=lambda share: abs(share - 0.5))
-    chosen = fractiles if len(motions) > 1 and len(curves) <= _WITH_ALL_FRACTILES else [middle]
-    widths = {share: 1.8 if share == middle else 0.9 for share in chosen}
-    named, with_singles = select_evenly(len(curves), _NAMED), len(curves) <= _WITH_ALL_MOTIONS
-    with page_for((5.6, 4.8), **place) as page:
-        peaks, *shares = panels = page.panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
-        for k, (style, curve) in enumerate(zip(styles_of(len(curves)), curves, strict=True)):
-            peaks.plot([], [], linewidth=1.4, label=escape_dollars(curve.label) if k in named else "", **style)
-            if with_singles:
+    drawn_fractiles = fractiles if len(motions) > 1 and len(curves) <= _MAX_CURVES_WITH_FRACTILES else [middle]
+    widths = {share: 1.8 if share == middle else 0.9 for share in drawn_fractiles}
+    labelled, has_singles = select_evenly(len(curves), _MAX_NAMED_CURVES), len(curves) <= _MAX_CURVES_WITH_MOTIONS
+    with open_page((5.6, 4.8), **options) as page:
+        peaks, *shares = panels = page.create_panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
+        for k, (style, curve) in enumerate(zip(choose_styles(len(curves)), curves, strict=True)):
+            peaks.plot([], [], linewidth=1.4, label=escape_dollars(curve.label) if k in labelled else "", **style)
+            if has_singles:
                 singles = np.where(np.isfinite(curve.singles), curve.singles, np.nan)
                 peaks.plot(x, singles.T, color=style["color"], linewidth=0.5, alpha=0.35)
             for share, width in widths.items():
                 fractile = curve.fractiles[[*fractiles].index(share)]
-                _draw(peaks, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
+                _draw_peaks(peaks, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
             for panel in shares:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
-        if len(named) < len(curves):
-            peaks.plot([], [], linestyle="none", label=f"({len(named)} of {len(curves)} named)")
+        if len(labelled) < len(curves):
+            peaks.plot([], [], linestyle="none", label=f"({len(labelled)} of {len(curves)} named)")
         if len(motions) > 1:
-            if with_singles:
+            if has_singles:
                 peaks.plot([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions")
             for share, width in widths.items():
-                text = "median" if share == 0.5 else f"{100 * share:g} % of the motions are below"
-                peaks.plot([], [], color=INK, linewidth=width, label=text)
+                label = "median" if share == 0.5 else f"{100 * share:g} % of the motions are below"
+                peaks.plot([], [], color=INK, linewidth=width, label=label)
         peaks.grid(True, which="both")
-        scale_by_ratio(panels[-1], x)
+        set_log_axis(panels[-1], x)
         peaks.set_ylim(bottom=0.0)
         add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
         for panel in shares:
@@ -240,18 +257,18 @@ def spectrum_figure(
     return page.figure
 
 
-def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, Any]) -> None:
+def _draw_peaks(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, Any]) -> None:
     """Draw a line with gaps at infinite values, and mark its ends there."""
-    finite = np.isfinite(values)
-    shown = np.where(finite, values, np.nan)
-    axes.plot(x, shown, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
-    ends = finite & ~(np.append(True, finite[:-1]) & np.append(finite[1:], True))
-    if ends.any():
-        axes.plot(x[ends], values[ends], color=style["color"], label="beyond: overturns", **_END)
+    is_finite = np.isfinite(values)
+    finite_values = np.where(is_finite, values, np.nan)
+    axes.plot(x, finite_values, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
+    is_end = is_finite & ~(np.append(True, is_finite[:-1]) & np.append(is_finite[1:], True))
+    if is_end.any():
+        axes.plot(x[is_end], values[is_end], color=style["color"], label="beyond: overturns", **_END_MARKER)
 
 
 #: Fractiles of the motions, and their line styles.
-_FRACTILES: Final[Mapping[float, Any]] = {0.16: (0, (1, 1)), 0.5: "-", 0.84: (0, (5, 1.5))}
+_FRACTILE_LINES: Final[Mapping[float, Any]] = {0.16: (0, (1, 1)), 0.5: "-", 0.84: (0, (5, 1.5))}
 
 
 class ScaledMotion(NamedTuple):
@@ -263,68 +280,73 @@ class ScaledMotion(NamedTuple):
     bands: Floats
 
 
-def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Unpack[Place]) -> Figure:
+def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Unpack[FigureOptions]) -> Figure:
     """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
 
     More than four motions are drawn in one style, with the fractiles of the levels that reach a peak rotation.
     """
-    few = len(motions) <= len(CURVES)
+    has_few = len(motions) <= len(CURVES)
     names = [escape_dollars(motion.label) for motion in motions]
-    if few and len(motions) > 1:
+    if has_few and len(motions) > 1:
         names = [f"{k}: {name}" for k, name in enumerate(names, start=1)]
-    stands = np.concatenate([motion.levels[np.isfinite(motion.peak)] for motion in motions])
+    standing_levels = np.concatenate([motion.levels[np.isfinite(motion.peak)] for motion in motions])
     last = max(float(motion.levels[-1]) for motion in motions)
-    with page_for((7.0, 4.2), **place) as page:
-        curves, *strips = page.panels("AB", sharey=True, width_ratios=(2.0, 1.0))
+    with open_page((7.0, 4.2), **options) as page:
+        curves, *strips = page.create_panels("AB", sharey=True, width_ratios=(2.0, 1.0))
         for k, motion in enumerate(motions):
-            style = CURVES[k] if few else {"color": GROUND, "linewidth": 0.6}
+            style = CURVES[k] if has_few else {"color": GROUND, "linewidth": 0.6}
             peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
-            look: dict[str, Any] = {"marker": ".", "markersize": 5.0 if few else 3.0, "markeredgewidth": 0.0, **style}
-            curves.plot(peak, motion.levels, label=names[k] if few else "each motion", **look)
+            line_style: dict[str, Any] = {
+                "marker": ".",
+                "markersize": 5.0 if has_few else 3.0,
+                "markeredgewidth": 0.0,
+                **style,
+            }
+            curves.plot(peak, motion.levels, label=names[k] if has_few else "each motion", **line_style)
             for panel in strips:
                 for band in motion.bands:
                     # Lines at the ends keep the thinnest strip visible.
-                    color = style["color"] if few else INK
+                    color = style["color"] if has_few else INK
                     panel.plot([k, k], band, "_-", color=color, linewidth=5.0, markersize=5.0, solid_capstyle="butt")
-        if not few:
-            every = np.concatenate([motion.peak for motion in motions])
-            peaks = np.linspace(0.0, float(np.max(every[np.isfinite(every)], initial=0.0)), 200)[1:]
-            reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
-            for share, linestyle in _FRACTILES.items():
+        if not has_few:
+            all_peaks = np.concatenate([motion.peak for motion in motions])
+            peaks = np.linspace(0.0, float(np.max(all_peaks[np.isfinite(all_peaks)], initial=0.0)), 200)[1:]
+            reached = np.sort([find_reaching_levels(motion, peaks) for motion in motions], axis=0)
+            for share, linestyle in _FRACTILE_LINES.items():
                 # Lowest level that suffices for this fraction of the motions.
                 level = reached[int(np.ceil(share * len(motions))) - 1]
-                look = {"linestyle": linestyle, "label": f"level that suffices for {100 * share:g} % of them"}
-                curves.plot(peaks, np.where(np.isfinite(level), level, np.nan), color=ABOVE, **look)
-        curves.set(xlim=(0.0, None), ylim=(0.0, min(1.5 * float(stands.max(initial=0.0)) or last, last)))
+                line_style = {"linestyle": linestyle, "label": f"level that suffices for {100 * share:g} % of them"}
+                curves.plot(peaks, np.where(np.isfinite(level), level, np.nan), color=ABOVE, **line_style)
+        curves.set(xlim=(0.0, None), ylim=(0.0, min(1.5 * float(standing_levels.max(initial=0.0)) or last, last)))
         curves.grid(True)
         add_labels(curves, "peak rotation / slenderness", level_label)
         for panel in strips:
-            panel.set_xticks(range(len(motions)), [str(k + 1) for k in range(len(motions))] if few else names)
-            panel.tick_params("x", labelrotation=0 if few else 90, labelsize="small")
+            panel.set_xticks(range(len(motions)), [str(k + 1) for k in range(len(motions))] if has_few else names)
+            panel.tick_params("x", labelrotation=0 if has_few else 90, labelsize="small")
             panel.set_xlim(-0.7, len(motions) - 0.3)
             add_labels(panel, "overturns", "")
     return page.figure
 
 
-def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
-    """Return the lowest level at which a motion reaches each peak rotation; infinite if never."""
+def find_reaching_levels(motion: ScaledMotion, peaks: Floats) -> Floats:
+    """Find the lowest level at which a motion reaches each peak rotation; infinite if never."""
     overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
-    below = motion.levels < overturns
-    level, peak = motion.levels[below], motion.peak[below]
+    is_below = motion.levels < overturns
+    level, peak = motion.levels[is_below], motion.peak[is_below]
     if not level.size:
         return np.full(peaks.shape, overturns)
     first = np.searchsorted(np.maximum.accumulate(peak), peaks)
-    after = np.minimum(first, level.size - 1)
-    before = np.maximum(after - 1, 0)
-    rise = np.where(peak[after] > peak[before], peak[after] - peak[before], np.inf)
-    between = level[before] + (peaks - peak[before]) / rise * (level[after] - level[before])
-    return np.where(first < level.size, between, overturns)
+    upper = np.minimum(first, level.size - 1)
+    lower = np.maximum(upper - 1, 0)
+    rise = np.where(peak[upper] > peak[lower], peak[upper] - peak[lower], np.inf)
+    interpolated = level[lower] + (peaks - peak[lower]) / rise * (level[upper] - level[lower])
+    return np.where(first < level.size, interpolated, overturns)
 
 
 #: Bars of a histogram of blocks.
-_BINS: Final = 24
+_BIN_COUNT: Final = 24
 
-_DOTS: Final[dict[str, Any]] = {"linestyle": "", "markersize": 3.2, "markeredgewidth": 0.6, "clip_on": False}
+_TEST_MARKER: Final[dict[str, Any]] = {"linestyle": "", "markersize": 3.2, "markeredgewidth": 0.6, "clip_on": False}
 
 
 class Parameter(NamedTuple):
@@ -340,25 +362,27 @@ class Parameter(NamedTuple):
     bounds: tuple[float, float]
 
 
-def outcomes_figure(
+def draw_outcomes(
     *,
     probabilities: Floats,
     overturned: Flags,
     parameters: Sequence[Parameter],
     weights: Floats,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw the outcome of every test against its fitted probability, and the parameters of the blocks."""
-    with page_for((7.0, 4.6), **place) as page:
-        below = "ABCDEFGHI"[: len(parameters)]
-        tests, *panels = page.panels(f"{'T' * len(parameters)};{below}", height_ratios=(1.2, 1.0))
+    with open_page((7.0, 4.6), **options) as page:
+        letters = "ABCDEFGHI"[: len(parameters)]
+        tests, *panels = page.create_panels(f"{'T' * len(parameters)};{letters}", height_ratios=(1.2, 1.0))
         # Sorted, with each outcome at a probability of 0 or 1.
         order = np.argsort(probabilities, kind="stable")
-        number, fell = np.arange(1, order.size + 1), overturned[order]
+        number, is_overturned = np.arange(1, order.size + 1), overturned[order]
         tests.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
-        tests.plot(number[fell], np.ones(fell.sum()), "v", color=ABOVE, label="overturned", **_DOTS)
-        stood: Any = {"color": INK, "mfc": "white", "label": "did not overturn", **_DOTS}
-        tests.plot(number[~fell], np.zeros((~fell).sum()), "o", **stood)
+        tests.plot(
+            number[is_overturned], np.ones(is_overturned.sum()), "v", color=ABOVE, label="overturned", **_TEST_MARKER
+        )
+        standing_style: Any = {"color": INK, "mfc": "white", "label": "did not overturn", **_TEST_MARKER}
+        tests.plot(number[~is_overturned], np.zeros((~is_overturned).sum()), "o", **standing_style)
         tests.set_ylim(0.0, 1.0)
         tests.grid(True)
         add_labels(tests, "test, by its probability", "probability of overturning")
@@ -369,20 +393,26 @@ def outcomes_figure(
     return page.figure
 
 
-def measured_figure(
-    *, time: Floats, measured: Floats, residual: Floats, fitted_time: Floats, fitted: Floats, **place: Unpack[Place]
+def draw_measured_history(
+    *,
+    time: Floats,
+    measured: Floats,
+    residual: Floats,
+    fitted_time: Floats,
+    fitted: Floats,
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw measured and fitted rotation histories (rad, against s) and their residual."""
-    with page_for((7.0, 4.0), **place) as page:
-        main, *others = page.panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
+    with open_page((7.0, 4.0), **options) as page:
+        main, *residual_panels = page.create_panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
         main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")
         main.plot(fitted_time, fitted, color=ABOVE, linewidth=0.9, label="fitted")
         main.set_xlim(time[0], time[-1])
-        add_labels(main, "" if others else "time (s)", "rotation (rad)")
-        for panel in others:
+        add_labels(main, "" if residual_panels else "time (s)", "rotation (rad)")
+        for panel in residual_panels:
             panel.plot(time, residual, color=INK, linewidth=0.6)
             add_labels(panel, "time (s)", "residual (rad)")
-        for panel in (main, *others):
+        for panel in (main, *residual_panels):
             panel.axhline(0.0, color=INK, linewidth=0.4)
     return page.figure
 
@@ -390,29 +420,29 @@ def measured_figure(
 def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
     """Draw the distribution of the blocks, and the median and interval of the population's centre."""
     sides = parameter.values.shape[1]
-    drawn = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}
-    edges = np.histogram_bin_edges(parameter.values, _BINS)
+    styles = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}
+    edges = np.histogram_bin_edges(parameter.values, _BIN_COUNT)
     for bound in parameter.bounds:
         axes.axvline(bound, color=GROUND, linewidth=1.0, linestyle=(0, (3, 2)), label="bound")
-    for k, (name, style) in enumerate(drawn.items()):
+    for k, (name, style) in enumerate(styles.items()):
         shares = np.histogram(parameter.values[:, k], edges, weights=weights)[0]
         axes.stairs(shares, edges, linewidth=1.1, label=name, **style)
         median, low, high = parameter.estimates[k]
-        at = axes.get_xaxis_transform()
+        transform = axes.get_xaxis_transform()
         height = 0.97 - 0.07 * k
-        axes.plot([low, median, high], [height] * 3, "|-", color=style["color"], linewidth=1.0, transform=at)
+        axes.plot([low, median, high], [height] * 3, "|-", color=style["color"], linewidth=1.0, transform=transform)
     axes.plot([], [], "|-", color=GROUND, linewidth=1.0, markersize=7.0, label="centre: median and 90 %")
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.set_yticks([])
     add_labels(axes, parameter.label, "")
 
 
-def reliability_figure(
-    *, predicted: Floats, observed: Floats, band_lower: Floats, band_upper: Floats, **place: Unpack[Place]
+def draw_reliability(
+    *, predicted: Floats, observed: Floats, band_lower: Floats, band_upper: Floats, **options: Unpack[FigureOptions]
 ) -> Figure:
     """Draw observed against predicted fractions (bins,), with the bands of correct predictions."""
-    with page_for((3.7, 3.7), **place) as page:
-        (axes,) = page.panels()
+    with open_page((3.7, 3.7), **options) as page:
+        (axes,) = page.create_panels()
         axes.plot([0.0, 1.0], [0.0, 1.0], color=GROUND, linewidth=0.8, linestyle=(0, (4, 2)))
         label = "90 % of what right predictions would show"
         axes.vlines(predicted, band_lower, band_upper, color=GROUND, linewidth=5.0, alpha=0.55, label=label)
@@ -429,15 +459,15 @@ def draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float
     axes.plot(time, acceleration, color=GROUND, linewidth=linewidth, label="_ground acceleration")
 
 
-def motion_figure(
-    *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **place: Unpack[Place]
+def draw_motion(
+    *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **options: Unpack[FigureOptions]
 ) -> Figure:
     """Draw a ground acceleration (g) against time (s), and below it the vertical one, which is omitted in `ax`."""
     traces = {"ground acceleration (g)": acceleration_g}
-    if vertical_g is not None and place.get("ax") is None:
+    if vertical_g is not None and options.get("ax") is None:
         traces["vertical acceleration (g)"] = vertical_g
-    with page_for((7.0, 0.6 + 1.8 * len(traces)), **place) as page:
-        panels = page.panels(";".join("AB"[: len(traces)]), sharex=True)
+    with open_page((7.0, 0.6 + 1.8 * len(traces)), **options) as page:
+        panels = page.create_panels(";".join("AB"[: len(traces)]), sharex=True)
         for axes, (label, trace) in zip(panels, traces.items(), strict=True):
             draw_ground(axes, time, trace, 0.8)
             axes.set_xlim(time[0], time[-1])

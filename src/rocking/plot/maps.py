@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 from rocking.core.arrays import Floats
 from rocking.core.tables import escape_dollars
 from rocking.errors import InvalidOption
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Place, add_labels, cell_edges, page_for, styles_of
+from rocking.plot.canvas import (
+    ABOVE,
+    GROUND,
+    INK,
+    REST,
+    FigureOptions,
+    add_labels,
+    choose_styles,
+    find_cell_edges,
+    open_page,
+)
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -21,18 +31,18 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
 #: From harmless to worst, each darker than the previous one; the last stands out.
-_COLOURS: Final = ("#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c")
+_OUTCOME_COLOURS: Final = ("#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c")
 
 #: Colour of the hatch over points that overturn later.
-_LATER: Final = "#b0390c"
+_LATER_COLOUR: Final = "#b0390c"
 
 #: Colours and hatches of regions in which the block stays, and in which it overturns after 0, 1, ... impacts, from
 #: darkest to lightest; hatches distinguish them in greyscale. The second of the regions in which it stays is the
 #: darkest, because it is often a strip that must remain visible between the others.
-_STAYS: Final = (("#ffffff", ""), ("#5d7da6", ""), ("#dde7f0", ""))
-_OVERTURNS_AFTER_REST: Final = ("#b0390c", "ooo")
-_UNFINISHED: Final = ("#b5b5b5", "++")
-_OVERTURNS: Final = (
+_STAY_STYLES: Final = (("#ffffff", ""), ("#5d7da6", ""), ("#dde7f0", ""))
+_AFTER_REST_STYLE: Final = ("#b0390c", "ooo")
+_UNFINISHED_STYLE: Final = ("#b5b5b5", "++")
+_OVERTURN_STYLES: Final = (
     ("#7d2706", ""),
     ("#d9692a", "////"),
     ("#eda565", "\\\\\\\\"),
@@ -41,17 +51,17 @@ _OVERTURNS: Final = (
 )
 
 #: Fraction of the frame below which a region is invisible, and of its height below which lines hide it.
-_LEAST_SEEN: Final = 1e-3
-_STRIP: Final = 1e-2
+_MIN_VISIBLE_AREA: Final = 1e-3
+_MIN_STRIP_HEIGHT: Final = 1e-2
 
 #: Fraction of the frame's height beyond which boundaries of two columns are not connected.
-_SAME: Final = 0.25
+_MAX_CONNECTED_DISTANCE: Final = 0.25
 
 #: Ends of a frame around one value, relative to the value.
-_AROUND: Final = np.array([0.9, 1.1])
+_SINGLE_VALUE_FRAME: Final = np.array([0.9, 1.1])
 
 
-def outcome_figure(
+def draw_outcome_map(
     *,
     x: Floats,
     y: Floats,
@@ -60,24 +70,24 @@ def outcome_figure(
     later: NDArray[np.bool_],
     x_label: str,
     y_label: str,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw which of up to six outcomes each point of a grid has: integers of shape (len(y), len(x))."""
     from matplotlib import rc_context
     from matplotlib.colors import ListedColormap
 
-    with page_for((5.4, 4.2), **place) as page:
-        (axes,) = page.panels()
-        _colour_cells(axes, x, y, outcome, _COLOURS[: len(meanings)])
-        page.handles = [_patch((_COLOURS[k], ""), meanings[k]) for k in np.unique(outcome)]
+    with open_page((5.4, 4.2), **options) as page:
+        (axes,) = page.create_panels()
+        _colour_cells(axes, x, y, outcome, _OUTCOME_COLOURS[: len(meanings)])
+        page.handles = [_create_patch((_OUTCOME_COLOURS[k], ""), meanings[k]) for k in np.unique(outcome)]
         if later.any():
             cells = np.ma.masked_where(~later, outcome)
             # Two overlaid hatches are visible on the lightest and the darkest colours.
-            for ink, width in (("#ffffff", 2.0), (_LATER, 0.9)):
-                look: dict[str, Any] = {"cmap": ListedColormap(["none"]), "edgecolor": ink, "linewidth": 0.0}
+            for ink, width in (("#ffffff", 2.0), (_LATER_COLOUR, 0.9)):
+                style: dict[str, Any] = {"cmap": ListedColormap(["none"]), "edgecolor": ink, "linewidth": 0.0}
                 with rc_context({"hatch.linewidth": width}):
-                    axes.pcolor(cell_edges(x), cell_edges(y), cells, hatch="////", **look)
-            page.handles.append(_patch(("#ffffff", "////"), "overturns later"))
+                    axes.pcolor(find_cell_edges(x), find_cell_edges(y), cells, hatch="////", **style)
+            page.handles.append(_create_patch(("#ffffff", "////"), "overturns later"))
         add_labels(axes, x_label, y_label)
     return page.figure
 
@@ -87,11 +97,11 @@ def _colour_cells(axes: Axes, x: Floats, y: Floats, numbers: NDArray[np.integer]
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
-    look: dict[str, Any] = {"cmap": ListedColormap([*colours]), "norm": norm, "rasterized": True}
-    axes.pcolormesh(cell_edges(x), cell_edges(y), numbers, **look)
+    style: dict[str, Any] = {"cmap": ListedColormap([*colours]), "norm": norm, "rasterized": True}
+    axes.pcolormesh(find_cell_edges(x), find_cell_edges(y), numbers, **style)
 
 
-def regions_figure(
+def draw_regions(
     *,
     x: Floats,
     y_range: tuple[float, float],
@@ -100,124 +110,128 @@ def regions_figure(
     names: Mapping[int, str],
     x_label: str,
     y_label: str,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw regions between boundaries at increasing abscissae x, shape (n,).
 
     At each abscissa, `edges` contains the increasing ordinates of the boundaries, and `regions` the regions below,
-    between and above them: the number of impacts before overturning, or -5 to -1 for other outcomes (see `_look`).
-    Boundaries between the same regions are connected by straight lines. A region without counterpart in the next
-    column ends half way to it. The legend names the visible regions.
+    between and above them: the number of impacts before overturning, or -5 to -1 for other outcomes (see
+    `_choose_style`). Boundaries between the same regions are connected by straight lines. A region without counterpart
+    in the next column ends half way to it. The legend names the visible regions.
     """
     low, high = y_range
     # A single column or level fills the frame.
     if x.size == 1:
-        x, edges, regions = x * _AROUND, [*edges] * 2, [*regions] * 2
+        x, edges, regions = x * _SINGLE_VALUE_FRAME, [*edges] * 2, [*regions] * 2
     if low == high:
-        low, high = low * _AROUND
+        low, high = low * _SINGLE_VALUE_FRAME
     area: dict[int, float] = {}
-    farthest = _SAME * (high - low)
+    farthest = _MAX_CONNECTED_DISTANCE * (high - low)
     starts = [k for k in range(len(x)) if k == 0 or tuple(regions[k]) != tuple(regions[k - 1])]
-    with page_for((5.6, 4.6), **place) as page:
-        (axes,) = page.panels()
+    with open_page((5.6, 4.6), **options) as page:
+        (axes,) = page.create_panels()
         for start, end in pairwise([*starts, len(x)]):
             rows = [(x[k], edges[k]) for k in range(start, end)]
             if start > 0:
                 rows.insert(
-                    0, (np.mean(x[start - 1 : start + 1]), _half_way(start, start - 1, edges, regions, farthest))
+                    0, (np.mean(x[start - 1 : start + 1]), _interpolate(start, start - 1, edges, regions, farthest))
                 )
             if end < len(x):
-                rows.append((np.mean(x[end - 1 : end + 1]), _half_way(end - 1, end, edges, regions, farthest)))
-            at = np.array([abscissa for abscissa, _ in rows])
+                rows.append((np.mean(x[end - 1 : end + 1]), _interpolate(end - 1, end, edges, regions, farthest)))
+            abscissae = np.array([abscissa for abscissa, _ in rows])
             levels = np.array([[low, *row, high] for _, row in rows]).T
-            seen = np.diff(levels, axis=0).max(axis=1) > _STRIP * (high - low)
+            is_visible = np.diff(levels, axis=0).max(axis=1) > _MIN_STRIP_HEIGHT * (high - low)
             for k, region in enumerate(regions[start]):
-                colour, hatch = _look(region)
-                look: dict[str, Any] = {"facecolor": colour, "hatch": hatch, "edgecolor": INK, "antialiased": False}
-                axes.fill_between(at, levels[k], levels[k + 1], linewidth=0.0, **look)
-                area[region] = area.get(region, 0.0) + float(np.trapezoid(levels[k + 1] - levels[k], at))
-                if k > 0 and seen[k - 1] and seen[k]:  # lines would hide a strip
-                    axes.plot(at, levels[k], color=INK, linewidth=0.5, solid_capstyle="round")
+                colour, hatch = _choose_style(region)
+                style: dict[str, Any] = {"facecolor": colour, "hatch": hatch, "edgecolor": INK, "antialiased": False}
+                axes.fill_between(abscissae, levels[k], levels[k + 1], linewidth=0.0, **style)
+                area[region] = area.get(region, 0.0) + float(np.trapezoid(levels[k + 1] - levels[k], abscissae))
+                if k > 0 and is_visible[k - 1] and is_visible[k]:  # lines would hide a strip
+                    axes.plot(abscissae, levels[k], color=INK, linewidth=0.5, solid_capstyle="round")
         axes.set(xlim=(x[0], x[-1]), ylim=(low, high))
         add_labels(axes, x_label, y_label)
-        looks: dict[tuple[str, str], list[int]] = {}
+        regions_by_style: dict[tuple[str, str], list[int]] = {}
         for region in sorted(area):
-            if area[region] > _LEAST_SEEN * (x[-1] - x[0]) * (high - low):
-                looks.setdefault(_look(region), []).append(region)
+            if area[region] > _MIN_VISIBLE_AREA * (x[-1] - x[0]) * (high - low):
+                regions_by_style.setdefault(_choose_style(region), []).append(region)
         page.handles = [
-            _patch(look, names[alike[0]] if len(alike) == 1 else f"overturns after {alike[0]} or more")
-            for look, alike in looks.items()
+            _create_patch(style, names[group[0]] if len(group) == 1 else f"overturns after {group[0]} or more")
+            for style, group in regions_by_style.items()
         ]
     return page.figure
 
 
-def _half_way(
-    k: int, beside: int, edges: Sequence[Floats], regions: Sequence[Sequence[int]], farthest: float
+def _interpolate(
+    k: int, neighbour: int, edges: Sequence[Floats], regions: Sequence[Sequence[int]], max_distance: float
 ) -> Floats:
-    """Return a column's boundaries half way to its neighbour: matched to the nearest alike, closed, or unchanged."""
-    one, other = np.array(edges[k], dtype=float), np.array(edges[beside], dtype=float)
-    pairs = [*pairwise(regions[beside])]
-    alike = np.array([[mine == theirs for theirs in pairs] for mine in pairwise(regions[k])], dtype=bool)
-    distance = np.abs(one[:, None] - other)
-    alike = alike.reshape(distance.shape) & (distance < farthest)
-    distance[~alike] = np.inf
+    """Interpolate a column's boundaries half way to its neighbour: to the nearest alike, closed, or unchanged."""
+    ordinates, neighbour_ordinates = np.array(edges[k], dtype=float), np.array(edges[neighbour], dtype=float)
+    pairs = [*pairwise(regions[neighbour])]
+    is_alike = np.array(
+        [[pair == neighbour_pair for neighbour_pair in pairs] for pair in pairwise(regions[k])], dtype=bool
+    )
+    distance = np.abs(ordinates[:, None] - neighbour_ordinates)
+    is_alike = is_alike.reshape(distance.shape) & (distance < max_distance)
+    distance[~is_alike] = np.inf
     nearest = [distance.min(axis=axis, initial=np.inf, keepdims=True) for axis in (0, 1)]
-    mine, theirs = np.nonzero(alike & (distance == nearest[0]) & (distance == nearest[1]))
-    one[mine] = 0.5 * (one[mine] + other[theirs])
-    alone = np.setdiff1d(np.arange(one.size), mine)
-    for i in alone[np.isin(alone + 1, alone)]:
+    index, neighbour_index = np.nonzero(is_alike & (distance == nearest[0]) & (distance == nearest[1]))
+    ordinates[index] = 0.5 * (ordinates[index] + neighbour_ordinates[neighbour_index])
+    unmatched = np.setdiff1d(np.arange(ordinates.size), index)
+    for i in unmatched[np.isin(unmatched + 1, unmatched)]:
         if regions[k][i] == regions[k][i + 2]:
-            one[i : i + 2] = np.mean(one[i : i + 2])
-    return np.maximum.accumulate(one)
+            ordinates[i : i + 2] = np.mean(ordinates[i : i + 2])
+    return np.maximum.accumulate(ordinates)
 
 
-def _look(region: int) -> tuple[str, str]:
-    """Return colour and hatch of a region: -5 unfinished, -4 overturns after a rest, -3 to -1 stays, else impacts."""
+def _choose_style(region: int) -> tuple[str, str]:
+    """Choose colour and hatch of a region: -5 unfinished, -4 overturns after a rest, -3 to -1 stays, else impacts."""
     if region < 0:
-        return (_UNFINISHED, _OVERTURNS_AFTER_REST, *_STAYS)[region + 5]
-    return _OVERTURNS[min(region, len(_OVERTURNS) - 1)]
+        return (_UNFINISHED_STYLE, _AFTER_REST_STYLE, *_STAY_STYLES)[region + 5]
+    return _OVERTURN_STYLES[min(region, len(_OVERTURN_STYLES) - 1)]
 
 
-def _patch(look: tuple[str, str], label: str) -> Patch:
+def _create_patch(style: tuple[str, str], label: str) -> Patch:
     from matplotlib.patches import Patch
 
-    return Patch(facecolor=look[0], hatch=look[1], edgecolor=INK, linewidth=0.5, label=label)
+    return Patch(facecolor=style[0], hatch=style[1], edgecolor=INK, linewidth=0.5, label=label)
 
 
 #: Width and height of one panel, inches, and the number of panels in a row.
-_PANEL: Final = (3.5, 2.9)
-_BESIDE: Final = 2
+_PANEL_SIZE: Final = (3.5, 2.9)
+_PANELS_PER_ROW: Final = 2
 
 
-def blocks_figure(
+def draw_blocks(
     p: Floats,
     alpha: Floats,
     *,
     panels: Mapping[str, Floats],
     value_label: str,
     missing_label: str,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw a number for each block as the colour of a marker, in one or several panels with one colour scale."""
-    if place.get("ax") is not None and len(panels) > 1:
+    if options.get("ax") is not None and len(panels) > 1:
         raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
-    names, columns = [*panels], min(len(panels), _BESIDE)
+    names, columns = [*panels], min(len(panels), _PANELS_PER_ROW)
     rows = [[*names[k : k + columns], *"." * (columns - len(names[k:]))] for k in range(0, len(names), columns)]
-    every = np.concatenate([*panels.values()])
-    finite = every[np.isfinite(every)] if np.isfinite(every).any() else np.array([0.0, 1.0])
+    all_values = np.concatenate([*panels.values()])
+    finite = all_values[np.isfinite(all_values)] if np.isfinite(all_values).any() else np.array([0.0, 1.0])
     shades: dict[str, Any] = {"cmap": "cividis_r", "vmin": finite.min(), "vmax": finite.max()}
     size: dict[str, Any] = {"s": float(np.clip(9000.0 / len(p), 6.0, 60.0))}
-    with page_for((columns * _PANEL[0] + 0.6, len(rows) * _PANEL[1] + 0.4), **place) as page:
-        for each, (name, values) in zip(page.panels(rows), panels.items(), strict=True):
-            there, degrees = np.isfinite(values), np.degrees(alpha)
-            marks = each.scatter(p[there], degrees[there], c=values[there], marker="s", linewidth=0.0, **size, **shades)
-            if not there.all():
-                look: dict[str, Any] = {"color": ABOVE, "linewidth": 0.7, "label": missing_label}
-                each.scatter(p[~there], degrees[~there], marker="x", **size, **look)
-            add_labels(each, "p (rad/s)", "slenderness (degrees)")
+    with open_page((columns * _PANEL_SIZE[0] + 0.6, len(rows) * _PANEL_SIZE[1] + 0.4), **options) as page:
+        for axes, (name, values) in zip(page.create_panels(rows), panels.items(), strict=True):
+            is_finite, degrees = np.isfinite(values), np.degrees(alpha)
+            markers = axes.scatter(
+                p[is_finite], degrees[is_finite], c=values[is_finite], marker="s", linewidth=0.0, **size, **shades
+            )
+            if not is_finite.all():
+                style: dict[str, Any] = {"color": ABOVE, "linewidth": 0.7, "label": missing_label}
+                axes.scatter(p[~is_finite], degrees[~is_finite], marker="x", **size, **style)
+            add_labels(axes, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
-                each.set_title(escape_dollars(name), color=INK)
-        page.figure.colorbar(marks, ax=page.drawn, label=value_label, shrink=0.9)
+                axes.set_title(escape_dollars(name), color=INK)
+        page.figure.colorbar(markers, ax=page.panel_axes, label=value_label, shrink=0.9)
     return page.figure
 
 
@@ -229,10 +243,10 @@ _SHADES: Final = {
 }
 
 #: Markers of orbit points, one for each orbit.
-_MARKS: Final = ("o", "^", "s", "D", "v", "P")
+_MARKERS: Final = ("o", "^", "s", "D", "v", "P")
 
 
-def basins_figure(
+def draw_basins(
     *,
     x: Floats,
     y: Floats,
@@ -242,28 +256,32 @@ def basins_figure(
     orbits: Floats,
     x_label: str,
     y_label: str,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw the attractor of each state of a grid: integers of shape (len(y), len(x))."""
-    seen = [kinds[:k].count(kind) for k, kind in enumerate(kinds)]
-    shades = [_SHADES[kind][min(k, len(_SHADES[kind]) - 1)] for k, kind in zip(seen, kinds, strict=True)]
-    with page_for((5.4, 4.6), **place) as page:
-        (axes,) = page.panels()
+    ranks = [kinds[:k].count(kind) for k, kind in enumerate(kinds)]
+    shades = [_SHADES[kind][min(k, len(_SHADES[kind]) - 1)] for k, kind in zip(ranks, kinds, strict=True)]
+    with open_page((5.4, 4.6), **options) as page:
+        (axes,) = page.create_panels()
         _colour_cells(axes, x, y, outcome, shades)
         handles: list[Artist] = []
-        for name, kind, shade, k, points in zip(names, kinds, shades, seen, orbits, strict=True):
-            handles.append(_patch((shade, ""), name))
+        for name, kind, shade, k, points in zip(names, kinds, shades, ranks, orbits, strict=True):
+            handles.append(_create_patch((shade, ""), name))
             inside = points[(points >= [x[0], y[0]]).all(axis=1) & (points <= [x[-1], y[-1]]).all(axis=1)]
             if kind == "orbit" and len(inside):
-                look: dict[str, Any] = {"marker": _MARKS[k % len(_MARKS)], "markersize": 4.5, "markeredgewidth": 0.8}
-                look |= {"linestyle": "", "color": "white", "markeredgecolor": INK, "label": f"{name}: its points"}
-                handles += axes.plot(*inside.T, **look)
+                style: dict[str, Any] = {
+                    "marker": _MARKERS[k % len(_MARKERS)],
+                    "markersize": 4.5,
+                    "markeredgewidth": 0.8,
+                }
+                style |= {"linestyle": "", "color": "white", "markeredgecolor": INK, "label": f"{name}: its points"}
+                handles += axes.plot(*inside.T, **style)
         add_labels(axes, x_label, y_label)
         page.handles = handles
     return page.figure
 
 
-def rose_figure(
+def draw_rose(
     *,
     azimuth: Floats,
     acceleration: Floats,
@@ -271,56 +289,58 @@ def rose_figure(
     p: Floats,
     support: Floats,
     weakest: tuple[float, float],
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw the uplift acceleration, g, of a body in each direction around its support, and its slenderness and p."""
     from matplotlib.patches import Polygon
 
-    with page_for((6.8, 4.0), **place) as page:
-        main, *beside = page.panels("AB;AC", width_ratios=(1.6, 1.0))
-        for axes, values, label in zip(beside, (slenderness, p), ("slenderness (deg)", "p (rad/s)"), strict=False):
-            axes.plot(*_closed(azimuth, values), color=INK, linewidth=1.2)
+    with open_page((6.8, 4.0), **options) as page:
+        main, *side_panels = page.create_panels("AB;AC", width_ratios=(1.6, 1.0))
+        for axes, values, label in zip(side_panels, (slenderness, p), ("slenderness (deg)", "p (rad/s)"), strict=False):
+            axes.plot(*_close_circle(azimuth, values), color=INK, linewidth=1.2)
             axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))
             axes.grid(True)
-            add_labels(axes, "azimuth (deg)" if axes is beside[-1] else "", label)
-        _look_down(main, float(max(acceleration.max(), np.abs(support).max())))
+            add_labels(axes, "azimuth (deg)" if axes is side_panels[-1] else "", label)
+        _set_plan_view(main, float(max(acceleration.max(), np.abs(support).max())))
         label = "support over height of centre of mass"
         main.add_patch(Polygon(support, facecolor=REST, edgecolor=GROUND, linewidth=1.0, label=label))
-        main.plot(*_around(azimuth, acceleration), color=INK, linewidth=1.4, label="ground acceleration that lifts it")
+        main.plot(
+            *_find_points(azimuth, acceleration), color=INK, linewidth=1.4, label="ground acceleration that lifts it"
+        )
         label = f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg"
-        end = _around(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
+        end = _find_points(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
         main.plot(*np.insert(end, 0, 0.0, axis=1), color=ABOVE, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
         add_labels(main, "towards west and east (g)", "towards south and north (g)")
     return page.figure
 
 
-def shares_figure(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **place: Unpack[Place]) -> Figure:
+def draw_shares(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **options: Unpack[FigureOptions]) -> Figure:
     """Draw fractions, shape (curves, azimuths), against the azimuth; north is up, and the full circle is 1."""
-    with page_for((4.8, 4.8), **place) as page:
-        (axes,) = page.panels()
-        _look_down(axes, 1.0)
-        for share, label, style in zip(shares, labels, styles_of(len(labels)), strict=True):
-            look = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": escape_dollars(label), **style}
-            axes.plot(*_around(azimuth, share), **look)
+    with open_page((4.8, 4.8), **options) as page:
+        (axes,) = page.create_panels()
+        _set_plan_view(axes, 1.0)
+        for share, label, style in zip(shares, labels, choose_styles(len(labels)), strict=True):
+            line_style = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": escape_dollars(label), **style}
+            axes.plot(*_find_points(azimuth, share), **line_style)
         add_labels(axes, "share towards west and east", "share towards south and north")
     return page.figure
 
 
-def _closed(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return values over the azimuth, with the first repeated after a full turn."""
+def _close_circle(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Repeat the first value over the azimuth after a full turn."""
     return np.append(azimuth, azimuth[0] + 360.0), np.append(values, values[0])
 
 
-def _around(azimuth: Floats, values: Floats) -> Floats:
-    """Return points at distances and azimuths as a closed line, shape (2, n)."""
-    turned, distances = _closed(azimuth, values)
-    angle = np.deg2rad(turned)
+def _find_points(azimuth: Floats, values: Floats) -> Floats:
+    """Convert azimuths and distances to the points of a closed line, shape (2, n)."""
+    closed_azimuth, distances = _close_circle(azimuth, values)
+    angle = np.deg2rad(closed_azimuth)
     return np.asarray(distances * np.array([np.sin(angle), np.cos(angle)]))
 
 
-def _look_down(axes: Axes, most: float) -> None:
+def _set_plan_view(axes: Axes, limit: float) -> None:
     """Set equal limits, and label both axes with the distance from the centre."""
-    axes.set(aspect="equal", xlim=(-1.1 * most, 1.1 * most), ylim=(-1.1 * most, 1.1 * most))
+    axes.set(aspect="equal", xlim=(-1.1 * limit, 1.1 * limit), ylim=(-1.1 * limit, 1.1 * limit))
     axes.locator_params(nbins=5)
     axes.grid(True)
     axes.plot(0.0, 0.0, "+", color=INK)

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.plot.canvas import ABOVE, GROUND, INK, Place, add_labels, add_ticks, page_for
+from rocking.plot.canvas import ABOVE, GROUND, INK, FigureOptions, add_labels, add_ticks, open_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Line styles of stable and unstable orbits.
-_STABLE: Final[dict[str, Any]] = {"color": INK, "linewidth": 1.4, "linestyle": "-"}
-_IMPACT: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.8, "linestyle": (0, (1, 1.5))}
-_UNSTABLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
+_STABLE_STYLE: Final[dict[str, Any]] = {"color": INK, "linewidth": 1.4, "linestyle": "-"}
+_IMPACT_STYLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.8, "linestyle": (0, (1, 1.5))}
+_UNSTABLE_STYLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 #: Markers of bifurcations by name, and of other bifurcations.
-_MARKS: Final = {
+_MARKERS: Final = {
     "fold": "o",
     "flip": "D",
     "symmetry breaking": "s",
@@ -30,10 +30,10 @@ _MARKS: Final = {
     "start of rest": "<",
     "uplift": ">",
 }
-_OTHER: Final = "P"
+_OTHER_MARKER: Final = "P"
 
 
-def orbit_figure(
+def draw_orbit(
     *,
     time: Floats,
     coordinate: Floats,
@@ -41,22 +41,22 @@ def orbit_figure(
     impact_times: Floats,
     states: Floats,
     labels: tuple[str, str],
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw a periodic orbit: velocity against coordinate with its impacts, and coordinate against time."""
-    with page_for((7.0, 3.2), **place) as page:
-        plane, *histories = page.panels("AB")
+    with open_page((7.0, 3.2), **options) as page:
+        plane, *histories = page.create_panels("AB")
         # Arcs end at impacts, so that no line is drawn across a jump of the velocity.
-        at = np.searchsorted(time, impact_times, side="right") - 1  # two times may be equal after division
-        x, v = (np.insert(each, at, np.nan) for each in (coordinate, velocity))
-        plane.plot(x, v, label="orbit", **_STABLE)
-        before = np.maximum(at - 1, 0)
-        for k, jump in enumerate(np.column_stack([before, np.minimum(at, len(time) - 1)])):
-            plane.plot(coordinate[jump], velocity[jump], label="" if k else "impact", **_IMPACT)
+        indices = np.searchsorted(time, impact_times, side="right") - 1  # two times may be equal after division
+        x, v = (np.insert(values, indices, np.nan) for values in (coordinate, velocity))
+        plane.plot(x, v, label="orbit", **_STABLE_STYLE)
+        previous = np.maximum(indices - 1, 0)
+        for k, jump in enumerate(np.column_stack([previous, np.minimum(indices, len(time) - 1)])):
+            plane.plot(coordinate[jump], velocity[jump], label="" if k else "impact", **_IMPACT_STYLE)
         plane.plot(*states.T, "o", color=INK, markersize=5.0, mfc="white", label="start of a period", zorder=4)
         add_labels(plane, *labels)
         for history in histories:
-            history.plot(time, coordinate, **_STABLE)
+            history.plot(time, coordinate, **_STABLE_STYLE)
             heights = np.interp(impact_times, time, coordinate)
             history.plot(impact_times, heights, "|", color=ABOVE, markersize=8.0, markeredgewidth=1.0)
             history.set_xlim(time[0], time[-1])
@@ -64,25 +64,25 @@ def orbit_figure(
     return page.figure
 
 
-def branch_figure(
+def draw_branches(
     *,
     values: Floats,
     heights: Floats,
     stable: Flags,
     marks: Sequence[tuple[str, float, float]],
     labels: tuple[str, str],
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw branches of periodic orbits: stable ones solid, unstable ones dashed, bifurcations as markers."""
-    with page_for((5.2, 3.6), **place) as page:
-        (axes,) = page.panels()
-        for chosen, name, style in ((stable, "stable", _STABLE), (~stable, "unstable", _UNSTABLE)):
+    with open_page((5.2, 3.6), **options) as page:
+        (axes,) = page.create_panels()
+        for is_branch, name, style in ((stable, "stable", _STABLE_STYLE), (~stable, "unstable", _UNSTABLE_STYLE)):
             # Dashes extend to the points where solid lines begin.
-            joined = chosen | np.append(chosen[1:], False) | np.insert(chosen[:-1], 0, False)
-            shown = chosen if name == "stable" else joined
-            if np.any(chosen & ~np.isnan(values)):
-                axes.plot(np.where(shown, values, np.nan), np.where(shown, heights, np.nan), label=name, **style)
-        look: dict[str, Any] = {
+            is_joined = is_branch | np.append(is_branch[1:], False) | np.insert(is_branch[:-1], 0, False)
+            mask = is_branch if name == "stable" else is_joined
+            if np.any(is_branch & ~np.isnan(values)):
+                axes.plot(np.where(mask, values, np.nan), np.where(mask, heights, np.nan), label=name, **style)
+        markers: dict[str, Any] = {
             "color": INK,
             "markersize": 4.5,
             "markerfacecolor": GROUND,
@@ -90,8 +90,8 @@ def branch_figure(
             "zorder": 4,
         }
         for kind in dict.fromkeys(name for name, _, _ in marks):
-            at = np.array([(value, height) for name, value, height in marks if name == kind])
-            axes.plot(at[:, 0], at[:, 1], marker=_MARKS.get(kind, _OTHER), label=kind, **look)
+            points = np.array([(value, height) for name, value, height in marks if name == kind])
+            axes.plot(points[:, 0], points[:, 1], marker=_MARKERS.get(kind, _OTHER_MARKER), label=kind, **markers)
         axes.margins(x=0.04, y=0.06)
         add_labels(axes, *labels)
     return page.figure
@@ -99,13 +99,13 @@ def branch_figure(
 
 #: Colour and marker area (points squared) of each sweep direction. The first of two is larger, so that both are
 #: visible.
-_LOOKS: Final = ((INK, 4.0), (ABOVE, 0.9))
-_ALONE: Final = ((INK, 0.9),)
+_SWEEP_STYLES: Final = ((INK, 4.0), (ABOVE, 0.9))
+_SINGLE_SWEEP_STYLE: Final = ((INK, 0.9),)
 
-_WORDS: Final = {"up": "values going up", "down": "values going down", "afresh": "each value afresh"}
+_SWEEP_LABELS: Final = {"up": "values going up", "down": "values going down", "afresh": "each value afresh"}
 
 
-def bifurcation_figure(
+def draw_bifurcation(
     *,
     value: Floats,
     states: Mapping[str, Floats],
@@ -113,45 +113,45 @@ def bifurcation_figure(
     not_followed: Flags | None = None,
     x_label: str,
     y_label: str,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw states, shape (len(value), n), of each direction against a parameter; NaN if there are fewer."""
-    with page_for((5.6, 3.8), **place) as page:
-        (axes,) = page.panels()
-        looks = _ALONE if len(states) == 1 else _LOOKS
-        for (way, kept), (colour, area) in zip(states.items(), looks, strict=True):
-            look: dict[str, Any] = {"linestyle": "", "marker": "o", "color": colour, "markeredgewidth": 0.0}
-            axes.plot(value, kept, markersize=area**0.5, rasterized=True, **look)
-            axes.plot([], [], markersize=area**0.5 + 1.0, label=_WORDS[way], **look)
-        for gone, marker, label in ((overturned, "|", "overturned"), (not_followed, "x", "not followed")):
-            if gone is not None and gone.any():
-                add_ticks(axes, value[gone], 0.015, marker, color=GROUND, label=label)
+    with open_page((5.6, 3.8), **options) as page:
+        (axes,) = page.create_panels()
+        styles = _SINGLE_SWEEP_STYLE if len(states) == 1 else _SWEEP_STYLES
+        for (direction, branch_states), (colour, area) in zip(states.items(), styles, strict=True):
+            style: dict[str, Any] = {"linestyle": "", "marker": "o", "color": colour, "markeredgewidth": 0.0}
+            axes.plot(value, branch_states, markersize=area**0.5, rasterized=True, **style)
+            axes.plot([], [], markersize=area**0.5 + 1.0, label=_SWEEP_LABELS[direction], **style)
+        for is_marked, marker, label in ((overturned, "|", "overturned"), (not_followed, "x", "not followed")):
+            if is_marked is not None and is_marked.any():
+                add_ticks(axes, value[is_marked], 0.015, marker, color=GROUND, label=label)
         axes.set_xlim(value[0], value[-1] if value.size > 1 else None)
         add_labels(axes, x_label, y_label)
     return page.figure
 
 
-_DOTS: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "markersize": 3.2, "markeredgewidth": 0.6}
+_DOT: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "markersize": 3.2, "markeredgewidth": 0.6}
 
 #: Margin beside the first and the last impact, relative to their number.
-_MARGIN: Final = 0.03
+_AXIS_MARGIN: Final = 0.03
 
 
-def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -> Figure:
+def draw_intervals(*, intervals: Floats, eta: float, **options: Unpack[FigureOptions]) -> Figure:
     """Draw the dimensionless intervals between the impacts of a chattering sequence, and ratios of every second one."""
     from matplotlib.ticker import MaxNLocator
 
-    with page_for((7.0, 3.2), **place) as page:
+    with open_page((7.0, 3.2), **options) as page:
         # Panels are side by side if the figure is wider than high.
-        panels = page.panels("AB" if page.figure.get_figwidth() > page.figure.get_figheight() else "A;B")
+        panels = page.create_panels("AB" if page.figure.get_figwidth() > page.figure.get_figheight() else "A;B")
         number = np.arange(1, intervals.size + 1)
-        margin = max(0.5, _MARGIN * intervals.size)
-        _draw(panels[0], number, intervals)
+        margin = max(0.5, _AXIS_MARGIN * intervals.size)
+        _draw_sides(panels[0], number, intervals)
         add_labels(panels[0], "impact", "interval before the impact, p t")
         if intervals.size:
             panels[0].set_yscale("log")
         for panel in panels[1:]:
-            _draw(panel, number[2:], intervals[2:] / intervals[:-2])
+            _draw_sides(panel, number[2:], intervals[2:] / intervals[:-2])
             panel.axhline(eta**2, color=ABOVE, linewidth=1.2, linestyle=(0, (5, 1.5)), label=f"η² = {eta**2:.5g}")
             add_labels(panel, "impact", "interval over that two impacts before")
         for panel in panels:
@@ -162,10 +162,10 @@ def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -
     return page.figure
 
 
-def _draw(axes: Axes, number: Integers, values: Floats) -> None:
+def _draw_sides(axes: Axes, number: Integers, values: Floats) -> None:
     """Draw values against the impact number, with filled markers on the first side and open ones on the second."""
     axes.plot(number, values, color=INK, linewidth=0.4, alpha=0.6, label="_in turn")
-    for first, face, label in ((1, INK, "impacts 1, 3, ..."), (0, "white", "impacts 2, 4, ...")):
-        chosen = number % 2 == first
-        if chosen.any():
-            axes.plot(number[chosen], values[chosen], markerfacecolor=face, label=label, **_DOTS)
+    for remainder, face, label in ((1, INK, "impacts 1, 3, ..."), (0, "white", "impacts 2, 4, ...")):
+        is_selected = number % 2 == remainder
+        if is_selected.any():
+            axes.plot(number[is_selected], values[is_selected], markerfacecolor=face, label=label, **_DOT)

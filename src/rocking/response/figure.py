@@ -15,7 +15,18 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
 from rocking.engine.problem import thresholds_of
 from rocking.errors import InvalidOption
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Page, Place, add_labels, add_ticks, page_for, write
+from rocking.plot.canvas import (
+    ABOVE,
+    GROUND,
+    INK,
+    REST,
+    FigureOptions,
+    Page,
+    add_labels,
+    add_text,
+    add_ticks,
+    open_page,
+)
 from rocking.plot.curves import draw_ground
 from rocking.response.simulated import Simulated
 from rocking.response.summary import time_text
@@ -87,7 +98,7 @@ def histories(
     window: Sequence[float] | None,
     *,
     longest_sequence: bool,
-    **place: Unpack[Place],
+    **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw the rotation above the ground motion in a window.
 
@@ -109,9 +120,9 @@ def histories(
 
     rotation = response.states(time)[:, 0]
     drawn = rotation * scale(rotation)
-    sequence = _longest_sequence(response, *shown) if longest_sequence and place.get("ax") is None else None
+    sequence = _longest_sequence(response, *shown) if longest_sequence and options.get("ax") is None else None
     traces = _ground_traces(response, *shown)
-    with page_for((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **place) as page:
+    with open_page((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **options) as page:
         main, *grounds = _panels(page, 1 + len(traces), zoomed=sequence is not None)
         _shade_rest(main, np.clip(response.rest_intervals, *shown))
         _draw_rotation(main, time, drawn, np.array([-minus, plus]) * scales[::-1], coordinate.limit)
@@ -134,7 +145,7 @@ def histories(
             axes.tick_params(labelbottom=axes is panels[-1])
             add_labels(axes, _time_label(*shown, response.duration) if axes is panels[-1] else "", name)
         if sequence is not None:
-            _draw_sequence(main, page.drawn[-1], response, sequence)
+            _draw_sequence(main, page.panel_axes[-1], response, sequence)
     return page.figure
 
 
@@ -167,7 +178,7 @@ def _longest_sequence(response: Simulated, start: float, end: float) -> np.void 
 
 def _panels(page: Page, histories: int, *, zoomed: bool) -> list[Axes]:
     """Return the panels of rotation and motion, above the panel of the chattering sequence."""
-    panels = page.panels(
+    panels = page.create_panels(
         ";".join("RGV"[:histories] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:histories]] + [1.0] * zoomed
     )
     for axes in panels[1:histories]:
@@ -217,7 +228,7 @@ def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
     for name, place, off, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
         words = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
         look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
-        write(axes, words, (0.0, 0.0), (3, off), **look)
+        add_text(axes, words, (0.0, 0.0), (3, off), **look)
 
 
 def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
@@ -236,7 +247,7 @@ def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration
         if pair[0] != pair[1]:
             words, place = ("lifts to side +", "bottom") if sign < 0.0 else ("lifts to side −", "top")
             look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
-            write(axes, words, (0.0, threshold[0]), (3, -2.0 * sign), **look)
+            add_text(axes, words, (0.0, threshold[0]), (3, -2.0 * sign), **look)
 
 
 def _time_label(start: float, end: float, duration: float) -> str:
@@ -252,7 +263,7 @@ def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.voi
     first, last, at = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
     main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
     look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
-    write(main, "A", (0.5 * (first + last), 0.955), (0, 2), **look)
+    add_text(main, "A", (0.5 * (first + last), 0.955), (0, 2), **look)
     rest, start, interval = 0.5 * (sequence["lower"] + sequence["upper"]), times[:-1], np.diff(times)
     # Logarithms are undefined for impacts closer than floating-point spacing.
     shown = (interval > 0.0) & (rest > start)
@@ -346,13 +357,13 @@ def marked(response: Simulated, start: float, end: float) -> dict[str, Floats]:
     return {kind: np.asarray(events["time"][inside & (events["kind"] == kind)], float) for kind in ("uplift", "rest")}
 
 
-def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
+def phase_plane(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw normalised velocity against normalised rotation in a window, in units of a `Course`."""
     span = shown_span(response, window)
     course = course_of(response, *span)
     limit = response.block.coordinate.limit if response._energy.has_balances else "rad"
-    with page_for((4.6, 4.2), **place) as page:
-        (axes,) = page.panels()
+    with open_page((4.6, 4.2), **options) as page:
+        (axes,) = page.create_panels()
         axes.axhline(0.0, color=INK, linewidth=0.4)
         axes.axvline(0.0, color=INK, linewidth=0.4)
         axes.plot(*boundary_of(response), label="as much energy as at the balance", **_BOUNDARY)
@@ -371,12 +382,12 @@ def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Un
     return page.figure
 
 
-def energies(response: Simulated, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
+def energies(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw kinetic, potential and total energy, divided by the overturning energy, in a window."""
     course = course_of(response, *shown_span(response, window))
     time, total = course.time, course.kinetic + course.potential
-    with page_for((7.0, 3.0), **place) as page:
-        (axes,) = page.panels()
+    with open_page((7.0, 3.0), **options) as page:
+        (axes,) = page.create_panels()
         _shade_rest(axes, np.clip(response.rest_intervals, time[0], time[-1]))
         top = float(np.max(total, initial=0.0)) or 1.0
         axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")

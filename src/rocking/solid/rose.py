@@ -97,10 +97,10 @@ class Rose(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.maps import rose_figure
+        from rocking.plot.maps import draw_rose
 
         data = self.data
-        return rose_figure(
+        return draw_rose(
             azimuth=data.azimuth.values,
             acceleration=data.acceleration.values,
             slenderness=np.rad2deg(data.alpha.values),

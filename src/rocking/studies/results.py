@@ -14,23 +14,23 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.analysis.curve import fitted_curve
+from rocking.analysis.curve import fit_curve
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.levels import (
-    checked_limit,
-    checked_limit_states,
-    clusters_of,
-    motions_in_words,
-    of_polarities,
-    passed,
-    pooled,
-    ratios_of,
-    single_block,
-    units_of,
-    values_of,
-    weights_of,
+    check_limit,
+    check_limit_states,
+    compute_intensities,
+    compute_ratios,
+    compute_units,
+    describe_polarities,
+    describe_pool,
+    describe_sample,
+    exceeds_limit,
+    find_single_block,
+    normalise_positive_weights,
+    number_clusters,
 )
-from rocking.analysis.spectrum import fractiles_of, overturned_share
+from rocking.analysis.spectrum import compute_fractiles, compute_overturned_share
 from rocking.block.body import Bodies
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, select_evenly, split_range
@@ -244,7 +244,7 @@ def _peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
                 "without a duration"
             )
         alpha = slenderness_of(store.product.bodies.select(blocks))
-        yield blocks, ratios_of(peak, overturned != 0.0, unfinished != 0.0, alpha)
+        yield blocks, compute_ratios(peak, overturned != 0.0, unfinished != 0.0, alpha)
 
 
 def _repeated(bodies: Bodies, polarities: int) -> Flags:
@@ -291,7 +291,7 @@ class BlockTable(DatasetResult):
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the first variable against p and slenderness, in up to four panels, or one fractile."""
-        from rocking.plot.maps import blocks_figure
+        from rocking.plot.maps import draw_blocks
 
         drawn, parameters = next(iter(self.data.data_vars.values())), self.block_parameters
         if "fractile" in drawn.dims:
@@ -309,7 +309,7 @@ class BlockTable(DatasetResult):
             np.mean([parameters[one] for one in (name, f"{name}_plus", f"{name}_minus") if one in parameters], axis=0)
             for name in ("p", "alpha")
         )
-        return blocks_figure(
+        return draw_blocks(
             p,
             alpha,
             panels={names[k]: shown[k] for k in select_evenly(len(names), 4)},
@@ -344,9 +344,9 @@ def checked_fractiles(fractiles: Sequence[float]) -> Floats:
 def _checked_states(limit_states: Mapping[str, float] | None, confidence: float) -> Mapping[str, float]:
     """Return limits by limit state. Check the arguments of curves before outcomes are read."""
     checks.fraction(confidence, "confidence", InvalidOption)
-    limits = checked_limit_states(limit_states)
+    limits = check_limit_states(limit_states)
     for name, limit in limits.items():
-        checked_limit(limit, name)
+        check_limit(limit, name)
     return limits
 
 
@@ -363,7 +363,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
             repeated = _repeated(product.bodies.select(blocks), ratios.shape[2])
             missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
             own = np.where(repeated, np.nan, ratios).swapaxes(1, 2).reshape(-1, scales.count, ratios.shape[3])
-            values[:, :, blocks], overturned[:, blocks] = fractiles_of(own, shares), overturned_share(own)
+            values[:, :, blocks], overturned[:, blocks] = compute_fractiles(own, shares), compute_overturned_share(own)
             bar.advance(blocks.stop - blocks.start)
     words = "peak rotation over the slenderness, infinite where that share overturns"
     left_out = missing_text(missing)
@@ -393,8 +393,8 @@ def pooled_fragility(
     """Fit one curve to the outcomes of all blocks, with optional weights."""
     limits = _checked_states(limit_states, confidence)
     product, bodies = store.product, store.product.bodies
-    units, which = np.unique(units_of(bodies, measure, product.model), return_inverse=True)
-    shares = weights_of(weights, len(bodies))
+    units, which = np.unique(compute_units(bodies, measure, product.model), return_inverse=True)
+    shares = normalise_positive_weights(weights, len(bodies))
     motions, scales, _, _ = product.shape
     trials, missing = np.zeros((motions, scales, len(units))), 0
     counts = {name: np.zeros_like(trials) for name in limits}
@@ -404,23 +404,23 @@ def pooled_fragility(
         trials += known.sum(axis=2, dtype=float) @ belongs
         missing += int(np.count_nonzero(~known))
         for name, limit in limits.items():
-            counts[name] += passed(ratios, limit, name).sum(axis=2) @ belongs
+            counts[name] += exceeds_limit(ratios, limit, name).sum(axis=2) @ belongs
     found = trials > 0.0
-    together = clusters_of(product.motions, clusters)
+    together = number_clusters(product.motions, clusters)
     x, groups = (
         _intensities(product, measure)[:, :, None] / units,
         np.broadcast_to(together[:, None, None], found.shape),
     )
     curves = [
-        fitted_curve(name, (x[found], count[found], trials[found]), groups[found], confidence, measure, limits[name])
+        fit_curve(name, (x[found], count[found], trials[found]), groups[found], confidence, measure, limits[name])
         for name, count in counts.items()
     ]
-    text = f"{pooled(bodies, weights)}, {motions_in_words(together, clusters)}, {format_count(scales, 'scale')}"
+    text = f"{describe_pool(bodies, weights)}, {describe_sample(together, clusters)}, {format_count(scales, 'scale')}"
     return Fragility(
         tuple(curves),
         measure,
-        f"{text}, {product.model} model{of_polarities(product.polarity, is_symmetric=bodies.is_symmetric)}",
-        single_block(bodies),
+        f"{text}, {product.model} model{describe_polarities(product.polarity, is_symmetric=bodies.is_symmetric)}",
+        find_single_block(bodies),
         product.model,
         outcomes=None,
         one_way=product.polarity != "both" and not bodies.is_symmetric,
@@ -458,8 +458,8 @@ def block_fragilities(
     product, bodies, scales = store.product, store.product.bodies, store.product.scales.count
     kept = {name: np.full((len(limits), len(bodies)), np.nan) for name in _KEPT}
     faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
-    intensities, units = _intensities(product, measure).ravel(), units_of(bodies, measure, product.model)
-    together = np.repeat(clusters_of(product.motions, clusters), scales)
+    intensities, units = _intensities(product, measure).ravel(), compute_units(bodies, measure, product.model)
+    together = np.repeat(number_clusters(product.motions, clusters), scales)
     fit = partial(fit_fragility, measure=measure, confidence=confidence)
     with Progress("fitting", len(bodies) * len(limits)) as bar:
         for blocks, ratios in _peak_ratios(store):
@@ -468,7 +468,7 @@ def block_fragilities(
             own = np.where(repeated, np.nan, ratios)
             all_trials = np.count_nonzero(~np.isnan(own), axis=2).reshape(-1, own.shape[3])
             for i, (name, limit) in enumerate(limits.items()):
-                all_exceeded = passed(own, limit, name).sum(axis=2).reshape(-1, own.shape[3])
+                all_exceeded = exceeds_limit(own, limit, name).sum(axis=2).reshape(-1, own.shape[3])
                 for j, trials, exceeded in zip(range(len(bodies))[blocks], all_trials.T, all_exceeded.T, strict=True):
                     some = trials > 0
                     data = intensities[some] / units[j], {name: exceeded[some]}
@@ -504,7 +504,7 @@ def block_fragilities(
 def _intensities(product: Product, measure: Measure) -> Floats:
     """Return the intensity of every motion at every scale, shape (motions, scales)."""
     scales = product.scales
-    values = values_of(product.motions, measure)
+    values = compute_intensities(product.motions, measure)
     if scales.measure == measure.alone:
         return np.tile(scales.values, (len(values), 1))  # the input values, bit for bit
     factors = np.array([scales.factors(motion) for motion in product.motions])
