@@ -158,8 +158,9 @@ class FragilityCurve:
     def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
         """Compute the largest annual rates of exceeding an intensity that are consistent with survival.
 
-        The rates are -ln(1 - confidence)/(years P(intensity)), with a one-sided confidence as in `Fragility.survival` and the shape of the intensities (SI units, 0 or more),
-        and infinite at 0. A precarious rock that has stood for so long contradicts hazard curves above them.
+        The rates are -ln(1 - confidence)/(years P(intensity)), with the shape of the intensities (SI units, 0 or more),
+        and infinite at 0. The confidence is one-sided, as in `Fragility.survival`. A precarious rock that has stood for
+        so long contradicts hazard curves above them.
         """
         duration = checks.positive(years, "years", InvalidOption)
         fraction = checks.fraction(confidence, "confidence", InvalidOption)
