@@ -26,10 +26,10 @@ def digest(folder: str | Path) -> str:
 
 def store_of(study: rocking.Study) -> Store:
     """Outcomes of a study as they lie in its folder."""
-    return Store(study.place)
+    return Store(study.folder)
 
 
 def after_each_unit(monkeypatch: pytest.MonkeyPatch, action: Callable[[], object]) -> None:
     """Do something each time that a unit is stored."""
-    put = folders.put
-    monkeypatch.setattr(RUNS, "put", lambda file, data: (put(file, data), action()))
+    put = folders.write_atomically
+    monkeypatch.setattr(RUNS, "write_atomically", lambda file, data: (put(file, data), action()))

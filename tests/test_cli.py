@@ -194,7 +194,7 @@ def test_an_error_in_place_of_an_interrupt_is_one(run, monkeypatch, interrupted)
                 raise RuntimeError("release unlocked lock")  # noqa: B904 - as Python itself does
         raise ValueError("of its own")
 
-    monkeypatch.setattr("rocking.cli.command_of", called)
+    monkeypatch.setattr("rocking.cli.find_command", called)
     if interrupted:
         assert run("records") == (130, "", f"{INTERRUPTED}\n")
     else:

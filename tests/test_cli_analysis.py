@@ -331,6 +331,6 @@ def test_standing_is_about_overturning_in_whatever_order_the_limits_come(run, mo
     for limits in ("overturning,half=0.5", "half=0.5,overturning"):
         code, out, _ = run(*common, "--limit-states", limits)
         assert code == 0 and json.loads(out)["survival"]["limit_state"] == "overturning"
-    monkeypatch.setattr("rocking.cli.fragility.run", None)  # it is refused before anything is simulated
+    monkeypatch.setattr("rocking.cli.fragility.fit_simulated", None)  # it is refused before anything is simulated
     code, _, err = run(*common, "--limit-states", "half=0.5,most=0.8")
     assert code == 2 and "--standing is about overturning, or about one limit, not half and most" in err

@@ -96,7 +96,7 @@ def test_what_has_no_critical_scales_is_refused(complete, tmp_path):
 @pytest.mark.parametrize(("verdict", "column"), [("overturning", "overturns"), ("complete_chattering", "completes")])
 def test_the_command_writes_a_row_for_each_change(complete, run, tmp_path, verdict, column):
     pandas = pytest.importorskip("pandas")
-    assert run("study", "export", complete.place, tmp_path / "all.csv", "--critical", verdict)[0] == 0
+    assert run("study", "export", complete.folder, tmp_path / "all.csv", "--critical", verdict)[0] == 0
     table, found = pandas.read_csv(tmp_path / "all.csv"), complete.critical_scales(verdict)
     assert [*table.columns][-4:] == ["pga_low_m_s2", "pga_high_m_s2", column, "known"]
     np.testing.assert_array_equal(table.pga_high_m_s2, found.high)

@@ -227,7 +227,7 @@ def test_wrong_options_of_a_report_are_refused(study, run, tmp_path):
     with pytest.raises(rocking.errors.InvalidOption, match="fractiles must hold a share of the motions or more"):
         study.spectrum([])
     for options in ("--limit-states foo", "--measure sa", "--fractiles 2", "--confidence 2", "--limit-states half=-1"):
-        code, _, err = run("study", "report", study.place, tmp_path / "out", *options.split())
+        code, _, err = run("study", "report", study.folder, tmp_path / "out", *options.split())
         said = "the limit 'half'" if "half" in options else options.split()[0]
         assert code == 2 and said in err and not (tmp_path / "out").exists()
 
