@@ -221,8 +221,8 @@ def test_one_unknown_angle_is_found_from_forty_tests(coarse):
         ({"overturned": [1, 1, 1]}, "all the same"),
         ({"overturned": [0, 2, 1]}, "True or False"),
         ({"overturned": ["no", "yes", "no"]}, "True or False"),
-        ({"lapse": 0.0}, "lapse"),
-        ({"lapse": 0.5}, "lapse"),
+        ({"outlier_probability": 0.0}, "outlier_probability"),
+        ({"outlier_probability": 0.5}, "outlier_probability"),
         ({"candidates": 10}, "candidates"),
         ({"p": (2.0, 1.0)}, "p must be"),
         ({"p": 2.0, "alpha": 0.2, "restitution": 0.9}, "everything is known"),
@@ -320,7 +320,7 @@ def test_a_search_goes_on_while_few_candidates_speak_for_what_it_found(
     threshold_evidence, monkeypatch, candidates, goes_on, populations
 ):
     monkeypatch.setattr(searching, "_PROPOSAL", (populations, 2))
-    monkeypatch.setattr(searching, "_COMPARED", (populations, 4))
+    monkeypatch.setattr(searching, "_COMPARISON", (populations, 4))
     evidence, thresholds = threshold_evidence
     space = evidence.candidates.space
 

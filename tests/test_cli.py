@@ -173,7 +173,7 @@ def test_an_interrupt_is_one_sentence_and_closes_what_is_half_done(monkeypatch, 
         for _ in map_in_threads(lambda each: (begun.append(each), time.sleep(0.01)), itertools.count()):
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(cli, "_run", run)
+    monkeypatch.setattr(cli, "_run_command", run)
     with pytest.raises(SystemExit) as ended:
         cli.main([])
     count = len(begun)

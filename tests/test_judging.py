@@ -199,7 +199,7 @@ def test_what_is_no_outcome_is_no_test(given, sentence):
         ({"tests": []}, "tests must hold at least one test"),
         ({"tests": [STRONG]}, "tests must hold tests"),
         ({"weights": [1.0, 2.0]}, "weights must be 1 numbers of 0 or more"),
-        ({"lapse": 0.7}, "lapse must be a number from 0 to 0.5"),
+        ({"outlier_probability": 0.7}, "outlier_probability must be a number from 0 to 0.5"),
         ({"simulations": 3}, "simulations must be a whole number of at least 100"),
         ({"blocks": rocking.dynamics.BouncingBall(0.9)}, "this is known of blocks alone"),
     ],
@@ -280,6 +280,6 @@ def test_the_command_writes_figure_tables_and_numbers(run, undrawn, tmp_path):
 
 
 def test_predictions_of_tests_that_were_left_out_take_no_lapse_and_no_weights():
-    for name, given in (("lapse", 0.3), ("weights", [1.0, 1.0])):
+    for name, given in (("outlier_probability", 0.3), ("weights", [1.0, 1.0])):
         with pytest.raises(InvalidOption, match=f"take no {name}"):
             rocking.validate(of_outcomes([0, 1]), left_out([0.2, 0.3]), **{name: given})

@@ -75,7 +75,7 @@ def test_any_selection_of_the_results_is_that_of_the_whole(complete, reference):
 
 @pytest.mark.thorough
 def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_path, monkeypatch):
-    monkeypatch.setattr(RUNS, "choose_unit", lambda product, unit_blocks: (2, 1, 2, 1024))
+    monkeypatch.setattr(RUNS, "choose_unit_shape", lambda product, unit_blocks: (2, 1, 2, 1024))
     study = made(tmp_path, unit_blocks=None)
     keys = list(store_of(study).grid)
     assert len(keys) == 2 * 2 * 1 * 2
@@ -566,15 +566,15 @@ def test_bodies_of_another_kind_with_the_same_numbers_are_another_study(tmp_path
 
 
 def test_a_study_that_another_process_creates_meanwhile_is_opened(tmp_path, monkeypatch):
-    pilot, motion = RUNS.choose_unit, rocking.pulses.one_sine(4.0, 1.0)
+    pilot, motion = RUNS.choose_unit_shape, rocking.pulses.one_sine(4.0, 1.0)
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
 
     def slow(product, unit_blocks):
-        monkeypatch.setattr(RUNS, "choose_unit", pilot)
+        monkeypatch.setattr(RUNS, "choose_unit_shape", pilot)
         rocking.create_study(tmp_path, blocks, motion, unit_blocks=512).run()
         return (1, 1, 1, 1024)
 
-    monkeypatch.setattr(RUNS, "choose_unit", slow)
+    monkeypatch.setattr(RUNS, "choose_unit_shape", slow)
     study = rocking.create_study(tmp_path, blocks, motion)
     assert study.results().sizes["block"] == 1300
     assert not study.verify()

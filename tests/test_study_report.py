@@ -163,7 +163,7 @@ def test_what_is_written_of_spectral_accelerations_says_their_period_and_damping
 
 def test_what_is_read_in_small_parts_is_the_same(study, curves, monkeypatch):
     whole = curves, study.spectrum(), study.fragility(measure="pga_ratio")
-    monkeypatch.setattr(reading, "_HELD", 5 * len(MOTIONS) * len(LEVELS))
+    monkeypatch.setattr(reading, "_MAX_IN_MEMORY", 5 * len(MOTIONS) * len(LEVELS))
     parts = study.block_fragilities(limit_states=LIMITS), study.spectrum(), study.fragility(measure="pga_ratio")
     assert whole[0].data.identical(parts[0].data)
     assert whole[1].data.identical(parts[1].data)

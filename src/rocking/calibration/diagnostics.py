@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.calibration.search import MAX_R_HAT, RUN_COUNT, SearchResult, unpack
-from rocking.calibration.space import MAX_VALUES, Space, find_unit
+from rocking.calibration.space import MAX_VALUES, Space, find_parameter_unit
 from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import format_count
 from rocking.errors import InvalidOption
@@ -32,7 +32,7 @@ class Scores:
     log_loss : float
         Mean of -log of the probability of the observed outcome, infinite for an outcome with probability zero.
     brier : float
-        Mean squared difference between probability and outcome (Brier 1950).
+        Mean squared difference between probability and outcome :cite:p:`brier1950`.
 
     See Also
     --------
@@ -60,10 +60,10 @@ class Scores:
         predicted, actual = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if predicted.shape != actual.shape or not predicted.size:
             raise InvalidOption(
-                f"there must be one probability for each outcome, not {predicted.shape} and {actual.shape}"
+                f"probabilities and outcomes must have the same shape; got {predicted.shape} and {actual.shape}"
             )
         if not np.all((predicted >= 0.0) & (predicted <= 1.0)):
-            raise InvalidOption("{} must lie between 0 and 1", "probabilities")
+            raise InvalidOption("{} must be between 0 and 1", "probabilities")
         return cls(
             accuracy=float(np.mean((predicted > 0.5) == actual)),
             log_loss=float(compute_log_losses(predicted, actual).mean()),
@@ -98,12 +98,12 @@ class BoundReached:
     share: float
 
     def __str__(self) -> str:
-        unit = find_unit(self.name)
+        unit = find_parameter_unit(self.name)
         bound = f"{self.bound:g}" + ("" if unit == "1" else f" {unit}")
         return (
             f"{self.name} reaches its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
             f"the outermost {100 * _EDGE_SHARE:.0f} % of the range, so that the bound sets the {self.end} end of the "
-            "interval; unless you know that bound, "
+            "interval; unless this bound is certain, "
             f"set that of {self.name.partition('_')[0]} to {self.wider:g}"
         )
 
@@ -135,13 +135,11 @@ class Diagnostics:
         notes = [f"{bound}" for bound in self.bounds_reached]
         disagreeing = [f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > MAX_R_HAT]
         if disagreeing:
-            advice = "the estimates weigh what both found; double the candidates, or narrow the bounds to what you know"
+            advice = "the estimates average them; double the candidates, or narrow the bounds"
             notes.append(f"independent runs disagree (R-hat) on {', '.join(disagreeing)}: {advice}")
         if self.effective < 20.0:
-            shortage = (
-                f"only {format_count(round(self.effective), 'candidate')} can tell what a typical population does"
-            )
-            notes.append(f"{shortage}: double the candidates, or narrow the bounds to what you know")
+            shortage = f"only {format_count(round(self.effective), 'candidate')} represent a typical population"
+            notes.append(f"{shortage}: double the candidates, or narrow the bounds")
         return tuple(notes)
 
     def __str__(self) -> str:
@@ -180,7 +178,7 @@ def find_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ..
         ]
         for end, bound, suggested, is_near in ends:
             share = float(is_near.mean())
-            # No block exceeds such a bound.
+            # Bounds at the largest possible value cannot be widened.
             if share > 0.05 and bound < math.log(MAX_VALUES[parameter]) - 1e-9:
                 reached.append(BoundReached(name, end, math.exp(bound), suggested, share))
     return tuple(reached)

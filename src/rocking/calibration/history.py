@@ -16,7 +16,7 @@ from rocking.calibration.space import (
     NO_UNKNOWNS,
     PARAMETERS,
     Range,
-    find_unit,
+    find_parameter_unit,
     is_known,
     parse_range,
 )
@@ -117,7 +117,7 @@ class HistoryCalibration(Result):
                 name,
                 fit.value,
                 float(f"{fit.deviation:.2g}"),
-                find_unit(name),
+                find_parameter_unit(name),
                 "at its bound" if fit.at_bound else "",
             ]
             for name, fit in self.estimates.items()
@@ -153,7 +153,8 @@ class HistoryCalibration(Result):
 
     def _estimates_text(self) -> str:
         texts = (
-            f"{name.replace('_', ' ')} = {fit.value:.4g} {find_unit(name)}" for name, fit in self.estimates.items()
+            f"{name.replace('_', ' ')} = {fit.value:.4g} {find_parameter_unit(name)}"
+            for name, fit in self.estimates.items()
         )
         return ", ".join(text.removesuffix(" 1") for text in texts)
 
@@ -243,7 +244,8 @@ def calibrate_history(
         raise InvalidOption(NO_UNKNOWNS)
     if len(sample_times) < 2 * len(unknowns):
         raise InvalidOption(
-            f"{format_count(len(sample_times), 'sample')} cannot determine {format_count(len(unknowns), 'parameter')}: give more"
+            f"{format_count(len(sample_times), 'sample')} cannot determine {format_count(len(unknowns), 'parameter')}: "
+            "provide more"
         )
     problem = _Problem(sample_times, measured, motion, model, known, tuple(unknowns))
     rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
@@ -251,17 +253,19 @@ def calibrate_history(
 
 
 def _check_history(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
-    """Return checked copies of the times and rotations of a history."""
+    """Check the times and rotations of a history, and copy them."""
     sample_times, measured = (
         np.array(checks.numbers(values, name, InvalidOption))
         for values, name in ((times, "times"), (rotation, "rotation"))
     )
     if sample_times.ndim != 1 or sample_times.shape != measured.shape:
-        raise InvalidOption(f"there must be one rotation for each time, not {sample_times.shape} and {measured.shape}")
+        raise InvalidOption(
+            f"times and rotations must have the same shape; got {sample_times.shape} and {measured.shape}"
+        )
     if not (np.all(np.isfinite(sample_times)) and np.all(np.isfinite(measured))):
-        raise InvalidOption("{} and {} must be finite: leave out samples that are missing", "times", "rotation")
+        raise InvalidOption("{} and {} must be finite; remove missing samples", "times", "rotation")
     if not len(sample_times) or sample_times[0] < 0.0 or not np.all(np.diff(sample_times) > 0.0):
-        raise InvalidOption("{} must start at 0 or later and increase from sample to sample", "times")
+        raise InvalidOption("{} must be nonnegative and increasing", "times")
     if not np.any(measured) or np.abs(measured).max() >= 0.5 * math.pi:
         raise InvalidOption("{} must be in rad, below pi/2 in size, and not zero throughout", "rotation")
     return sample_times, measured
@@ -289,7 +293,7 @@ class _Problem:
     unknowns: tuple[_Unknown, ...]
 
     def count_samples(self, share: float) -> int:
-        """Return the number of samples up to this share of the integral of |rotation|."""
+        """Count the samples up to this share of the integral of |rotation|."""
         cumulative = np.cumsum(np.abs(self.rotation) * np.gradient(self.times))
         return int(np.searchsorted(cumulative, share * cumulative[-1])) + 1
 
@@ -350,10 +354,10 @@ def _split_parameters(inputs: Mapping[str, float | Range], two_sided: bool) -> t
 
 
 def _bound_initial_rotation(rotation: Floats) -> _Unknown:
-    """Return the unknown initial rotation, bounded around the first sample."""
+    """Return the unknown initial rotation with bounds around the first sample."""
     first = float(rotation[0])
     if abs(first) < 0.05 * np.abs(rotation).max():
-        text = "a release test must start at the rotation it is released from; give {}"
+        text = "a release test must start at the rotation of the release; set {}"
         raise InvalidOption(text, "initial_rotation")
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
@@ -428,12 +432,12 @@ def _compute_covariance(problem: _Problem, logs: Floats, residuals: Floats) -> F
     ]
     if undetermined:
         raise InvalidOption(
-            f"the history does not determine {', '.join(undetermined)}: give it a value, or a longer history"
+            f"the history does not determine {', '.join(undetermined)}: set a value, or use a longer history"
         )
     _, singular_values, right_vectors = np.linalg.svd(slopes / norms, full_matrices=False)
     if singular_values[-1] <= _INSENSITIVE * singular_values[0]:
         names = ", ".join(unknown.name for unknown in problem.unknowns)
-        raise InvalidOption(f"the history does not distinguish {names}: give one of them a value")
+        raise InvalidOption(f"the history does not distinguish {names}: set the value of one")
     return np.asarray(variance * (right_vectors.T / singular_values**2) @ right_vectors / np.outer(norms, norms))
 
 

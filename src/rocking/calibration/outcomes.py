@@ -26,7 +26,7 @@ from rocking.calibration.search import (
     unpack,
     with_outliers,
 )
-from rocking.calibration.space import SIDED_PARAMETER, Space, ValueOrBounds, find_unit
+from rocking.calibration.space import SIDED_PARAMETER, Space, ValueOrBounds, find_parameter_unit
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
@@ -228,15 +228,13 @@ class Calibration(Result):
                 estimate.lower,
                 estimate.upper,
                 f"{100 * estimate.dispersion:.0f} %",
-                find_unit(name),
+                find_parameter_unit(name),
             ]
             for name, estimate in self.estimates.items()
         ]
-        equivalent = 1.0 / float((self.weights**2).sum())
+        size = 1.0 / float((self.weights**2).sum())
         table = format_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows)
-        ensemble = (
-            f"ensemble of {format_count(len(self.blocks), 'block')}, equivalent to {equivalent:.0f} of equal weight"
-        )
+        ensemble = f"ensemble of {format_count(len(self.blocks), 'block')}, equivalent to {size:.0f} of equal weight"
         return f"{self._headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -277,7 +275,7 @@ class Calibration(Result):
         )
 
     def _create_parameter(self, name: str) -> Parameter:
-        """Return one parameter for a figure, for both sides if they may differ."""
+        """Create a parameter for a figure, for both sides if they may differ."""
         from rocking.plot.curves import Parameter
 
         estimates = [estimate for key, estimate in self.estimates.items() if key.partition("_")[0] == name]
@@ -308,7 +306,7 @@ def compute_probabilities(share: Floats, effective: float, outlier_probability: 
 
 
 def label_groups(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
-    """Return the group of each motion, numbered from 0. By default each motion is a group."""
+    """Assign a group number, from 0, to each motion. By default each motion is a group."""
     labels = groups_of(range(count) if groups is None else groups, "groups", count)
     checks.integer(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
@@ -342,8 +340,8 @@ def calibrate(
         Known value on both sides in every test (a number, or a pair of equal numbers), or lowest and highest plausible
         value on either side (rad/s, rad, -) with a log-uniform prior. A body of known size has p =
         ``Block(width=..., height=...).p``. The restitution "housner" is computed from the slenderness as 1 - 1.5
-        sin(alpha)^2 (Housner 1963). For two sides it comes from a rectangle with an eccentric centre of mass and these
-        slendernesses, and p is the rectangle's.
+        sin(alpha)^2 :cite:p:`housner1963`. For two sides it comes from a rectangle with an eccentric centre of mass and
+        these slendernesses, and p is the rectangle's.
     two_sided : bool
         Whether the slendernesses of the two sides may differ, by a factor of at most 3. By default they may, unlike in
         `calibrate_history`, because few specimens are symmetric and outcomes alone would not reveal this.
@@ -377,10 +375,10 @@ def calibrate(
     Notes
     -----
     The block of each test is drawn from a population that is lognormal in p, alpha, restitution and the ratio of the
-    slendernesses. The posterior over populations is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra
-    2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs fill the bounds evenly, then
-    add blocks near their own best fits. Weights inverse to the density of candidates preserve the prior (deterministic
-    mixture, Owen and Zhou 2000).
+    slendernesses. The posterior over populations is sampled by sequential Monte Carlo
+    :cite:p:`delmoral2006`, with a lognormal prior on each dispersion (median 10 %). Two independent runs fill the
+    bounds evenly, then add blocks near their own best fits. Weights inverse to the density of candidates preserve the
+    prior (deterministic mixture, :cite:t:`owen2000`).
 
     Two mirrored blocks often explain the outcomes equally well. The estimates of each side are then wide, but the
     predictions are not.
@@ -389,8 +387,8 @@ def calibrate(
     --------
     >>> import rocking
     >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-    >>> found = calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-    >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
+    >>> calibration = calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+    >>> bool(calibration.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
     True
     """
     motion_list = list_motions(motions)
@@ -444,22 +442,22 @@ def _compute_estimates(space: Space, populations: Floats) -> dict[str, Estimate]
 
 
 def check_outcomes(overturned: ArrayLike, count: int) -> Flags:
-    """Return outcomes (yes or no) as a read-only array, one for each motion and not all equal."""
+    """Check that there is an outcome for each motion and not all are equal; return a read-only array."""
     if np.ma.is_masked(overturned):
-        raise InvalidOption("{} must be given for each motion, but some are masked", "overturned", value=overturned)
+        raise InvalidOption("{} must not be masked; provide an outcome for each motion", "overturned", value=overturned)
     values = np.asarray(overturned)
     if values.shape != (count,):
         raise InvalidOption(
-            f"{{}} must hold one outcome for each of the {count} motions, not {values.shape}",
+            f"{{}} must contain one outcome for each of the {count} motions; got shape {values.shape}",
             "overturned",
             value=overturned,
         )
     if not np.all(np.isin(values, (0, 1))):
-        raise InvalidOption("{} must hold True or False (or 1 or 0) for each motion", "overturned")
+        raise InvalidOption("{} must contain True or False (or 1 or 0) for each motion", "overturned")
     observed = values.astype(bool)
     if observed.all() or not observed.any():
         raise InvalidOption(
-            "the outcomes are all the same: calibration needs motions that overturn and motions that do not"
+            "all outcomes are equal; a calibration requires motions that overturn the block and motions that do not"
         )
     observed.flags.writeable = False
     return observed

@@ -32,7 +32,7 @@ _DISPERSION_LOG_DEVIATION: Final = 0.6
 _BATCH: Final = 64
 
 
-#: Factor on the dispersions of a guide to draw blocks.
+#: Factor on the dispersions of fitted populations for drawing blocks.
 PROPOSAL_WIDTH: Final = 1.2
 
 #: Jeffreys' prior, Beta(1/2, 1/2), of a share estimated from n simulated blocks.
@@ -40,7 +40,7 @@ _JEFFREYS: Final = 0.5
 
 
 def unpack(populations: Floats) -> tuple[Floats, Floats]:
-    """Return centres and dispersions, shape (c, k) each."""
+    """Split populations into centres and dispersions, shape (c, k) each."""
     k = populations.shape[1] // 2
     return populations[:, :k], np.exp(populations[:, k:])
 
@@ -59,13 +59,13 @@ def compute_log_prior(space: Space, populations: Floats) -> Floats:
 
 
 def draw_points(populations: Floats, width: float, count: int, rng: np.random.Generator) -> Floats:
-    """Draw points from populations in turn, with dispersions times `widened`, shape (count, k)."""
+    """Draw points from populations in turn, with dispersions times `width`, shape (count, k)."""
     centre, dispersion = unpack(populations[np.arange(count) % len(populations)])
     return centre + width * dispersion * rng.standard_normal(centre.shape)
 
 
 def compute_log_density(populations: Floats, width: float, points: Floats) -> Floats:
-    """Compute the log-density of the distribution of `drawn` at points, shape (n,)."""
+    """Compute the log-density of the distribution of `draw_points` at points, shape (n,)."""
     centre, dispersion = unpack(populations)
     mean = centre.mean(axis=0)
     centre, centred = centre - mean, points - mean
@@ -100,7 +100,7 @@ class Candidates:
         )
 
     def select_tests(self, tests: Flags) -> Candidates:
-        """Return the same blocks under some of the motions."""
+        """Select some of the motions."""
         return replace(self, overturned=np.ascontiguousarray(self.overturned[:, tests]))
 
     @cached_property
@@ -126,7 +126,7 @@ class Evidence:
     outlier_probability: float
 
     def select_tests(self, tests: Flags) -> Evidence:
-        """Return the evidence of some of the tests."""
+        """Select some of the tests."""
         return replace(self, candidates=self.candidates.select_tests(tests), observed=self.observed[tests])
 
     def weights(self, populations: Floats) -> NDArray[np.float32]:
@@ -211,8 +211,8 @@ def with_outliers(probabilities: Floats, outlier_probability: float) -> Floats:
 #: Number of independent runs.
 RUN_COUNT: Final = 2
 
-#: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the guiding likelihood. The
-#: search continues at most `_MORE` times if runs disagree or too few candidates are effective.
+#: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the likelihood. The
+#: search continues at most `_MAX_EXTENSIONS` times if runs disagree or too few candidates are effective.
 _FILLING_PARTS: Final = 2
 _EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
 _MAX_EXTENSIONS: Final = 2
@@ -227,7 +227,7 @@ MAX_R_HAT: Final = 1.1
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Calibration problem: parameter space, observed outcomes, and simulation of blocks (`tried`)."""
+    """Calibration problem: parameter space, observed outcomes, and simulation of blocks."""
 
     space: Space
     observed: Flags
@@ -283,9 +283,7 @@ def search(problem: Problem, candidates: int, rng: np.random.Generator) -> Searc
     for _ in range(_MAX_EXTENSIONS):
         if max(result.agreement.values()) >= MAX_R_HAT:
             exponents = 0.1, 0.3, 1.0
-        elif (
-            result.effective_candidates < 100.0
-        ):  # a single block that happens to fit would make a population look excellent
+        elif result.effective_candidates < 100.0:  # few blocks overrate a population that one of them fits by chance
             exponents = 1.0, 1.0, 1.0
         else:
             break
@@ -300,7 +298,7 @@ def _extend_runs(
     part_size: int,
     streams: Sequence[np.random.Generator],
 ) -> SearchResult:
-    """Let every run add blocks near its own fits, and compare the runs."""
+    """Extend every run by blocks near its fits, and compare the runs."""
     extended, posteriors = [], []
     for run, rng in zip(runs, streams, strict=True):
         for exponent in exponents:
@@ -384,12 +382,8 @@ def _move_particles(
         with np.errstate(invalid="ignore"):
             gain = (1.0 - temperature) * (new_start - start[movers]) + temperature * (new_end - end[movers])
         accepted = np.log(rng.random(len(movers))) < gain
-        accepted_movers = movers[accepted]
-        particles[accepted_movers], start[accepted_movers], end[accepted_movers] = (
-            new[accepted],
-            new_start[accepted],
-            new_end[accepted],
-        )
+        indices = movers[accepted]
+        particles[indices], start[indices], end[indices] = new[accepted], new_start[accepted], new_end[accepted]
 
 
 def resample(weights: Floats, count: int, rng: np.random.Generator) -> Integers:

@@ -38,13 +38,13 @@ _MAX_HOUSNER_ALPHA: Final = math.asin(math.sqrt(2.0 / 3.0))
 
 #: Message for a problem without unknowns.
 NO_UNKNOWNS: Final = (
-    "everything is known of the block, so that nothing is to be found: give a pair (lowest, highest) for what is not "
-    "known, or ask what the known block does by simulate, and how probably it overturns by fragility"
+    "all parameters are known, so that there is nothing to estimate: use a pair (lowest, highest) for each unknown "
+    "parameter, or call simulate or fragility with the known block"
 )
 
 Range = tuple[float, float]
 
-#: Knowledge of a parameter: its value, its bounds, or for a restitution Housner's rule.
+#: Input of a parameter: its value, its bounds, or for a restitution Housner's rule.
 ValueOrBounds = float | Range | Literal["housner"]
 
 
@@ -72,7 +72,7 @@ class Space:
             if isinstance(value, str):
                 if name != "restitution" or value != HOUSNER:
                     alternatives = "a value or a pair (lowest, highest)" + f", or {HOUSNER!r}" * (name == "restitution")
-                    raise InvalidOption(f"{{}} must be {alternatives}, not {value!r}", name, value=value)
+                    raise InvalidOption(f"{{}} must be {alternatives}; got {value!r}", name, value=value)
             elif is_known(value):
                 known[name] = check_known_value(np.ravel(value)[0], name)
             else:
@@ -170,7 +170,7 @@ class Space:
         return np.stack([points[:, :f] + half, points[:, :f] - half], axis=1)
 
 
-def find_unit(estimate: str) -> str:
+def find_parameter_unit(estimate: str) -> str:
     """Return the unit of an estimate: a parameter (of either side) or the initial rotation."""
     return _UNITS[estimate.partition("_")[0]]
 
@@ -183,15 +183,15 @@ def is_known(value: Any) -> bool:
 
 
 def check_known_value(value: object, name: str) -> float:
-    """Return the value of a known parameter, within the range allowed for blocks."""
-    known = checks.positive(value, name, InvalidOption, find_unit(name))
+    """Check a known parameter against the range allowed for blocks."""
+    known = checks.positive(value, name, InvalidOption, find_parameter_unit(name))
     if known > MAX_VALUES[name]:
         raise InvalidOption(f"{{}} must be at most {MAX_VALUES[name]:g}, not {known:g}", name, value=known)
     return known
 
 
 def parse_range(pair: Any, name: str, max_value: float) -> Range:
-    """Return the ends of a range, increasing numbers between 0 and `highest`."""
+    """Parse the ends of a range, increasing numbers between 0 and `max_value`."""
     try:
         low, high = (checks.real(value, f"each of {name}", InvalidOption) for value in pair)
     except (TypeError, ValueError):

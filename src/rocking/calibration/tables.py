@@ -71,7 +71,7 @@ class _Table:
     def create_error(
         self, message: str, *arguments: str, line: int | None = 1, value: object = None
     ) -> UnreadableRecord:
-        """Return an error about a line of the table, by default its header."""
+        """Create an error about a line of the table, by default its header."""
         return UnreadableRecord(message, *arguments, path=str(self.path), line=line, value=value)
 
 
@@ -83,9 +83,7 @@ def read_calibration(
     if {"motion", "overturned"} <= set(table.columns):
         return _create_tests(table, channel=channel, dt=dt, units=units)
     if {"rotation_rad", "rotation_deg"} <= set(table.columns):
-        raise table.create_error(
-            "rotation must be there once, in rad or in deg, but rotation_rad and rotation_deg are there"
-        )
+        raise table.create_error("the table must contain either rotation_rad or rotation_deg, not both")
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
         if {"time_s", column} <= set(table.columns):
             return MeasuredHistory(table.numbers("time_s"), unit * table.numbers(column))
@@ -104,13 +102,13 @@ def read_ensemble(path: Path) -> Ensemble:
     ]
     missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
     if missing:
-        raise table.create_error(f"no ensemble of a calibration, whose ensemble.csv has {' and '.join(missing)}")
+        raise table.create_error(f"not the ensemble.csv of a calibration: {' and '.join(missing)} missing")
     model_names: dict[str, Model] = {name: name for name in get_args(Model)}
     models = {
         table.convert(line, row["model"], model_names.__getitem__, "linear or nonlinear") for line, row in table.rows
     }
     if len(models) > 1:
-        raise table.create_error("an ensemble has one model, not both; correct the column model", line=None)
+        raise table.create_error("an ensemble must have one model, not both; correct the column model", line=None)
     try:
         blocks = Blocks(*(np.column_stack([table.numbers(side) for side in sides]) for sides in columns))
     except RockingError as error:
@@ -125,16 +123,16 @@ def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Tabl
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
-        raise UnreadableRecord(f"it cannot be read: {error.strerror}", path=str(path)) from None
+        raise UnreadableRecord(f"the file cannot be read: {error.strerror}", path=str(path)) from None
     except UnicodeDecodeError:
-        raise UnreadableRecord("it is no text table; save it as CSV", path=str(path)) from None
+        raise UnreadableRecord("the file is not a text table in UTF-8; save it as CSV", path=str(path)) from None
     cells = read_csv_rows(text)
     if len(cells) < 2:
-        raise UnreadableRecord("it holds no rows below its header", path=str(path))
+        raise UnreadableRecord("the table has no rows below its header", path=str(path))
     (_, header), *rows = cells
     columns = [convert_heading(cell) for cell in header]
     if duplicates := [column for column in dict.fromkeys(columns) if columns.count(column) > 1]:
-        text = f"each column must be there once, but {' and '.join(duplicates)} several times"
+        text = f"column names must be distinct; got {' and '.join(duplicates)} more than once"
         raise UnreadableRecord(text, path=str(path), line=1)
     for line, row in rows:
         if len(row) != len(columns):
@@ -144,12 +142,10 @@ def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Tabl
 
 
 def _create_tests(table: _Table, **metadata: Any) -> list[ShakeTest]:
-    """Return the tests of a table with these columns."""
+    """Create the tests of a table with these columns."""
     specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
     if len(specimens) > 1:
-        raise table.create_error(
-            f"the tests are of {format_count(len(specimens), 'specimen')}: give each a table of its own"
-        )
+        raise table.create_error(f"the tests are of {format_count(len(specimens), 'specimen')}; use a table for each")
     overturned, motions = table.booleans("overturned"), _load_row_motions(table, **metadata)
     names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
     return [ShakeTest(*row) for row in zip(motions, overturned, names, groups, strict=True)]
@@ -162,22 +158,22 @@ def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any) -> tu
     motions = []
     for line, row in table.rows:
         scale = table.convert(line, row.get("scale") or "1", _parse_finite, "a number")
-        dt_text = row.get("dt_s") or ""
-        row_metadata = (
+        step = row.get("dt_s") or ""
+        cells = (
             row.get("channel"),
-            table.convert(line, dt_text, float, "a number") if dt_text else None,
+            table.convert(line, step, float, "a number") if step else None,
             row.get("units"),
         )
         metadata = {
-            "channel": row_metadata[0] or channel,
-            "dt": dt if row_metadata[1] is None else row_metadata[1],
-            "units": row_metadata[2] or units,
+            "channel": cells[0] or channel,
+            "dt": dt if cells[1] is None else cells[1],
+            "units": cells[2] or units,
         }
         name, vertical = row["motion"], row.get("vertical") or ""
         try:
-            if (key := (name, vertical, *row_metadata)) not in loaded:
+            if (key := (name, vertical, *cells)) not in loaded:
                 loaded[key] = _load_row_motion(
-                    table.path, name, vertical, several=several and not any(row_metadata), **metadata
+                    table.path, name, vertical, several=several and not any(cells), **metadata
                 )
             motions.append(loaded[key] if scale == 1.0 else loaded[key].scaled(scale))
         except RockingError as error:
@@ -199,7 +195,7 @@ def _load_row_motion(table: Path, name: str, vertical: str, *, several: bool, **
 
 
 def _resolve_path(table: Path, name: str) -> str:
-    """Return the path of a file relative to the table's folder if it exists there."""
+    """Resolve a file name relative to the table's folder if such a file exists."""
     sibling = table.parent / name
     return str(sibling) if path_exists(sibling) else name
 
@@ -254,7 +250,7 @@ def read_tests(
     """
     table = read_table(checks.path(path, "path of a table", UnreadableRecord))
     if not {"motion", "overturned"} <= {*table.columns}:
-        raise table.create_error(f"the columns must be motion and overturned, each once, not {','.join(table.columns)}")
+        raise table.create_error(f"the columns must include motion and overturned; got {','.join(table.columns)}")
     return _create_tests(table, channel=channel, dt=dt, units=units)
 
 
@@ -291,7 +287,7 @@ def read_observed(
 def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[str, Any]:
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
-        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
+        raise InvalidOption("a spectral acceleration requires {}, in s", "period", path=str(table.path))
     if measure.name not in ("pga", kind):  # "pga" is the default
         raise InvalidOption(
             f"{{}} is {measure.name}, but the outcomes are given by {kind}: leave it out",
@@ -303,7 +299,7 @@ def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[
 
 def _pair_with_motions(table: _Table, measure: Measure, **metadata: Any) -> dict[str, Any]:
     if measure.in_block_units:
-        raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
+        raise InvalidOption(f"{measure.name} is in units of the block, which is unknown for observed outcomes; use pga")
     motions = _load_row_motions(table, **metadata)
     motions_by_name = {
         row["motion"]: motion for (_, row), motion in zip(table.rows, motions, strict=True) if motion.pga > 0.0
@@ -316,7 +312,7 @@ def _pair_with_motions(table: _Table, measure: Measure, **metadata: Any) -> dict
 
 
 def _join_clusters(table: _Table, families: Mapping[str, int]) -> list[int]:
-    """Return the cluster of each row: a common motion (or multiple) or group, even indirectly, joins rows."""
+    """Assign a cluster to each row: a common motion (or a multiple of it) or group joins rows, even indirectly."""
     clusters = [*range(len(table.rows))]
     first: dict[tuple[str, str | int], int] = {}
     for k, (_, row) in enumerate(table.rows):

@@ -69,7 +69,7 @@ class ShakeTest:
     def __post_init__(self) -> None:
         motion, outcome = check_motion(self.motion), self.overturned
         if motion is None:
-            raise InvalidMotion("a test needs the {} of what the specimen stood on, not None", "motion")
+            raise InvalidMotion("a test requires the {} of the base; got None", "motion")
         for label in ("name", "group"):
             checks.text(getattr(self, label), label, InvalidOption)
         if not isinstance(outcome, (bool, int, np.bool_, np.integer)) or outcome not in (0, 1):
@@ -139,7 +139,7 @@ class ShareInBin:
     predicted, observed : float
         Predicted and observed shares that overturn.
     band_lower, band_upper : float
-        Ends of the central 90 % of the shares in simulations from the predictions (Broecker and Smith 2007).
+        Ends of the central 90 % of the shares in simulations from the predictions :cite:p:`broecker2007`.
     """
 
     lower: float
@@ -199,12 +199,16 @@ class ModelValidation(Result):
         overturned_count = sum(test.overturned for test in self.tests)
         if overturned_count in (0, len(self.tests)):
             all_or_none = "all tests" if overturned_count else "no test"
-            notes.append(f"{all_or_none} overturned the specimen: the base rate is perfect, and no skill is known")
+            notes.append(
+                f"{all_or_none} overturned the specimen: the base rate is perfect, so that the skill is undefined"
+            )
         if self.brier.clusters < 10:
             cluster_text = format_count(self.brier.clusters, "cluster")
             notes.append(f"the tests belong to {cluster_text} only: standard errors are rough")
         if math.isinf(self.log_loss.value):
-            notes.append("the log loss is infinite, as a certainty failed: give what is not known of the specimen")
+            notes.append(
+                "the log loss is infinite because a certain prediction failed: include the uncertainty of the specimen"
+            )
         return tuple(notes)
 
     def _headline(self) -> str:
@@ -315,11 +319,11 @@ def validate(
     """
     items = checks.items(tests, "tests", InvalidOption)
     if not items:
-        raise InvalidOption("{} must hold at least one test", "tests", value=tests)
+        raise InvalidOption("{} must contain at least one test", "tests", value=tests)
     for test in items:
         if not isinstance(test, ShakeTest):
             raise InvalidOption(
-                f"{{}} must hold tests, ShakeTest(motion, overturned), not {checks.short_repr(test)}",
+                f"{{}} must contain ShakeTest(motion, overturned); got {checks.short_repr(test)}",
                 "tests",
                 value=test,
             )
@@ -339,7 +343,7 @@ def validate(
     else:
         if isinstance(blocks, Calibration):
             if weights is not None:
-                raise InvalidOption("a calibration has {} of its own: leave them out", "weights")
+                raise InvalidOption("a calibration contains its own {}: omit the argument", "weights")
             description, equation = f"calibration, {format_count(len(blocks.blocks), 'block')}", model or blocks.model
             bodies: Bodies = blocks.blocks
             shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
@@ -372,14 +376,14 @@ def validate(
 
 
 def _average_left_out(source: Validation, count: int, weights: object, outlier_probability: float | None) -> Floats:
-    """Return the predicted probabilities of left-out tests of a calibration."""
+    """Average the predicted probabilities of left-out tests over the repeats."""
     if weights is not None or outlier_probability is not None:
         name = "outlier_probability" if weights is None else "weights"
-        raise InvalidOption("predictions of tests that were left out take no {}: leave it out", name)
+        raise InvalidOption("{} cannot be combined with predictions of left-out tests: omit it", name)
     predicted_count = source.probabilities.shape[1]
     if predicted_count != count:
         raise InvalidOption(
-            f"the predictions are of {format_count(predicted_count, 'test')}, and {format_count(count, 'test')} are given: "
+            f"the predictions are of {format_count(predicted_count, 'test')}; got {format_count(count, 'test')}: "
             "{} must be those of the calibration, in their order",
             "tests",
         )
@@ -387,7 +391,7 @@ def _average_left_out(source: Validation, count: int, weights: object, outlier_p
 
 
 def compute_score(scores: Floats, observed: Flags, base_score: Callable[[float], float], clusters: Integers) -> Score:
-    """Compute mean score and skill against the base rate, whose score is `base` of the share that overturned."""
+    """Compute mean score, and skill against the base rate, whose score is `base_score` of the overturned share."""
 
     def mean(indices: Integers) -> float:
         return float(scores[indices].mean())
@@ -396,10 +400,7 @@ def compute_score(scores: Floats, observed: Flags, base_score: Callable[[float],
         reference = base_score(float(observed[indices].mean()))
         return 1.0 - mean(indices) / reference if reference > 0.0 else math.nan
 
-    errors, all_tests = (
-        [_jackknife(statistic, clusters) for statistic in (mean, skill)],
-        np.arange(len(scores)),
-    )
+    errors, all_tests = [_jackknife(statistic, clusters) for statistic in (mean, skill)], np.arange(len(scores))
     return Score(mean(all_tests), errors[0], skill(all_tests), errors[1], len(scores), len(np.unique(clusters)))
 
 
@@ -429,14 +430,14 @@ def compute_miscalibration(probabilities: Floats, observed: Flags, bins: Integer
 def _summarise_bin(
     k: int, bins: int, in_bin: Flags, probabilities: Floats, observed: Flags, simulated: Flags
 ) -> ShareInBin:
-    """Return the share of the tests in bin k, and the band of simulated shares with at most 5 % beyond each end."""
+    """Compute the shares of bin k, and the band of simulated shares with at most 5 % beyond each end."""
     band = np.quantile(simulated[:, in_bin].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
     shares = float(probabilities[in_bin].mean()), float(observed[in_bin].mean())
     return ShareInBin(k / bins, (k + 1) / bins, int(in_bin.sum()), *shares, *band)
 
 
 def _format_with_error(value: float, error: float) -> tuple[str, str]:
-    """Return value and standard error as text, to two digits of the error."""
+    """Format value and standard error to two digits of the error."""
     if not (math.isfinite(value) and math.isfinite(error)):
         if math.isinf(value):
             return ("infinite" if value > 0.0 else "-infinite"), "-"

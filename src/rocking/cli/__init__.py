@@ -27,7 +27,7 @@ app = App(
 
 
 def _read_help_lines(module: str) -> dict[str, str]:
-    """Return the first docstring line of each function, without importing the module."""
+    """Read the first docstring line of each function, without importing the module."""
     tree = ast.parse(Path(__file__).with_name(f"{module}.py").read_text("utf-8"))
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     return {node.name: (ast.get_docstring(node) or "").partition("\n")[0] for node in functions}
@@ -47,7 +47,7 @@ for _module, _commands in {
 app.command(
     "rocking.cli.study:study",
     name="study",
-    help="Run a study too long for one sitting: created once, resumed after anything.",
+    help="Run many simulations in a study, which can be interrupted and resumed.",
 )
 
 
@@ -102,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     except Exception as error:
         if not _is_interrupt(error):
-            sentence = _describe_error(error, words)
+            sentence = _format_error(error, words)
             if not sentence:
                 raise
             print(f"rocking: {sentence}", file=sys.stderr)
@@ -113,14 +113,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether an error replaced an interrupt, as in a lock of `threading`."""
+    """Return whether an interrupt caused an error, as in a lock of `threading`."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
     return error is not None
 
 
-def _describe_error(error: Exception, words: list[str]) -> str:
-    """Return an error as one line that names options; empty for a bug of the program."""
+def _format_error(error: Exception, words: list[str]) -> str:
+    """Format an error as one line with option names; empty for an unexpected exception."""
     if isinstance(error, DamagedStudy):
         return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
     if isinstance(error, RockingError):
@@ -143,9 +143,9 @@ def _describe_error(error: Exception, words: list[str]) -> str:
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         # File errors have their own sentence; this is printing to a full disk.
         _close_output()
-        return f"the output cannot be written: {os.strerror(error.errno)}; send it elsewhere"
+        return f"the output cannot be written: {os.strerror(error.errno)}; redirect it to another disk"
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}; name another place"
+        return f"{error.filename}: {error.strerror}; choose another path"
     return ""
 
 
@@ -168,7 +168,7 @@ def _close_output() -> None:
 
 
 def create_spelling(command: App) -> Spelling:
-    """Return a function that spells an argument as the command's option, if there is one."""
+    """Create a function that spells an argument as the command's option, if there is one."""
 
     @functools.cache  # The command is inspected only when a message names an argument.
     def options() -> frozenset[str]:
@@ -178,31 +178,28 @@ def create_spelling(command: App) -> Spelling:
 
 
 def find_command(arguments: Sequence[str]) -> App:
-    """Return the called command, or the program if there is none. The parser treats --help as a command."""
+    """Find the called command, or the program if there is none. The parser treats --help as a command."""
     return app.parse_commands(arguments)[1][len(_find_command_words(arguments))]
 
 
 def reject_unknown_options(values: Iterable[object], arguments: Sequence[str]) -> None:
     """Check that no record name is an unknown option. After "--" any name is allowed."""
     typed = arguments[: arguments.index("--")] if "--" in arguments else arguments
-    for name in values:
-        if isinstance(name, str) and name.startswith("-") and name.lstrip("-")[:1].isalpha() and name in typed:
-            option = name.partition("=")[0]
+    for value in values:
+        if isinstance(value, str) and value.startswith("-") and value.lstrip("-")[:1].isalpha() and value in typed:
+            option = value.partition("=")[0]
             # Short names are too alike to guess: a suggestion must not lead to another quantity.
             candidates = [
-                known_option
-                for known_option in _list_options(find_command(arguments))
-                if min(len(known_option), len(option)) > len("--pga")
+                name for name in _list_options(find_command(arguments)) if min(len(name), len(option)) > len("--pga")
             ]
-            options_by_word = {known_option.lstrip("-"): known_option for known_option in candidates}
-            hint = suggest(
-                option.lstrip("-"), options_by_word, "see its --help", 0.8
-            )  # a typo of one or two letters in six
+            options_by_word = {name.lstrip("-"): name for name in candidates}
+            # The cutoff allows a typo of one or two letters in six.
+            hint = suggest(option.lstrip("-"), options_by_word, "see its --help", 0.8)
             raise InvalidOption(f"{_format_command(arguments)} has no option {option}; {hint}")
 
 
 def _format_command(arguments: Sequence[str]) -> str:
-    """Return the called command as it is typed."""
+    """Format the called command as it is typed."""
     return " ".join(["rocking", *_find_command_words(arguments)])
 
 
@@ -211,7 +208,7 @@ def _find_command_words(arguments: Sequence[str]) -> list[str]:
 
 
 def _list_options(command: App) -> Iterable[str]:
-    """Return the options of a command without its positional arguments."""
+    """List the options of a command without its positional arguments."""
     if command.default_command is None:
         return ()
     arguments = command.assemble_argument_collection()

@@ -84,10 +84,10 @@ def spectrum(
         Abscissa of the figure.
     """
     if alpha is None and ensemble is None:
-        raise InvalidOption("a spectrum needs {}, or the {} of a calibration", "alpha", "ensemble")
+        raise InvalidOption("a spectrum requires {}, or the {} of a calibration", "alpha", "ensemble")
     if ensemble is not None and (alpha is not None or restitution is not None):
         raise InvalidOption(
-            "the blocks of {} have slendernesses and restitutions of their own: leave {} and {} out",
+            "the file of {} contains slendernesses and restitutions: omit {} and {}",
             "ensemble",
             "alpha",
             "restitution",
@@ -261,7 +261,7 @@ def _create_slender_block(options: BlockOptions) -> Block:
     values = options.read_values()
     if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
         raise InvalidBlock(
-            "the restitution of two different sides follows from {} and {} of both: give {}, too", "p", "alpha", "p"
+            "the restitution of two different sides follows from {} and {} of both: also set {}", "p", "alpha", "p"
         )
     block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_SHAPES)
     note_likely_mistakes([block])

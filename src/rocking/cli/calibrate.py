@@ -107,12 +107,12 @@ def calibrate(
             conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
         for name in [name for name, value in conflicting.items() if value]:
             kind = "outcomes" if isinstance(table, MeasuredHistory) else "a history"
-            raise InvalidOption(f"{{}} is for {kind}; the columns of this table are not", name)
+            raise InvalidOption(f"{{}} requires a table of {kind}, which this is not", name)
         records = predict if motion is None else (motion,)
         motions = _read_motions(records, file, "motion" if isinstance(table, MeasuredHistory) else "predict")
         if isinstance(table, MeasuredHistory):
             if len(motions) > 1:
-                raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
+                raise InvalidOption("a history has one motion of the base: use {}, or a single {}", "motion", "pulse")
             base_motion = next(iter(motions.values()), None)
             arguments |= {"initial_rotation": rotation, "seed": seed}
             result: Calibration | HistoryCalibration = calibrate_history(
@@ -138,14 +138,14 @@ def _read_motions(records: Sequence[str], file: ScaledPulseOptions, option: str)
     """Read records and pulses and reject options of motions if there are none."""
     motions = {name: file.motion(name) for name in records} | file.pulses()
     for name in {} if motions else file.supplied("scale", "pga", "pgv", "sa", "vertical"):
-        raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
+        raise InvalidOption("{} requires motions from {} or {}: add one, or omit it", name, option, "pulse")
     return motions
 
 
 def _summarise_calibration(
     calibration: Calibration, tests: Sequence[ShakeTest], motions: Mapping[str, Motion], folds: int
 ) -> tuple[dict[str, Any], str]:
-    """Return the numbers and text of a calibration, optionally with predictions and a cross-validation."""
+    """Summarise a calibration as numbers and text, optionally with predictions and a cross-validation."""
     predicted = dict(zip(motions, calibration.predict([*motions.values()]), strict=True))
     numbers, parts = {**calibration.to_dict(), "predicted": predicted}, [calibration.summary()]
     if folds:

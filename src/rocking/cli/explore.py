@@ -49,25 +49,25 @@ def explore(
     explorer = Explorer()
     is_study = motion is not None and Path(motion).is_dir()
     study = _open_study(Path(motion)) if motion is not None and is_study else None
-    texts = {"view": "map"} if is_study else {} if motion is None else _describe_motion(explorer, motion)
+    texts = {"view": "map"} if is_study else {} if motion is None else _describe_initial_motion(explorer, motion)
     server = start_listening(explorer, texts, study, address=address, port=port)
     server.announce(open_browser=not no_open)
     server.run()
 
 
 def _open_study(folder: Path) -> StudyView:
-    """Return the study in a folder, for display as maps."""
+    """Open the study in a folder, for display as maps."""
     from rocking.explorer.studies import StudyView
     from rocking.studies.folder import contains_study
 
     if not contains_study(folder):
-        sentence = "this folder holds no study; name one record, and drop the other files on the page"
+        sentence = "this folder contains no study; pass one record, and drop the other files on the page"
         raise InvalidOption(sentence, path=str(folder))
     return StudyView(folder)
 
 
-def _describe_motion(explorer: Explorer, motion: str) -> dict[str, str]:
-    """Return the texts of the initial motion."""
+def _describe_initial_motion(explorer: Explorer, motion: str) -> dict[str, str]:
+    """Describe the initial motion in texts of the page."""
     from rocking.explorer.motions import create_pulse, is_pulse
     from rocking.records.formats.source import unreadable_file_error
 

@@ -160,7 +160,7 @@ def fragility(
 
 def _reject_options_beside_outcomes(options: Mapping[str, object]) -> None:
     for option in [option for option, value in options.items() if value]:
-        sentence = "{} are observed, of a block and under motions of their own: leave {} out"
+        sentence = "{} are observed, for their own block and motions: omit {}"
         raise InvalidOption(sentence, "outcomes", option)
 
 
@@ -170,9 +170,9 @@ def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
 
 
 def _find_standing_limit(names: list[str]) -> str:
-    """Return the limit that a standing block has not exceeded: overturning, or the only one."""
+    """Find the limit state that a standing block has not exceeded: overturning, or the only one."""
     if len(names) > 1 and "overturning" not in names:
-        sentence = f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}"
+        sentence = f"{{}} requires overturning or a single limit state; got {' and '.join(names)}: choose one in {{}}"
         raise InvalidOption(sentence, "standing", "limit_states", value=names)
     return "overturning" if "overturning" in names else names[0]
 
@@ -194,7 +194,7 @@ def _save_outcomes_on_failure(folder: Path | None) -> Iterator[None]:
     except Unfitted as error:
         if folder is not None and error.outcomes is not None:
             write_csv(folder / "outcomes.csv", error.outcomes)
-            note(f"what was simulated is in {folder / 'outcomes.csv'}")
+            note(f"the simulated outcomes are in {folder / 'outcomes.csv'}")
         raise
 
 
@@ -203,7 +203,7 @@ def _read_hazard(file: Path | None, site: int, years: float, period: float | Non
     if file is None:
         for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
             if is_given:
-                raise InvalidOption("{} is for a curve of {}: give one, or leave it out", name, "hazard")
+                raise InvalidOption("{} requires a curve from {}: add one, or omit it", name, "hazard")
         return None
     curve = HazardCurve.read(file, site=site, period=period)
     for sentence in hazard_notes(curve.intensity, curve.measure):

@@ -64,7 +64,7 @@ def mesh(
     """
     with output.folder() as folder:
         if restitution is not None and azimuth is None:
-            raise InvalidOption("{} is for the blocks of {}: give one, or leave it out", "restitution", "azimuth")
+            raise InvalidOption("{} requires blocks from {}: add one, or omit it", "restitution", "azimuth")
         solid = Solid.from_mesh(
             file,
             density=None if density is None else read_densities(density, "density"),
@@ -94,7 +94,7 @@ def mesh(
 
 
 def _create_block_row(azimuth: float, block: Block) -> dict[str, float]:
-    """Return a table row with a block's pivots and the parameters of both sides, with notes on the block."""
+    """Create a table row with a block's pivots and the parameters of both sides, with notes on the block."""
     for sentence in block_notes(block):
         note(f"azimuth {azimuth:g}: {sentence}")
     plus, minus = block.sides
@@ -114,5 +114,5 @@ def _create_block_row(azimuth: float, block: Block) -> dict[str, float]:
 
 
 def _read_numbers(text: str, name: str) -> Sequence[float]:
-    """Return numbers separated by commas."""
+    """Read numbers separated by commas."""
     return [read_number(part, name) for part in text.split(",")]

@@ -52,12 +52,12 @@ Names = Annotated[
 
 
 def describe_option(text: str) -> Parameter:
-    """Return the help of an option."""
+    """Describe an option in the help."""
     return Parameter(help=text)
 
 
 def describe_signed_option(text: str) -> Parameter:
-    """Return the help of a numeric option whose value may begin with a minus sign."""
+    """Describe a numeric option whose value may begin with a minus sign."""
     return Parameter(help=text, allow_leading_hyphen=True)
 
 
@@ -73,7 +73,7 @@ INTEGER: Final = Parameter(converter=_convert_integer)
 
 @dataclass(frozen=True)
 class InputOptions:
-    """Texts of some inputs."""
+    """Options that are texts of inputs."""
 
     def supplied(self, *names: str) -> dict[str, Any]:
         """Return the texts that were supplied, or the named ones."""
@@ -151,9 +151,7 @@ class EnsembleOptions(RestrainedOptions):
 
     ensemble: Annotated[
         Path | None,
-        describe_option(
-            "In place of a block the ensemble.csv that rocking calibrate writes, with its weights and its model."
-        ),
+        describe_option("File ensemble.csv from rocking calibrate, instead of a block; includes weights and model."),
     ] = None
 
     def blocks(self, model: ModelOptions) -> dict[str, Any]:
@@ -162,7 +160,7 @@ class EnsembleOptions(RestrainedOptions):
             return {"blocks": self.body(), "model": model.model}
         if conflicting := self.block_options():
             raise InvalidBlock(
-                f"{{}} has blocks of its own: leave {bodies.name_all(conflicting)} out", "ensemble", *conflicting
+                f"{{}} replaces the block: omit {bodies.name_all(conflicting)}", "ensemble", *conflicting
             )
         return read_ensemble_arguments(self.ensemble, model)
 
@@ -172,7 +170,7 @@ class EnsembleOptions(RestrainedOptions):
 
 
 def read_ensemble_arguments(file: Path, model: ModelOptions) -> dict[str, Any]:
-    """Return blocks, weights and equation of motion of an ensemble as arguments."""
+    """Read blocks, weights and equation of motion of an ensemble as arguments."""
     from rocking.calibration.tables import read_ensemble
 
     ensemble = read_ensemble(file)
@@ -198,10 +196,10 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
         name, equals, value = (parameter.strip() for parameter in part.partition("="))
         name = name.replace("-", "_")
         if not equals or name in values:
-            sentence = "{} takes NAME=VALUE with commas between, each name once, not "
+            sentence = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
             raise InvalidOption(sentence + literal(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
-            raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
+            raise InvalidOption(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
         values[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
     bodies.check_parameters(kind, values, "{}", option)
     with _naming_option(option):
@@ -275,7 +273,7 @@ class LoadedRecords(NamedTuple):
 
 
 def describe_refusal(name: str, error: RockingError) -> str:
-    """Return why a record cannot be read, for the command line."""
+    """Describe why a record cannot be read, for the command line."""
     reason = error.text(
         lambda argument: write_option_name(argument) if argument in ("channel", "dt", "units") else argument
     )
@@ -313,7 +311,7 @@ class _RecordOptions(FileOptions):
         records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
         if not records and not pulses:
             raise InvalidOption(
-                "give one record or more: files, folders, or names of shipped records (see rocking records), or {}",
+                "at least one record is required: file, folder, or name of a shipped record, or {}",
                 "pulse",
             )
         pulse_motions = self.pulses()
@@ -347,12 +345,12 @@ class IntensityOptions:
     measure: Annotated[
         IntensityName,
         describe_option(
-            "Intensity: PGA, PGV, spectral acceleration, or in the block's own units PGA and p PGV "
-            "over the acceleration that lifts it."
+            "Intensity: PGA, PGV, spectral acceleration, or PGA and p PGV divided by the uplift acceleration of the "
+            "block."
         ),
     ] = "pga"
     period: Annotated[float | None, describe_option("Period of the spectral acceleration, s.")] = None
-    damping: Annotated[float, describe_option("Its fraction of critical damping.")] = 0.05
+    damping: Annotated[float, describe_option("Fraction of critical damping of the spectral acceleration.")] = 0.05
 
     @property
     def intensity_measure(self) -> Measure:
@@ -416,48 +414,48 @@ class StartOptions(InputOptions):
 
 
 def parse_labels(clusters: str | None) -> str | list[str] | None:
-    """Return the labels of an option that groups motions."""
+    """Parse the labels of an option that groups motions."""
     from rocking.analysis.levels import BY_STATION
 
     return clusters if clusters in (None, BY_STATION) else [label.strip() for label in clusters.split(",")]
 
 
 def read_positive_acceleration(text: str, name: str) -> float:
-    """Return a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
+    """Read a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
     if not read_acceleration(text, name) > 0.0:
         raise InvalidOption(
-            f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
+            f"{{}} must be positive; got {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
         )
     return read_noted_acceleration(text, name)
 
 
 def _read_ratio(text: str, name: str) -> float:
-    """Return a level of a measure in the units of the block."""
+    """Read a level of a measure in the units of the block."""
     try:
         return read_number(text, name)
     except InvalidOption:
-        sentence = "{} takes plain numbers with this {}, which counts in the block's own units, not "
+        sentence = "{} must be plain numbers with this {}, which is in units of the block; got "
         raise InvalidOption(sentence + repr(text.strip()), name, "measure") from None
 
 
 def parse_limit_states(text: str) -> dict[str, float]:
-    """Return limit states by name: overturning, or rotations divided by the slenderness, as half=0.5."""
+    """Parse limit states by name: overturning, or rotations divided by the slenderness, as half=0.5."""
     limits = {}
     for part in text.split(","):
         name, equals, value = part.strip().partition("=")
         if not equals and name != "overturning":
             raise InvalidOption(
-                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}",
+                f"{{}} must be overturning or NAME=ROTATION divided by slenderness; got {part.strip()!r}",
                 "limit_states",
                 value=text,
             )
         if name in limits or (equals and name in ("", "overturning")):
-            fault = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
+            fault = f"contains {name} twice" if name in limits else f"must not name a rotation {name!r}"
             raise InvalidOption(f"{{}} {fault}; name each limit state once, as half=0.5", "limit_states")
         try:
             limits[name] = read_number(value, "limit_states") if equals else math.inf
         except InvalidOption:
             raise InvalidOption(
-                f"{{}} {name} takes a number, not {value.strip()!r}", "limit_states", value=text
+                f"{{}} {name} must be a number; got {value.strip()!r}", "limit_states", value=text
             ) from None
     return limits

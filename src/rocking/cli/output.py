@@ -29,7 +29,7 @@ OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))
 class QuietOptions:
     """Options of every command."""
 
-    quiet: Annotated[bool, Parameter(name="--quiet", negative="", help="No notes on stderr.")] = False
+    quiet: Annotated[bool, Parameter(name="--quiet", negative="", help="Suppress notes on stderr.")] = False
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,6 @@ def subfolder(folder: Path, name: str) -> Path:
 
 
 def _read_modification_times(folder: Path) -> dict[str, int]:
-    """Return the modification times, ns, of the files below a folder."""
+    """Read the modification times, ns, of the files below a folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
     return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}

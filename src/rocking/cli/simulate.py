@@ -59,11 +59,11 @@ class _ResponseOptions(StartOptions):
     """Start and end of a simulation, and optional results."""
 
     friction: Annotated[
-        float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
+        float | None, Parameter(help="Coefficient of friction, to report whether and when the block would slide.")
     ] = None
     precision: Annotated[
         float,
-        Parameter(help="Relative precision of the record: the outcome is also counted in 11 motions within it."),
+        Parameter(help="Relative precision of the record; 11 motions within it are also simulated."),
     ] = PRECISION
 
 
@@ -99,7 +99,7 @@ def simulate(
     body = block.body()
     options: dict[str, Any] = {**model.arguments(), **start.read_values()}
     for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
-        raise InvalidOption("{} writes files; name the folder for them with {}", name, "out")
+        raise InvalidOption("{} writes files; set their folder with {}", name, "out")
     with output.folder() as folder:
         loaded = motion.read_all(names)
         if loaded.is_single:
@@ -111,7 +111,7 @@ def simulate(
             )
         else:
             if energy and not each:
-                raise InvalidOption("{} draws single responses; of several records give {}, too", "energy", "each")
+                raise InvalidOption("{} draws single responses; with several records also use {}", "energy", "each")
             results = replace(survey(body, loaded.motions, **summary_options, **options), skipped=loaded.skipped)
             if folder is not None:
                 results.to_csv(folder / "summary.csv")
@@ -129,7 +129,7 @@ def simulate(
 def _write_response(
     response: Response, record: str, summary_options: dict[str, Any], folder: Path | None, energy: bool
 ) -> dict[str, Any]:
-    """Return the result, and write it with figures, histories and events into a folder, if any."""
+    """Write the result, figures, histories and events into a folder, if any, and return the result."""
     result = response.to_dict(**summary_options)
     # The record also names the motion, as in tables of several records.
     result |= {"motion": {"record": record, **result["motion"]}}
@@ -241,7 +241,7 @@ def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
 
 
 def _format_parameters(family: PulseFamily, parameters: Mapping[str, Any]) -> str:
-    """Return the parameters of a pulse with units and defaults."""
+    """Format the parameters of a pulse with units and defaults."""
     units = {name: f" ({family.unit(name)})" if family.unit(name) else "" for name in parameters}
     defaults = {
         name: "" if value is None else f" = {value:g}" if isinstance(value, float) else f" = {value}"

@@ -1,4 +1,4 @@
-"""`rocking study`: long runs of simulations, from a text file to results."""
+"""`rocking study`: long runs of simulations, from a study file to results."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT] = QuietOptions())
         TOML file to write. An existing file is not replaced.
     """
     if file.exists():
-        raise OutputError("the file is there already: choose another name, or remove it first", path=str(file))
+        raise OutputError("the file already exists; choose another name, or remove it first", path=str(file))
     write_text(file, TEMPLATE)
     print(f"written to {file}; edit it, then: rocking study run {file}")
 
@@ -101,7 +101,7 @@ def run(
         Fixed share of the units to compute, as 3/10. Shares may run at the same time, as an array of jobs.
     """
     if into is not None and not folder.endswith(".toml"):
-        raise InvalidOption(f"{into} is for a study from a TOML file, which {folder} is not; name one place only")
+        raise InvalidOption(f"{into} is only allowed with a TOML file, which {folder} is not; pass one folder only")
     is_file = folder.endswith(".toml")
     opened = _create_study(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
     with set_options(threads=threads):

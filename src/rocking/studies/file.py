@@ -154,11 +154,11 @@ def _check_tables(tables: Tables) -> None:
 
 
 def _read_bodies(tables: Tables) -> Bodies:
-    """Return the bodies of all combinations in [blocks], or of its table."""
+    """Read the bodies of all combinations in [blocks], or of its CSV table."""
     entries = tables.table("blocks")
     if "csv" in entries:
         if len(entries) > 1:
-            raise tables.create_error("blocks", "csv", "{} goes without other keys", "csv")
+            raise tables.create_error("blocks", "csv", "{} cannot be combined with other keys", "csv")
         return _read_blocks_csv(tables, tables.file.parent / entries["csv"])
     with tables.locating_errors("blocks"):
         find_shape(entries)
@@ -225,15 +225,17 @@ def _read_blocks_csv(tables: Tables, file: Path) -> Blocks:
     try:
         rows = read_csv_rows(file.read_text("utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text table in UTF-8; save it as CSV"
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text table in UTF-8; save it as CSV"
         raise tables.create_error("blocks", "csv", f"{file} cannot be read: {reason}") from None
     if len(rows) < 2:
-        raise tables.create_error("blocks", "csv", f"{file} holds no blocks: a heading and a row for each are needed")
+        raise tables.create_error(
+            "blocks", "csv", f"{file} contains no blocks: a heading and a row for each are required"
+        )
     headings, known_names = rows[0][1], [name + suffix for name in BLOCK for suffix in ("", *_SIDE_SUFFIXES)]
     for name in headings:
         suggestion = "" if name in known_names else checks.suggest(name, known_names, "")
         if suggestion or name in _RESTRAINT_KEYS or (name in known_names and headings.count(name) > 1):
-            fault = suggestion or ("it goes under [blocks]" if name in _RESTRAINT_KEYS else "it is there twice")
+            fault = suggestion or ("it belongs under [blocks]" if name in _RESTRAINT_KEYS else "it occurs twice")
             raise tables.create_error("blocks", "csv", f"column {name} of {file} cannot be read; {fault}")
     blocks = []
     for line, row in rows[1:]:
@@ -262,7 +264,7 @@ def _read_scales(tables: Tables) -> Scales:
         raise tables.create_error("scales", measures[0], sentence, *measures)
     options = {option: entries[option] for option in ("period", "damping") if option in entries}
     for option in () if "sa" in entries else options:
-        raise tables.create_error("scales", option, "{} goes with {}, and only with it", option, "sa")
+        raise tables.create_error("scales", option, "{} is only allowed with {}", option, "sa")
     if not measures:
         return Scales.from_levels(None, FACTOR)
     (name,) = measures
@@ -273,14 +275,14 @@ def _read_scales(tables: Tables) -> Scales:
 
 
 def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
-    """Return the motions, their records, and a sentence for each skipped record."""
+    """Load the motions; return them, their records, and a sentence for each skipped record."""
     entries, folder = tables.table("motions"), tables.file.parent
     if "vertical" in entries and not entries.get("records"):
-        raise tables.create_error("motions", "vertical", "{} is that of the records, and there are none", "vertical")
+        raise tables.create_error("motions", "vertical", "{} applies to records, and there are none", "vertical")
     names_by_path: dict[str, str] = {}  # names in the file by path or record name
     for name in entries.get("records", []):
         with tables.locating_record_errors(name):
-            names_by_path |= dict.fromkeys(_find_records(folder, name), name)
+            names_by_path |= dict.fromkeys(_match_records(folder, name), name)
     motions, names, skipped = [], [], []
     for path, name in names_by_path.items():
         try:
@@ -298,7 +300,7 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
     for k in range(len(entries.get("pulses", []))):
         motions += _create_pulses(tables, k)
     if not motions:
-        raise tables.create_error("motions", None, "[motions] holds no motion that can be read: name records or pulses")
+        raise tables.create_error("motions", None, "[motions] contains no readable motion: add records or pulses")
     return motions, names + [""] * (len(motions) - len(names)), skipped
 
 
@@ -316,8 +318,8 @@ def _load_record(tables: Tables, path: str, *, several: bool) -> Motion:
     return motion
 
 
-def _find_records(folder: Path, name: str) -> list[str]:
-    """Return the matching files beside the study file, or a shipped record."""
+def _match_records(folder: Path, name: str) -> list[str]:
+    """Find the files that match a name relative to the study file, or a shipped record."""
     path = str(folder / name)
     if glob.has_magic(name) and not path_exists(path):
         return expand_record_names([str(Path(glob.escape(str(folder))) / name)])

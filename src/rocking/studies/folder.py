@@ -58,7 +58,7 @@ class Store:
         self.folder = check_folder(path)
         data = read_bytes(self.folder / _INPUTS)
         if data is None:
-            raise StudyError("there is no study here: create it first", path=str(path))
+            raise StudyError("the folder contains no study: create it first", path=str(path))
         archive = unseal(data)
         if archive is None:
             raise StudyError(
@@ -68,7 +68,7 @@ class Store:
             self.inputs: dict[str, NDArray[Any]] = dict(arrays)
         header = json.loads(str(self.inputs.pop("about")))
         if header["format"] != _FORMAT:
-            raise StudyError(f"the study is of format {header['format']}, this program reads {_FORMAT}", path=str(path))
+            raise StudyError(f"the study has format {header['format']}; this program reads {_FORMAT}", path=str(path))
         self.program: str = header["program"]
         #: Record name of each motion, empty for a pulse; an empty sequence if unknown.
         self.records: tuple[str, ...] = tuple(header["records"])
@@ -91,8 +91,8 @@ class Store:
         """Raise a StudyError unless this program computes the same bits as the store."""
         if self.program != identify_program():
             raise StudyError(
-                f"the study was made by {self.program}, this is {identify_program()}: run it with that version, or create it "
-                "again elsewhere",
+                f"the study was created by {self.program}, this is {identify_program()}: run it with that version, or "
+                "create it again elsewhere",
                 path=str(self.folder),
             )
 
@@ -110,8 +110,8 @@ class Store:
             parts = [*dict.fromkeys(changed)]
             summary = ", ".join(parts[:3]) + (" and more" if len(parts) > 3 else "")
             raise StudyError(
-                f"this holds a study of other inputs ({summary} changed), {len(self.find_done())} of "
-                f"{format_count(len(self.grid), 'unit')} done: create this one elsewhere, or remove that one",
+                f"the folder contains a study of other inputs ({summary} changed), {len(self.find_done())} of "
+                f"{format_count(len(self.grid), 'unit')} done: create this study elsewhere, or remove the other one",
                 path=str(self.folder),
             )
 
@@ -146,7 +146,7 @@ class Store:
         return dict(zip(OUTCOMES, values, strict=True))
 
     def create_input(self, key: Key) -> UnitInput:
-        """Return the complete input of a worker for a unit."""
+        """Create the complete input of a worker for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
         return UnitInput(setup_of(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
@@ -159,16 +159,16 @@ class Store:
 
 
 def check_folder(path: str | Path) -> Path:
-    """Return the folder of a study, which may not exist yet."""
+    """Check the path of a study's folder, which may not exist yet."""
     folder = checks.path(path, "the folder of a study", StudyError)
     if "://" in str(path) or folder.is_file():
         kind = "a file" if folder.is_file() else "a URL"
-        raise StudyError(f"this is {kind}, and a study is kept in a folder: name a folder", path=str(path))
+        raise StudyError(f"a study is stored in a folder, but this is {kind}: choose a folder", path=str(path))
     return folder
 
 
 def contains_study(path: str | Path) -> bool:
-    """Whether a folder contains a study."""
+    """Return whether a folder contains a study."""
     return (check_folder(path) / _INPUTS).exists()
 
 
@@ -178,7 +178,7 @@ def require_empty(path: str | Path) -> None:
     names = sorted({entry.name for entry in folder.glob("[!.]*")} - {"lock"})
     if names:
         summary = ", ".join(names[:3]) + (" and more" if len(names) > 3 else "")
-        raise StudyError(f"this holds no study, but {summary}: name a new folder, or an empty one", path=str(folder))
+        raise StudyError(f"the folder contains no study, but {summary}: choose a new or empty folder", path=str(folder))
 
 
 def read_bytes(file: Path) -> bytes | None:
@@ -220,7 +220,7 @@ def lock_folder(path: str | Path, *, shared: bool = False) -> Iterator[None]:
                 file.seek(1)
                 holder = file.read().decode(errors="replace") or "another process"
                 raise StudyError(
-                    f"the study is being run by {holder}; wait for it, or end it there and run it again",
+                    f"the study is being run by {holder}; wait until it ends, or stop it there and run it again",
                     path=str(folder),
                 ) from None
             file.truncate(0)
@@ -240,7 +240,7 @@ def _convert_errors(operation: str, file: Path) -> Iterator[None]:
 
 
 def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
-    """Return all inputs as arrays by part and name."""
+    """Convert all inputs to arrays by part and name."""
     bodies, scales = product.bodies, product.scales
     arrays = {f"{bodies.kind}/{name}": values for name, (values, _) in bodies.parameters().items()}
     arrays[f"{bodies.kind}/gravity"] = np.array(bodies.gravity)
@@ -259,10 +259,10 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
 
 
 def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
-    """Return the inputs from their arrays."""
+    """Create the inputs from their arrays."""
     kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in KINDS), "")
     if not kind:
-        raise StudyError("the bodies of this study are of a kind that is not known here: import its module first")
+        raise StudyError("the study contains an unknown kind of body: import its module first")
     values = {name.partition("/")[2]: array for name, array in arrays.items() if name.startswith(f"{kind}/")}
     motions = dict.fromkeys(name.split("/")[1] for name in arrays if name.startswith("motions/"))
     texts = {name: json.loads(str(array)) for name, array in arrays.items() if array.dtype.kind == "U"}

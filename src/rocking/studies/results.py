@@ -126,7 +126,9 @@ def _read_selection(store: Store, names: Sequence[str], complete: bool, key: _Se
             for values, name in zip(selection, names, strict=True):
                 values[np.ix_(*targets)] = outcomes[name][np.ix_(*sources)]
         elif complete:
-            raise StudyError(f"unit {format_key(unit)} is gone since these results were opened: run the study again")
+            raise StudyError(
+                f"unit {format_key(unit)} was removed after these results were opened: run the study again"
+            )
     single = tuple(position for position, axis in enumerate(axes) if axis.ndim == 0)
     return [values.squeeze(axis=single) for values in selection]
 
@@ -164,7 +166,7 @@ def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise InvalidOption(f"Parquet needs pyarrow: {install('parquet')}, or write CSV or NetCDF") from None
+        raise InvalidOption(f"Parquet requires pyarrow: {install('parquet')}, or write CSV or NetCDF") from None
     tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
     first = next(tables)
     with parquet.ParquetWriter(target, first.schema) as file:
@@ -179,7 +181,7 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     checks.choice(outcome, "outcome", InvalidOption, get_args(StudyOutcome))
     product, levels = store.product, store.product.scales.values
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
-        raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
+        raise InvalidOption("critical scales require at least two scales, in increasing order")
     store.require_complete()
     names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
     holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
@@ -242,7 +244,7 @@ def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
         if stopped.any():
             raise StudyError(
                 f"{np.count_nonzero(stopped)} of {stopped.size} simulations were stopped by the study's duration, "
-                "while the block moved or the motion went on, so that their outcomes are not known: make the study "
+                "while the block moved or the motion went on, so that their outcomes are unknown: create the study "
                 "without a duration"
             )
         alpha = slenderness_of(store.product.bodies.select(blocks))
@@ -250,7 +252,7 @@ def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
 
 
 def _mark_repeated(bodies: Bodies, polarities: int) -> Flags:
-    """Whether a polarity repeats the first one by symmetry, shape (polarities, bodies)."""
+    """Mark polarities that repeat the first by symmetry, shape (polarities, bodies)."""
     repeated = np.zeros((polarities, len(bodies)), bool)
     if polarities > 1:
         repeated[1] = [bodies.select(slice(k, k + 1)).is_symmetric for k in range(len(bodies))]
@@ -331,26 +333,26 @@ class BlockTable(DatasetResult):
 
 
 def _parse_measure(attributes: Mapping[str, Any]) -> Measure:
-    """Return the measure that attributes describe."""
+    """Create the measure from the attributes of a variable."""
     return Measure(
         attributes["measure"], **{name: attributes[name] for name in ("period", "damping") if name in attributes}
     )
 
 
 def check_fractiles(fractiles: Sequence[float]) -> Floats:
-    """Return shares between 0 and 1, one or more."""
+    """Check that fractiles are between 0 and 1, and return them as an array."""
     shares = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
     if not shares.size:
-        raise InvalidOption("{} must hold a share of the motions or more, as [0.16, 0.5, 0.84]", "fractiles")
+        raise InvalidOption("{} must contain at least one share of the motions, as [0.16, 0.5, 0.84]", "fractiles")
     for value in shares:
         if not 0.0 < value < 1.0:
-            sentence = f"each of {{}} must be a number between 0 and 1, not {value:g}"
+            sentence = f"each of {{}} must be between 0 and 1; got {value:g}"
             raise InvalidOption(sentence, "fractiles", value=value)
     return shares
 
 
 def _check_limit_states(limit_states: Mapping[str, float] | None, confidence: float) -> Mapping[str, float]:
-    """Return limits by limit state. Check the arguments of curves before outcomes are read."""
+    """Check the arguments of curves before outcomes are read, and return limits by limit state."""
     checks.fraction(confidence, "confidence", InvalidOption)
     limits = checked_limit_states(limit_states)
     for name, limit in limits.items():
@@ -448,7 +450,7 @@ def fit_pooled_fragility(
 
 #: Stored results of the curve of each block.
 _CURVE_VARIABLES: Final[Mapping[str, str]] = {
-    "median": "intensity that half of the outcomes exceed the limit at",
+    "median": "intensity at which half of the outcomes exceed the limit",
     "median_lower": "lower end of its confidence interval",
     "median_upper": "upper end of its confidence interval",
     "dispersion": "standard deviation of the logarithm of the intensity",
@@ -490,7 +492,7 @@ def fit_block_fragilities(
                     numbers = [np.nan] * 6
                     try:
                         if not has_trials.any():
-                            raise Unfitted("every simulation was given up")
+                            raise Unfitted("every simulation was abandoned")
                         curve = fit(*data, trials=trials[has_trials], clusters=labels[has_trials]).curves[0]
                         numbers = [curve.median, *curve.median_interval, curve.dispersion, *curve.dispersion_interval]
                     except Unfitted as error:  # identical or separated outcomes have no lognormal fit
@@ -501,9 +503,7 @@ def fit_block_fragilities(
                     bar.advance()
     dims, unfitted_count, missing_note = ("limit_state", "block"), np.count_nonzero(faults != ""), missing_text(missing)
     text = f"fragility of {format_count(len(bodies), 'block')}; intensity: {measure.quantity}"
-    text += (
-        f"; {format_count(int(unfitted_count), 'curve')} cannot be fitted (fault says why)" if unfitted_count else ""
-    )
+    text += f"; {format_count(int(unfitted_count), 'curve')} cannot be fitted (see fault)" if unfitted_count else ""
     attributes = {"confidence": confidence, "model": product.model, "measure": measure.name, **measure.options()}
     return BlockTable(
         xr.Dataset(
@@ -513,7 +513,7 @@ def fit_block_fragilities(
                 )
                 for name, values in estimates.items()
             }
-            | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
+            | {"fault": variable(dims, faults.astype(str), "reason why there is no curve")},
             {"limit_state": list(limits), **body_coordinates(bodies)},
             {"description": text + f"; {missing_note}" * bool(missing_note), **attributes},
         )
@@ -521,7 +521,7 @@ def fit_block_fragilities(
 
 
 def _compute_intensities(product: Product, measure: Measure) -> Floats:
-    """Return the intensity of every motion at every scale, shape (motions, scales)."""
+    """Compute the intensity of every motion at every scale, shape (motions, scales)."""
     scales = product.scales
     values = values_of(product.motions, measure)
     if scales.measure == measure.alone:

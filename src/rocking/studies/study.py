@@ -47,7 +47,7 @@ from rocking.studies.results import (
     open_results,
     write_table,
 )
-from rocking.studies.units import Key, UnitInput, choose_unit, compute_unit, format_key
+from rocking.studies.units import Key, UnitInput, choose_unit_shape, compute_unit, format_key
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,11 +106,11 @@ class RunReport:
         text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
         if self.failed:
             text += f"; {format_count(len(self.failed), 'unit')} failed, the first: {next(iter(self.failed.values()))}"
-        return text + ("; stopped, go on with another run" if self.stopped else "")
+        return text + ("; stopped, run again to continue" if self.stopped else "")
 
 
 class Study:
-    """Simulations of blocks, motions, scales and polarities, stored in a folder; from `rocking.study`.
+    """Simulations of blocks, motions, scales and polarities, stored in a folder; created by `rocking.create_study`.
 
     Parameters
     ----------
@@ -119,14 +119,14 @@ class Study:
 
     Attributes
     ----------
-    place : str
+    folder : str
         Folder of the study.
     product : Product
         Inputs of the simulations.
 
     See Also
     --------
-    study : Create or open a study.
+    create_study : Create or open a study.
     simulate_many : Simulate in memory.
 
     Examples
@@ -227,7 +227,7 @@ class Study:
                 try:
                     store.read_outcomes(key)
                     if k in recomputed and compute_unit(store.create_input(key)) != read_bytes(store.unit_path(key)):
-                        faults[key] = f"unit {format_key(key)} is not what this program computes"
+                        faults[key] = f"unit {format_key(key)} differs from the result of this program"
                 except StudyError as error:
                     faults[key] = error.text()
                 bar.advance()
@@ -417,15 +417,15 @@ def open_or_create(
     """Create the study of a product, or open it and check its inputs."""
     if not contains_study(folder):
         require_empty(folder)  # before the pilot and the lock file
-        unit = choose_unit(product, unit_blocks)
+        unit = choose_unit_shape(product, unit_blocks)
         with lock_folder(folder):
             if not contains_study(folder):  # another process may have created it meanwhile
                 Store.create(folder, product, unit, records)
     opened = Study(folder)
     opened._store.check_inputs(product)
     width, count = opened._store.grid.unit[3], len(product.bodies)
-    if unit_blocks is not None and min(choose_unit(product, unit_blocks)[3], count) != min(width, count):
-        raise InvalidOption(f"the study is there already, in units of {width} blocks: leave {{}} out", "unit_blocks")
+    if unit_blocks is not None and min(choose_unit_shape(product, unit_blocks)[3], count) != min(width, count):
+        raise InvalidOption(f"the study already exists, in units of {width} blocks: omit {{}}", "unit_blocks")
     return opened
 
 
@@ -536,4 +536,4 @@ def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[
 
 
 def _create_worker_error(reason: object) -> StudyError:
-    return StudyError(f"the workers are gone: {reason}; what was computed is kept, run the study again")
+    return StudyError(f"the workers are gone: {reason}; computed units are stored, run the study again")

@@ -34,7 +34,7 @@ _GROUP_SIZE: Final = 512
 #: Maximum number of simulations in a unit.
 _MAX_SIMULATIONS: Final = 1 << 18
 
-#: Packing saves three quarters of the bytes, and takes half a microsecond for each simulation.
+#: Compression saves three quarters of the bytes and costs half a microsecond per simulation.
 _COMPRESSION_LEVEL: Final = 1
 
 #: Bytes of the hash at the end of a file.
@@ -45,12 +45,12 @@ Key = tuple[int, ...]
 
 
 def seal(data: bytes) -> bytes:
-    """Return data with their hash."""
+    """Append a hash to data."""
     return data + hashlib.sha256(data).digest()
 
 
 def unseal(data: bytes) -> bytes | None:
-    """Return the data of `sealed`; None if any bit has changed."""
+    """Remove the hash of `seal` from data; return None if any bit has changed."""
     return data[:-_HASH_SIZE] if seal(data[:-_HASH_SIZE]) == data else None
 
 
@@ -63,7 +63,7 @@ class UnitGrid:
 
     @functools.cached_property
     def cells(self) -> tuple[int, ...]:
-        """Return the number of units along each axis."""
+        """Number of units along each axis."""
         return tuple(math.ceil(size / part) for size, part in zip(self.shape, self.unit, strict=True))
 
     def __len__(self) -> int:
@@ -88,8 +88,8 @@ def format_key(key: Key) -> str:
     return "unit." + ".".join(map(str, key))
 
 
-def choose_unit(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
-    """Return the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
+def choose_unit_shape(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
+    """Choose the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
     if unit_blocks is not None:
         width = checks.integer(unit_blocks, "unit_blocks", InvalidOption, minimum=_GROUP_SIZE)
         if width % _GROUP_SIZE:
@@ -118,7 +118,7 @@ def choose_unit(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
 
 @functools.cache
 def identify_program() -> str:
-    """Return an identifier shared by programs that compute the same bits."""
+    """Return the identifier of programs that compute the same bits."""
     return f"rocking {VERSION} (kernels {fingerprint()})"
 
 
@@ -134,10 +134,10 @@ class UnitInput:
 
 
 def compute_unit(unit_input: UnitInput, cancelled: threading.Event | None = None) -> bytes:
-    """Return the bytes of a unit, unless `cancelled`; raise a StudyError if the program differs."""
+    """Compute the bytes of a unit, unless `cancelled`; raise a StudyError if the program differs."""
     if unit_input.program != identify_program():
         raise StudyError(
-            f"the worker on {socket.gethostname()} has {identify_program()}, the study needs {unit_input.program}"
+            f"the worker on {socket.gethostname()} has {identify_program()}, the study requires {unit_input.program}"
         )
     # NaN where the unit contains fewer simulations than a full one
     values = np.full((len(OUTCOMES), *unit_input.unit), np.nan)
@@ -151,6 +151,6 @@ def compute_unit(unit_input: UnitInput, cancelled: threading.Event | None = None
 
 
 def decode(data: bytes, unit: tuple[int, ...]) -> Floats | None:
-    """Return the outcomes of a full unit, shape (outcomes, *unit); None if any bit has changed."""
+    """Decode the outcomes of a full unit, shape (outcomes, *unit); return None if any bit has changed."""
     packed = unseal(data)
     return None if packed is None else np.frombuffer(zlib.decompress(packed), "<f8").reshape(len(OUTCOMES), *unit)
