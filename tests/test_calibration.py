@@ -218,14 +218,14 @@ def test_one_unknown_angle_is_found_from_forty_tests(coarse):
     ("change", "word"),
     [
         ({"overturned": [True, False]}, "each of the 3 motions"),
-        ({"overturned": [1, 1, 1]}, "all the same"),
+        ({"overturned": [1, 1, 1]}, "all outcomes are equal"),
         ({"overturned": [0, 2, 1]}, "True or False"),
         ({"overturned": ["no", "yes", "no"]}, "True or False"),
         ({"outlier_probability": 0.0}, "outlier_probability"),
         ({"outlier_probability": 0.5}, "outlier_probability"),
         ({"candidates": 10}, "candidates"),
         ({"p": (2.0, 1.0)}, "p must be"),
-        ({"p": 2.0, "alpha": 0.2, "restitution": 0.9}, "everything is known"),
+        ({"p": 2.0, "alpha": 0.2, "restitution": 0.9}, "all parameters are known"),
         ({"restitution": "hausner"}, "'housner'"),
         ({"p": "housner"}, "p must be a value or a pair"),
         ({"alpha": (0.1, 1.0), "restitution": "housner"}, "below 0.9553"),
@@ -617,13 +617,13 @@ def test_correlated_noise_widens_the_errors(coarse, sure, known):
         ({"rotation": np.full(len(TIMES), math.nan)}, "finite"),
         ({"rotation": np.zeros(len(TIMES))}, "zero throughout"),
         ({"rotation": np.full(len(TIMES), 10.0)}, "rad"),
-        ({"rotation": np.roll(released(), 1) * (TIMES > 0.0)}, "give initial_rotation"),
+        ({"rotation": np.roll(released(), 1) * (TIMES > 0.0)}, "set initial_rotation"),
         ({"rotation": ["a"] * len(TIMES)}, "numbers"),
         ({"times": TIMES[:6], "rotation": released()[:6]}, "6 samples"),
         pytest.param(
             {"times": TIMES[:30], "rotation": released()[:30]}, "does not determine restitution", marks=pytest.mark.slow
         ),
-        ({"p": 2.5, "alpha": 0.2, "restitution": 0.9, "initial_rotation": 0.1}, "everything is known"),
+        ({"p": 2.5, "alpha": 0.2, "restitution": 0.9, "initial_rotation": 0.1}, "all parameters are known"),
         ({"model": "cubic"}, "model"),
     ],
 )
@@ -642,7 +642,7 @@ def test_an_ensemble_is_read_as_it_was_written(found, tmp_path):
         assert getattr(read.blocks, name) == pytest.approx(getattr(found.blocks, name), rel=1e-9)
     text = (tmp_path / "ensemble.csv").read_text()
     for damaged, said in (
-        (text.replace("weight", "wait", 1), "line 1: no ensemble"),
+        (text.replace("weight", "wait", 1), "line 1: not the ensemble.csv"),
         (text.replace("linear", "cubic", 1), "line 2: 'cubic' is not linear or nonlinear"),
         (text.replace("linear", "nonlinear", 1), "one model"),
     ):
@@ -704,5 +704,5 @@ def test_a_column_that_is_there_twice_is_refused(tmp_path):
     ):
         path = tmp_path / "table.csv"
         path.write_text(text)
-        with pytest.raises(rocking.errors.UnreadableRecord, match="must be there once"):
+        with pytest.raises(rocking.errors.UnreadableRecord, match="must contain either"):
             read_calibration(path, channel=None, dt=None, units=None)

@@ -122,7 +122,7 @@ def test_a_closed_pipe_is_no_traceback(run, monkeypatch):
 @pytest.mark.parametrize("is_small", [True, False])
 def test_a_full_disk_behind_the_output_is_one_sentence(run, monkeypatch, is_small):
     """What is printed is written when it is much (here at once), or else at the end; closing it fails no more."""
-    said = "rocking: the output cannot be written: No space left on device; send it elsewhere\n"
+    said = "rocking: the output cannot be written: No space left on device; redirect it to another disk\n"
     with open("/dev/full", "w", 8192 if is_small else 64) as full, monkeypatch.context() as patched:  # noqa: PTH123
         full.reconfigure(write_through=not is_small)
         patched.setattr(sys, "stdout", full)

@@ -533,7 +533,7 @@ def test_rows_belong_together_by_motion_and_by_group_and_not_without_a_label(tmp
 def test_two_columns_of_one_name_are_refused(heading: str, tmp_path: Path) -> None:
     path = tmp_path / "seen.csv"
     path.write_text(f"{heading}\n0.1,1,0\n0.2,0,1\n")
-    with pytest.raises(rocking.RockingError, match="several times"):
+    with pytest.raises(rocking.RockingError, match="more than once"):
         read_observed(path, Measure("pga"))
     hazard = tmp_path / "hazard.csv"
     hazard.write_text("pga_g,annual_rate,Annual rate\n0.1,1e-2,1e-3\n0.2,1e-3,1e-4\n")

@@ -200,7 +200,7 @@ def test_sigterm_finishes_the_units_in_hand(complete, tmp_path, monkeypatch):
         with rocking.set_options(threads=1):
             report = study.run()
     assert report.stopped and 1 <= report.units == study.status.done <= 3
-    assert "stopped, go on with another run" in str(report)
+    assert "stopped, run again to continue" in str(report)
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     study.run()
     assert digest(tmp_path) == digest(complete)
@@ -418,7 +418,7 @@ def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
     study.run()
     results = study.results()
     (tmp_path / "units" / "unit.0.0.0.0").unlink()
-    with pytest.raises(errors.StudyError, match=r"unit\.0\.0\.0\.0 is gone"):
+    with pytest.raises(errors.StudyError, match=r"unit\.0\.0\.0\.0 was removed"):
         results.load()
 
 

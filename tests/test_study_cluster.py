@@ -159,7 +159,7 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
 
 def test_a_worker_with_another_program_is_told_so(tmp_path):
     work = store_of(made(tmp_path)).create_input((0, 0, 0, 0))
-    with pytest.raises(rocking.errors.StudyError, match=r"has rocking .*, the study needs rocking 9\.9\.9"):
+    with pytest.raises(rocking.errors.StudyError, match=r"has rocking .*, the study requires rocking 9\.9\.9"):
         compute_unit(replace(work, program="rocking 9.9.9 (kernels 0)"))
 
 

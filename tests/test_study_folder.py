@@ -84,9 +84,9 @@ def test_a_lock_goes_with_its_process_and_the_next_run_removes_half_written_file
 
 def test_where_there_is_no_study_none_is_opened(tmp_path: Path) -> None:
     assert not contains_study(tmp_path)
-    with pytest.raises(StudyError, match="there is no study here: create it first"):
+    with pytest.raises(StudyError, match="the folder contains no study: create it first"):
         Store(tmp_path)
-    with pytest.raises(StudyError, match="this is a URL, and a study is kept in a folder"):
+    with pytest.raises(StudyError, match="a study is stored in a folder, but this is a URL"):
         rocking.Study("s3://bucket/museum")
 
 

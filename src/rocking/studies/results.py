@@ -450,7 +450,7 @@ def fit_pooled_fragility(
 
 #: Stored results of the curve of each block.
 _CURVE_VARIABLES: Final[Mapping[str, str]] = {
-    "median": "intensity at which half of the outcomes exceed the limit",
+    "median": "intensity that half of the outcomes exceed the limit at",
     "median_lower": "lower end of its confidence interval",
     "median_upper": "upper end of its confidence interval",
     "dispersion": "standard deviation of the logarithm of the intensity",
@@ -513,7 +513,7 @@ def fit_block_fragilities(
                 )
                 for name, values in estimates.items()
             }
-            | {"fault": variable(dims, faults.astype(str), "reason why there is no curve")},
+            | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
             {"limit_state": list(limits), **body_coordinates(bodies)},
             {"description": text + f"; {missing_note}" * bool(missing_note), **attributes},
         )
