@@ -712,7 +712,7 @@ def validations() -> Iterator[Item]:
         for k, (motion, fell) in enumerate(zip(motions, overturned, strict=True))
     ]
     block = rocking.Block.from_parameters(p=3.2, alpha=0.21, restitution=0.88)
-    options = {"lapse": 0.01, "bins": 4, "simulations": 200, "seed": 3}
+    options = {"outlier_probability": 0.01, "bins": 4, "simulations": 200, "seed": 3}
     yield from of_result(rocking.validate(tests, block, **options, **QUIET))
     yield from of_result(rocking.validate(tests, SUITE_BLOCKS, weights=[1.0, 2.0, 1.0, 1.0], **options, **QUIET))
 

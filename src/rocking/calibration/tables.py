@@ -159,11 +159,7 @@ def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any) -> tu
     for line, row in table.rows:
         scale = table.convert(line, row.get("scale") or "1", _parse_finite, "a number")
         step = row.get("dt_s") or ""
-        cells = (
-            row.get("channel"),
-            table.convert(line, step, float, "a number") if step else None,
-            row.get("units"),
-        )
+        cells = row.get("channel"), table.convert(line, step, float, "a number") if step else None, row.get("units")
         metadata = {
             "channel": cells[0] or channel,
             "dt": dt if cells[1] is None else cells[1],

@@ -133,7 +133,7 @@ class RestrainedOptions(BlockOptions):
         ]
         for name, couple in declared.COUPLES.items():
             if name in texts:
-                with _naming_option(name):
+                with _add_option_to_errors(name):
                     forces.append(couple(INPUTS[name].read(texts[name])))
         try:
             body = bodies.create_body(block, self.read_values("restitution", "one_sided", "lean"), forces)
@@ -178,7 +178,7 @@ def read_ensemble_arguments(file: Path, model: ModelOptions) -> dict[str, Any]:
 
 
 @contextmanager
-def _naming_option(option: str) -> Iterator[None]:
+def _add_option_to_errors(option: str) -> Iterator[None]:
     """Add the option to errors on its parameters, because other options share their names."""
     try:
         yield
@@ -202,7 +202,7 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
             raise InvalidOption(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
         values[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
     bodies.check_parameters(kind, values, "{}", option)
-    with _naming_option(option):
+    with _add_option_to_errors(option):
         return kind(**values)
 
 
