@@ -214,7 +214,7 @@ def test_an_interrupt_that_python_drops_comes_again(dropped):
         "def run(_):\n"
         "    Dropping()\n"
         f"    time.sleep({60.0 if dropped == 'KeyboardInterrupt' else 0.1})\n"
-        "cli._run = run\n"
+        "cli._run_command = run\n"
         "main()\n"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False, timeout=50.0)

@@ -284,7 +284,7 @@ def test_observed_outcomes_go_without_what_is_simulated(run, tmp_path, arguments
     code, out, err = run("fragility", "--outcomes", table, *arguments.split())
     if arguments:
         assert (code, out) == (2, "")
-        assert f"leave {arguments.split()[0]} out" in err
+        assert f"omit {arguments.split()[0]}" in err
     else:
         assert (code, err) == (0, "")
 

@@ -62,7 +62,7 @@ map half-sine --cycles 3 --alpha 0.2 | the pulse half-sine has no cycles; it tak
 ida {R} {S} --measure pgv --levels 0.2g:1g:5 | --levels takes a velocity as 40cm/s or 0.4 (m/s), not '0.2g'
 ida {R} {S} --measure pga_ratio --levels 0.2g,1g | which is in units of the block; got '0.2g'
 fragility {R} --ensemble none.csv --restitution 0.5 | --ensemble replaces the block: omit --restitution
-measures {R} --ensemble none.csv --one-sided --spring 2 | leave --one-sided and --spring out
+measures {R} --ensemble none.csv --one-sided --spring 2 | omit --one-sided and --spring
 fragility {R} {S} --limit-states half=0.5,half=0.7 | contains half twice
 fragility {R} {S} --limit-states overturning=0.5 | must not name a rotation 'overturning'
 fragility {R} {S} --site 2 | --site requires a curve from --hazard
@@ -213,7 +213,7 @@ def test_a_note_is_said_once(run):
 
 
 def test_levels_of_a_velocity_may_have_their_unit(run):
-    code, out, _ = run("ida", RECORD, *SIZES, "--measure", "pgv", "--levels", "20cm/s:40cm/s:3", "--tolerance", "1e-3")
+    code, out, _ = run("ida", RECORD, *SIZES, "--measure", "pgv", "--levels", "20cm/s:40cm/s:3", "--rtol", "1e-3")
     assert code == 0
     assert "looked at: 3 levels, 0.2 to 0.4 m/s" in out
 
@@ -222,7 +222,7 @@ ECCENTRIC = ["--p", "2.9858,3.0053", "--alpha", "0.27417,0.155"]
 
 
 def test_a_map_takes_a_block_as_the_other_commands_do(run):
-    grid = ["--amplitudes", "1,3", "--frequencies", "2", "--tolerance", "1e-2", "--json"]
+    grid = ["--amplitudes", "1,3", "--frequencies", "2", "--rtol", "1e-2", "--json"]
     alone, with_p = (run("map", "one-sine", *p, "--alpha", "0.2", *grid) for p in ([], ["--p", "2.5"]))
     assert (alone[0], with_p[0]) == (0, 0)
     assert json.loads(alone[1]) == json.loads(with_p[1])

@@ -144,7 +144,7 @@ def test_a_calibration_says_of_tests_what_it_predicts(coarse):
     )
     with pytest.raises(InvalidOption, match="a calibration contains its own weights"):
         rocking.validate(tests, calibration, weights=[1.0])
-    with pytest.raises(InvalidOption, match="of 4 tests, and 3 tests are given"):
+    with pytest.raises(InvalidOption, match="of 4 tests; got 3 tests"):
         rocking.validate(tests[:3], validation)
 
 
@@ -152,7 +152,7 @@ def test_a_known_block_is_certain_and_a_lapse_is_not():
     tests = [ShakeTest(STRONG, False), ShakeTest(WEAK, False)]
     found = rocking.validate(tests, BLOCK)
     assert [test.probability for test in found.tests] == [1.0, 0.0] and math.isinf(found.log_loss.value)
-    assert any("a certainty failed" in note for note in found.notes)
+    assert any("a certain prediction failed" in note for note in found.notes)
     assert any("no test overturned" in note for note in found.notes) and math.isnan(found.brier.skill)
     with_outliers = rocking.validate(tests, BLOCK, outlier_probability=0.01)
     assert [test.probability for test in with_outliers.tests] == pytest.approx([0.99, 0.01])

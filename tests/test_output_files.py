@@ -49,7 +49,7 @@ def response() -> rocking.Response:
 
 @pytest.fixture(scope="module")
 def analysis(response: rocking.Response) -> DatasetResult:
-    return rocking.incremental_dynamic_analysis(response.block, response.motion, tolerance=1e-2)
+    return rocking.incremental_dynamic_analysis(response.block, response.motion, rtol=1e-2)
 
 
 def drawn() -> Figure:

@@ -152,7 +152,7 @@ chattering = "certified=1e-9" -> chattering = "slow" | 20 | chattering must be
 ["el-centro-meloland-270"] -> ["el-centro-melolnd-270"] | 7 | did you mean the shipped record el-centro-meloland-270
 ["el-centro-meloland-270"] -> [\n"el-centro-meloland-270",\n"nowhere/*.AT2",\n] | 9 | matches this name
 ["el-centro-meloland-270"] -> "el-centro-meloland-270" | 7 | records must be a list of texts
-records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | of the records, and there
+records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | applies to records, and there
 [motions] -> [motions]\nskip_unreadable = "no" | 7 | must be true or false
 [motions] -> [motions]\nvertical = "9" | 8 | no file or shipped record '9' for the vertical motion
 [blocks] -> [[blocks]] | 1 | must be one table, [blocks], once
@@ -263,8 +263,11 @@ def test_another_study_in_the_same_folder_is_refused(run, file, tmp_path):
     file.write_text(TEXT.replace("factor = [0.5, 1.0]", "factor = [0.5, 1.5]"))
     code, _, err = run("study", "create", file, tmp_path / "kept")
     assert code == 2
-    assert f"{tmp_path / 'kept'}: this holds a study of other inputs (scales/values changed), 0 of 20 units done" in err
-    assert "create this one elsewhere, or remove that one" in err
+    assert (
+        f"{tmp_path / 'kept'}: the folder contains a study of other inputs (scales/values changed), 0 of 20 units done"
+        in err
+    )
+    assert "create this study elsewhere, or remove the other one" in err
 
 
 def test_a_folder_of_other_things_is_no_place_for_a_study(run, file, tmp_path):
@@ -463,7 +466,7 @@ def test_units_of_a_study_that_is_there_are_not_changed_without_a_word(run, file
     for width, code in (("512", 0), ("512", 0), ("1024", 2)):
         found, _, err = run("study", "create", file, tmp_path / "made", "--unit-blocks", width)
         assert found == code
-    assert "in units of 512 blocks: leave --unit-blocks out" in err
+    assert "in units of 512 blocks: omit --unit-blocks" in err
 
 
 @pytest.mark.thorough

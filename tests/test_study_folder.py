@@ -58,7 +58,7 @@ def test_one_process_runs_a_study_or_several_run_parts_of_it(tmp_path: Path, one
                 with lock_folder(tmp_path, shared=other):
                     pass
             else:
-                told = rf"run by process {os.getpid()} on .*; wait for it, or end it there"
+                told = rf"run by process {os.getpid()} on .*; wait until it ends, or stop it there"
                 with pytest.raises(StudyError, match=told), lock_folder(tmp_path, shared=other):
                     pass
 
@@ -91,7 +91,7 @@ def test_where_there_is_no_study_none_is_opened(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "listed"), [(("b", "a"), "but a, b: name"), (("d", "c", "b", "a"), "but a, b, c and more: name")]
+    ("names", "listed"), [(("b", "a"), "but a, b: choose"), (("d", "c", "b", "a"), "but a, b, c and more: choose")]
 )
 def test_a_folder_of_other_files_is_no_place_for_a_study(tmp_path: Path, names: tuple[str, ...], listed: str) -> None:
     require_empty(tmp_path)
