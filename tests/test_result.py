@@ -120,9 +120,7 @@ def test_a_study_leaves_out_what_was_given_up(tmp_path):
 
 @pytest.mark.usefixtures("small_budget")
 def test_a_calibration_takes_what_was_given_up_for_half_overturned():
-    outcomes = simulate_outcomes(
-        rocking.Blocks.from_bodies(TWO), [PULSE.scaled(0.4), PULSE.scaled(2.0)], "nonlinear", None, False
-    )
+    outcomes = simulate_outcomes(rocking.Blocks.from_bodies(TWO), [PULSE.scaled(0.4), PULSE.scaled(2.0)], "nonlinear")
     assert outcomes.tolist() == [[0.0, 1.0], [0.5, 1.0]]
 
 
