@@ -51,7 +51,7 @@ def outcomes(space: Space, truth: np.ndarray, motions: list[rocking.Motion], rng
     """Simulate a population in its tests: each with its own block inside the bounds, and a few lapses."""
     drawn = np.empty((0, truth.shape[1] // 2))
     while len(drawn) < len(motions):
-        points = population.drawn(truth, 1.0, len(motions), rng)
+        points = population.draw_points(truth, 1.0, len(motions), rng)
         drawn = np.concatenate([drawn, points[space.contains(points)]])
     blocks = list(space.blocks(drawn[: len(motions)]))
     tested = zip(blocks, motions, strict=True)
@@ -79,7 +79,7 @@ def drawn(count: int, two_sided: bool) -> Iterator[DataSet]:
     """Draw so many truths, and pass over those whose outcomes are all the same."""
     space = Space.from_bounds(**BOUNDS, two_sided=two_sided)
     rng = np.random.default_rng(two_sided)
-    truths = population.with_dispersions(space, space.quasi_random(count, rng), rng)
+    truths = population.draw_dispersions(space, space.quasi_random(count, rng), rng)
     for seed, truth in enumerate(truths[:, None]):
         motions = tests(rng)
         overturned = outcomes(space, truth, motions, rng)
@@ -99,7 +99,7 @@ def ranks(given: DataSet) -> dict[str, float]:
             two_sided=given.space.two_sided,
             outlier_probability=LAPSE,
         )
-    values = given.space.named(population.unpacked(given.truth)[0])
+    values = given.space.parameters_by_name(population.unpack(given.truth)[0])
     return {name: float(np.mean(found.draws[name] < values[name][0])) for name in found.estimates}
 
 

@@ -95,12 +95,12 @@ def coarsely() -> Callable[[], AbstractContextManager[None]]:
     def shortened() -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(search, "_PROPOSAL", (64, 1))
-            patched.setattr(search, "_COMPARED", (64, 2))
+            patched.setattr(search, "_COMPARISON", (64, 2))
             patched.setattr(search, "_EXPONENTS", (0.1, 1.0))
-            patched.setattr(search, "_MORE", 0)
-            patched.setattr(history, "_CANDIDATES", 256)
+            patched.setattr(search, "_MAX_EXTENSIONS", 0)
+            patched.setattr(history, "_START_COUNT", 256)
             patched.setattr(history, "_STAGES", ((0.15, 6), (0.3, 3), (1.0, 1)))
-            patched.setattr(history, "_AROUND", 16)
+            patched.setattr(history, "_CLOUD_SIZE", 16)
             yield
 
     return shortened

@@ -31,5 +31,5 @@ def store_of(study: rocking.Study) -> Store:
 
 def after_each_unit(monkeypatch: pytest.MonkeyPatch, action: Callable[[], object]) -> None:
     """Do something each time that a unit is stored."""
-    put = folders.put
-    monkeypatch.setattr(RUNS, "put", lambda file, data: (put(file, data), action()))
+    put = folders.write_atomically
+    monkeypatch.setattr(RUNS, "write_atomically", lambda file, data: (put(file, data), action()))

@@ -122,7 +122,7 @@ def test_a_closed_pipe_is_no_traceback(run, monkeypatch):
 @pytest.mark.parametrize("is_small", [True, False])
 def test_a_full_disk_behind_the_output_is_one_sentence(run, monkeypatch, is_small):
     """What is printed is written when it is much (here at once), or else at the end; closing it fails no more."""
-    said = "rocking: the output cannot be written: No space left on device; send it elsewhere\n"
+    said = "rocking: the output cannot be written: No space left on device; redirect it to another disk\n"
     with open("/dev/full", "w", 8192 if is_small else 64) as full, monkeypatch.context() as patched:  # noqa: PTH123
         full.reconfigure(write_through=not is_small)
         patched.setattr(sys, "stdout", full)
@@ -173,7 +173,7 @@ def test_an_interrupt_is_one_sentence_and_closes_what_is_half_done(monkeypatch, 
         for _ in map_in_threads(lambda each: (begun.append(each), time.sleep(0.01)), itertools.count()):
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(cli, "_run", run)
+    monkeypatch.setattr(cli, "_run_command", run)
     with pytest.raises(SystemExit) as ended:
         cli.main([])
     count = len(begun)
@@ -194,7 +194,7 @@ def test_an_error_in_place_of_an_interrupt_is_one(run, monkeypatch, interrupted)
                 raise RuntimeError("release unlocked lock")  # noqa: B904 - as Python itself does
         raise ValueError("of its own")
 
-    monkeypatch.setattr("rocking.cli.command_of", called)
+    monkeypatch.setattr("rocking.cli.find_command", called)
     if interrupted:
         assert run("records") == (130, "", f"{INTERRUPTED}\n")
     else:
@@ -214,7 +214,7 @@ def test_an_interrupt_that_python_drops_comes_again(dropped):
         "def run(_):\n"
         "    Dropping()\n"
         f"    time.sleep({60.0 if dropped == 'KeyboardInterrupt' else 0.1})\n"
-        "cli._run = run\n"
+        "cli._run_command = run\n"
         "main()\n"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False, timeout=50.0)

@@ -229,7 +229,7 @@ def test_calibrate_json_is_the_calibration(run, outcomes_table):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (["--motion", RECORD], "--motion is for a history"),
+        (["--motion", RECORD], "--motion requires a table of a history"),
         (["--predict", "no-such-record"], "no-such-record"),
     ],
 )
@@ -284,7 +284,7 @@ def test_observed_outcomes_go_without_what_is_simulated(run, tmp_path, arguments
     code, out, err = run("fragility", "--outcomes", table, *arguments.split())
     if arguments:
         assert (code, out) == (2, "")
-        assert f"leave {arguments.split()[0]} out" in err
+        assert f"omit {arguments.split()[0]}" in err
     else:
         assert (code, err) == (0, "")
 
@@ -311,9 +311,9 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--scale", "3"], "--scale is for the motions of --motion or --pulse"),
-        (["--vertical", "up"], "--vertical is for the motions"),
-        (["--candidates", "512"], "--candidates is for outcomes"),
+        (["--scale", "3"], "--scale requires motions from --motion or --pulse"),
+        (["--vertical", "up"], "--vertical requires motions"),
+        (["--candidates", "512"], "--candidates requires a table of outcomes"),
     ],
 )
 def test_a_free_history_goes_without_what_is_said_of_motions(run, tmp_path, arguments, said):
@@ -331,6 +331,6 @@ def test_standing_is_about_overturning_in_whatever_order_the_limits_come(run, mo
     for limits in ("overturning,half=0.5", "half=0.5,overturning"):
         code, out, _ = run(*common, "--limit-states", limits)
         assert code == 0 and json.loads(out)["survival"]["limit_state"] == "overturning"
-    monkeypatch.setattr("rocking.cli.fragility.run", None)  # it is refused before anything is simulated
+    monkeypatch.setattr("rocking.cli.fragility.fit_simulated", None)  # it is refused before anything is simulated
     code, _, err = run(*common, "--limit-states", "half=0.5,most=0.8")
-    assert code == 2 and "--standing is about overturning, or about one limit, not half and most" in err
+    assert code == 2 and "--standing requires overturning or a single limit state; got half and most" in err

@@ -20,7 +20,7 @@ PULSE = "one-sine:amplitude=0.4g,frequency=1Hz"
 MISTAKES = """
 simulat | there is no command simulat; did you mean simulate?
 simulate {R} | a block is needed: give --width and --height, or --half-width and --half-height, or --p and --alpha
-simulate {S} | give one record or more
+simulate {S} | at least one record is required
 simulate {R} --width 1 | a block needs more than --width: give --width and --height
 simulate {R} {S} --p 2 | different descriptions
 simulate {R} --alpha 12deg | a block needs more than --alpha: give --p and --alpha; p is sqrt(3 g/(4 R))
@@ -37,7 +37,7 @@ simulate {R} {S} --chattering certified=0 | --chattering "certified=0": toleranc
 simulate {R} {S} --scale 2 --pga 0.5g | --scale and --pga
 simulate {R} {S} --sa 0.4g | 0.4g@1.0
 simulate {R} {S} --pga | --pga needs a value; see rocking simulate --help
-simulate {R} {S} --pga -0.4g | --pga must be above 0, not -0.4g; --scale -1 reverses a motion
+simulate {R} {S} --pga -0.4g | --pga must be positive; got -0.4g; --scale -1 reverses a motion
 simulate {R} {S} --channel 7 | a shipped record is one channel, with its step and units; leave --channel out
 simulate {R} {S} --energy | --energy writes files
 simulate {R} {S} --each | --out
@@ -45,11 +45,11 @@ simulate ridgecrest-clc-91 {S} | did you mean the shipped record ridgecrest-clc-
 simulate {P} --offset 0.1 | needs more than --offset: give --width and --height, or --half-width and --half-height
 simulate {P} {W} --tendon stiffnes=1 | --tendon has no stiffnes; did you mean stiffness?
 simulate {P} {W} --tendon prestress=1 | --tendon needs stiffness
-simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon takes NAME=VALUE with commas between, each name once
+simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon must be NAME=VALUE pairs separated by commas
 simulate {P} {W} --tendon stiffness=-1 | --tendon: stiffness of a tendon must be at least 0 N/m, not -1
-simulate {P} {W} --load mass=1,height=2,follows=maybe | --load takes follows=yes or follows=no, not 'maybe'
+simulate {P} {W} --load mass=1,height=2,follows=maybe | --load must contain follows=yes or follows=no; got 'maybe'
 simulate {P} {W} --lean 40deg | whose --lean is 0.698132 rad falls
-spectrum {R} --p 1 | a spectrum needs --alpha, or the --ensemble of a calibration
+spectrum {R} --p 1 | a spectrum requires --alpha, or the --ensemble of a calibration
 spectrum {R} --alpha 0.2 | one of --p
 spectrum {R} --alpha 0.2 --p 1 --size 1 | give not both of --p (rad/s) and --size (half diagonals, m)
 spectrum --alpha 0.2 --p 2 | record
@@ -60,18 +60,18 @@ map sine | a block is needed
 map sine --alpha 0.2 | the pulse sine needs cycles as well
 map half-sine --cycles 3 --alpha 0.2 | the pulse half-sine has no cycles; it takes amplitude and frequency
 ida {R} {S} --measure pgv --levels 0.2g:1g:5 | --levels takes a velocity as 40cm/s or 0.4 (m/s), not '0.2g'
-ida {R} {S} --measure pga_ratio --levels 0.2g,1g | which counts in the block's own units, not '0.2g'
-fragility {R} --ensemble none.csv --restitution 0.5 | --ensemble has blocks of its own: leave --restitution out
-measures {R} --ensemble none.csv --one-sided --spring 2 | leave --one-sided and --spring out
-fragility {R} {S} --limit-states half=0.5,half=0.7 | has half twice
-fragility {R} {S} --limit-states overturning=0.5 | gives a rotation the name 'overturning'
-fragility {R} {S} --site 2 | --site is for a curve of --hazard
+ida {R} {S} --measure pga_ratio --levels 0.2g,1g | which is in units of the block; got '0.2g'
+fragility {R} --ensemble none.csv --restitution 0.5 | --ensemble replaces the block: omit --restitution
+measures {R} --ensemble none.csv --one-sided --spring 2 | omit --one-sided and --spring
+fragility {R} {S} --limit-states half=0.5,half=0.7 | contains half twice
+fragility {R} {S} --limit-states overturning=0.5 | must not name a rotation 'overturning'
+fragility {R} {S} --site 2 | --site requires a curve from --hazard
 chatter one 2 0.9 | Invalid value for A: unable to convert "one" into float; see rocking chatter --help
 chatter 1.5 2 | rocking chatter needs ETA; see rocking chatter --help
 chatter | rocking chatter needs A; see
 mesh nobody.obj | nobody.obj: there is no such file
 mesh statue --density heavy | --density takes a number, not 'heavy'
-mesh statue --restitution 0.9 | --restitution is for the blocks of --azimuth: give one
+mesh statue --restitution 0.9 | --restitution requires blocks from --azimuth: add one
 explore --port http | --port: http is not a whole number; see rocking explore --help
 pulses sine x | Unused Tokens: ['sine', 'x']; see rocking pulses --help
 --version --verbos | Did you mean --verbose?
@@ -229,7 +229,7 @@ def test_a_map_takes_a_block_as_the_other_commands_do(run):
     sided = run("map", "one-sine", *ECCENTRIC, *grid)
     assert json.loads(sided[1])["restitution"] == pytest.approx([0.950255, 0.913887], abs=1e-6)
     code, _, err = run("map", "one-sine", "--alpha", "0.27417,0.155", *grid)
-    assert code == 2 and "follows from --p and --alpha of both: give --p, too" in err
+    assert code == 2 and "follows from --p and --alpha of both: also set --p" in err
 
 
 @pytest.mark.thorough

@@ -18,7 +18,7 @@ import pytest
 from cyclopts import CycloptsError
 
 import rocking
-from rocking.cli import app, main, refuse_unknown_options
+from rocking.cli import app, main, reject_unknown_options
 from rocking.studies.file import SCHEMA
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -96,7 +96,7 @@ def test_every_command_of_the_pages_is_taken_with_its_options():
         given = shlex.split(line)
         try:
             _, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
-            refuse_unknown_options(bound.args, given)
+            reject_unknown_options(bound.args, given)
         except (CycloptsError, rocking.RockingError) as error:
             pytest.fail(f"{page}: rocking {line}: {error}")
 

@@ -576,7 +576,7 @@ def test_the_command_prints_one_line_and_listens_here_alone():
         (("--address", "0.0.0.0"), "every address"),
         (("--address", "0x0"), "every address"),
         (("--address", "::ffff:0.0.0.0"), "every address"),
-        (("tests",), "this folder holds no study; name one record, and drop the other files on the page"),
+        (("tests",), "this folder contains no study; pass one record, and drop the other files on the page"),
         (("--address", "192.0.2.1"), "cannot be used"),
         (("sine:amplitude=1",), "needs frequency and cycles"),
     ],

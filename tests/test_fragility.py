@@ -612,5 +612,5 @@ def test_labels_of_pandas_that_are_missing_are_on_their_own_and_masked_outcomes_
     masked = np.ma.masked_array(fell, mask=[0, 0, 0, 0, 0, 1])
     with pytest.raises(InvalidOption, match="some are masked"):
         fit_fragility(levels, masked)
-    with pytest.raises(InvalidOption, match="some are masked"):
+    with pytest.raises(InvalidOption, match="must not be masked"):
         rocking.calibrate([rocking.pulses.one_sine(each, 1.0) for each in levels], masked)

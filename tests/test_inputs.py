@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rocking import Block, Blocks, RockingError
-from rocking.cli.options import BlockOptions, HeldOptions, MotionOptions, StartOptions
+from rocking.cli.options import BlockOptions, MotionOptions, RestrainedOptions, StartOptions
 from rocking.explorer.inputs import read_case
 from rocking.explorer.parameters import PARAMETERS
 from rocking.explorer.uploads import UploadStore
@@ -53,7 +53,7 @@ def in_a_study(tmp_path, table):
 def test_a_block_is_the_same_from_a_command_a_page_a_file_and_a_table(tmp_path, texts, block):
     without_mass = {name: text for name, text in texts.items() if name != "mass"}
     assert sides(BlockOptions(**without_mass).block()) == sides(block)
-    body = HeldOptions(**texts).body()
+    body = RestrainedOptions(**texts).body()
     assert (sides(body), body.mass) == (sides(block), block.mass)
     if {*without_mass} <= PARAMETERS.keys():
         case = read_case({**without_mass, "motion": "none", "duration": "1"}, UploadStore())
@@ -85,7 +85,7 @@ def test_a_file_makes_a_block_of_every_combination(tmp_path):
 
 
 def test_every_input_of_a_body_is_an_option_and_a_key_and_every_other_has_an_option():
-    options = {each for kind in (HeldOptions, MotionOptions, StartOptions) for each in kind.__dataclass_fields__}
+    options = {each for kind in (RestrainedOptions, MotionOptions, StartOptions) for each in kind.__dataclass_fields__}
     assert {*BLOCK, *SUPPORTS} <= options & INPUTS.keys()
     keys = {*SCHEMA["blocks"]}
     assert {*BLOCK} <= keys and all(name in keys or f"{name}s" in keys for name in SUPPORTS)

@@ -142,9 +142,9 @@ def test_a_calibration_says_of_tests_what_it_predicts(coarse):
     assert [t.probability for t in rocking.validate(tests, validation).tests] == pytest.approx(
         validation.probabilities.mean(axis=0).tolist()
     )
-    with pytest.raises(InvalidOption, match="a calibration has weights of its own"):
+    with pytest.raises(InvalidOption, match="a calibration contains its own weights"):
         rocking.validate(tests, calibration, weights=[1.0])
-    with pytest.raises(InvalidOption, match="of 4 tests, and 3 tests are given"):
+    with pytest.raises(InvalidOption, match="of 4 tests; got 3 tests"):
         rocking.validate(tests[:3], validation)
 
 
@@ -152,7 +152,7 @@ def test_a_known_block_is_certain_and_a_lapse_is_not():
     tests = [ShakeTest(STRONG, False), ShakeTest(WEAK, False)]
     found = rocking.validate(tests, BLOCK)
     assert [test.probability for test in found.tests] == [1.0, 0.0] and math.isinf(found.log_loss.value)
-    assert any("a certainty failed" in note for note in found.notes)
+    assert any("a certain prediction failed" in note for note in found.notes)
     assert any("no test overturned" in note for note in found.notes) and math.isnan(found.brier.skill)
     with_outliers = rocking.validate(tests, BLOCK, outlier_probability=0.01)
     assert [test.probability for test in with_outliers.tests] == pytest.approx([0.99, 0.01])
@@ -196,8 +196,8 @@ def test_what_is_no_outcome_is_no_test(given, sentence):
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"tests": []}, "tests must hold at least one test"),
-        ({"tests": [STRONG]}, "tests must hold tests"),
+        ({"tests": []}, "tests must contain at least one test"),
+        ({"tests": [STRONG]}, "tests must contain ShakeTest"),
         ({"weights": [1.0, 2.0]}, "weights must be 1 numbers of 0 or more"),
         ({"outlier_probability": 0.7}, "outlier_probability must be a number from 0 to 0.5"),
         ({"simulations": 3}, "simulations must be a whole number of at least 100"),
@@ -244,9 +244,13 @@ def test_a_table_of_tests_is_read_with_its_units_and_labels(tmp_path):
 @pytest.mark.parametrize(
     ("text", "line", "sentence"),
     [
-        ("motion,fell\nx,1", 1, "the columns must be motion and overturned"),
-        ("motion,overturned,specimen\nridgecrest-clc-090,1,a\nridgecrest-clc-090,1,b", 1, "of 2 specimens: give each"),
-        ("motion,overturned,overturned\nx,1,1", 1, "must be there once"),
+        ("motion,fell\nx,1", 1, "the columns must include motion and overturned"),
+        (
+            "motion,overturned,specimen\nridgecrest-clc-090,1,a\nridgecrest-clc-090,1,b",
+            1,
+            "of 2 specimens; use a table for each",
+        ),
+        ("motion,overturned,overturned\nx,1,1", 1, "must be distinct"),
         ("motion,overturned\nno-such-file.txt,1", 2, "no-such-file.txt"),
         ("motion,overturned\n,1", 2, "this is a folder; name one record file"),
         ("motion,overturned\nridgecrest-clc-090,perhaps", 2, "'perhaps' is not 0 or 1"),
@@ -281,5 +285,5 @@ def test_the_command_writes_figure_tables_and_numbers(run, undrawn, tmp_path):
 
 def test_predictions_of_tests_that_were_left_out_take_no_lapse_and_no_weights():
     for name, given in (("outlier_probability", 0.3), ("weights", [1.0, 1.0])):
-        with pytest.raises(InvalidOption, match=f"take no {name}"):
+        with pytest.raises(InvalidOption, match=f"{name} cannot be combined"):
             rocking.validate(of_outcomes([0, 1]), left_out([0.2, 0.3]), **{name: given})

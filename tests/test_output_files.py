@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 import rocking
 from rocking import errors
 from rocking.analysis.survey import create_folder_names, survey
-from rocking.cli.study import FORMATS
+from rocking.cli.study import WRITERS as STUDY_WRITERS
 from rocking.core import tables
 from rocking.core.result import DatasetResult
 from rocking.core.tables import atomic_file, write_figure
@@ -92,7 +92,7 @@ def test_an_export_of_a_study_is_whole_or_not_there(tmp_path, suffix):
     blocks = rocking.Blocks.grid(p=[1.0, 2.0, 3.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     study = rocking.create_study(tmp_path / "study", blocks, rocking.pulses.one_sine(4.0, 1.0), levels=[0.4, 1.0])
     study.run()
-    target, write = tmp_path / f"results{suffix}", FORMATS[suffix]
+    target, write = tmp_path / f"results{suffix}", STUDY_WRITERS[suffix]
     with full_disk(700), pytest.raises(errors.OutputError, match="cannot be written"):
         write(study, target)
     assert {file.name for file in tmp_path.iterdir()} == {"study"}

@@ -126,12 +126,12 @@ def test_a_study_is_kept_where_folders_cannot_be_flushed(monkeypatch: pytest.Mon
 
     # Folders cannot be opened.
     monkeypatch.setattr(folder, "os", _Windows(name="nt", open=refuse))
-    folder.put(tmp_path / "units" / "1", b"outcomes")
+    folder.write_atomically(tmp_path / "units" / "1", b"outcomes")
     assert (tmp_path / "units" / "1").read_bytes() == b"outcomes"
 
 
 def test_who_holds_a_lock_is_read_without_its_first_byte(tmp_path: Path) -> None:
-    with folder.locked(tmp_path):
+    with folder.lock_folder(tmp_path):
         held = (tmp_path / "lock").read_bytes()
         assert held[:1] == b" "
         assert held[1:].decode().startswith(f"process {os.getpid()} on ")

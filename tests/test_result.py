@@ -13,7 +13,7 @@ from public_names import public_names
 
 import rocking
 from rocking import dynamics, errors
-from rocking.calibration.outcomes import overturned_under
+from rocking.calibration.outcomes import simulate_outcomes
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult
@@ -120,7 +120,7 @@ def test_a_study_leaves_out_what_was_given_up(tmp_path):
 
 @pytest.mark.usefixtures("small_budget")
 def test_a_calibration_takes_what_was_given_up_for_half_overturned():
-    outcomes = overturned_under(rocking.Blocks.from_bodies(TWO), [PULSE.scaled(0.4), PULSE.scaled(2.0)], "nonlinear")
+    outcomes = simulate_outcomes(rocking.Blocks.from_bodies(TWO), [PULSE.scaled(0.4), PULSE.scaled(2.0)], "nonlinear")
     assert outcomes.tolist() == [[0.0, 1.0], [0.5, 1.0]]
 
 

@@ -20,7 +20,7 @@ import rocking
 from rocking import errors
 from rocking.studies import folder as folders
 from rocking.studies import units
-from rocking.studies.units import OUTCOMES, UnitGrid, decoded, name_of
+from rocking.studies.units import OUTCOMES, UnitGrid, decode, format_key
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.7)
 MOTIONS = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2.0)]
@@ -75,21 +75,21 @@ def test_any_selection_of_the_results_is_that_of_the_whole(complete, reference):
 
 @pytest.mark.thorough
 def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_path, monkeypatch):
-    monkeypatch.setattr(RUNS, "unit_of", lambda product, unit_blocks: (2, 1, 2, 1024))
+    monkeypatch.setattr(RUNS, "choose_unit_shape", lambda product, unit_blocks: (2, 1, 2, 1024))
     study = made(tmp_path, unit_blocks=None)
     keys = list(store_of(study).grid)
     assert len(keys) == 2 * 2 * 1 * 2
-    assert sum(map(store_of(study).grid.simulations, keys)) == reference.overturned.size
+    assert sum(map(store_of(study).grid.count_simulations, keys)) == reference.overturned.size
     with rocking.set_options(threads=2):
         study.run()
     xr.testing.assert_identical(rocking.Study(tmp_path).results().load(), reference)
     lazy = rocking.Study(tmp_path).results()
     for part in ({"motion": [2, 0], "block": [1299, 5]}, {"polarity": 1, "scale": 0}, {"motion": -1, "block": -1}):
         xr.testing.assert_identical(lazy.isel(part).load(), reference.isel(part))
-    (tmp_path / "units" / name_of(keys[3])).unlink()
+    (tmp_path / "units" / format_key(keys[3])).unlink()
     found = rocking.Study(tmp_path).results().load()
     np.testing.assert_array_equal(np.isnan(found.impacts.values), ~found.done.values)
-    assert (~found.done.values).sum() == store_of(study).grid.simulations(keys[3])
+    assert (~found.done.values).sum() == store_of(study).grid.count_simulations(keys[3])
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_pat
     many = rocking.Blocks(p=np.linspace(1.0, 6.0, blocks), alpha=0.2, restitution=0.7)
     study = rocking.create_study(tmp_path, many, pulses, levels=np.linspace(0.5, 2.0, scales), model="linear")
     assert 20 <= len(store_of(study).grid) <= 120
-    sizes = list(map(store_of(study).grid.simulations, store_of(study).grid))
+    sizes = list(map(store_of(study).grid.count_simulations, store_of(study).grid))
     assert sum(sizes) == blocks * motions * scales
     study.run()
     stored = sum(path.stat().st_size for path in (tmp_path / "units").iterdir())
@@ -200,7 +200,7 @@ def test_sigterm_finishes_the_units_in_hand(complete, tmp_path, monkeypatch):
         with rocking.set_options(threads=1):
             report = study.run()
     assert report.stopped and 1 <= report.units == study.status.done <= 3
-    assert "stopped, go on with another run" in str(report)
+    assert "stopped, run again to continue" in str(report)
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     study.run()
     assert digest(tmp_path) == digest(complete)
@@ -227,10 +227,10 @@ def test_ctrl_c_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
         if next(numbers):
             cancelled.wait(30.0)
         stopped.append(cancelled.is_set())
-        return units.compute(work)
+        return units.compute_unit(work)
 
     with monkeypatch.context() as patched:
-        patched.setattr(RUNS, "compute", compute)
+        patched.setattr(RUNS, "compute_unit", compute)
         after_each_unit(patched, lambda: signal.raise_signal(signal.SIGINT))
         with pytest.raises(KeyboardInterrupt), rocking.set_options(threads=2):
             study.run()
@@ -259,7 +259,7 @@ def test_workers_that_are_gone_end_the_run_and_another_one_goes_on(complete, tmp
     study = made(tmp_path)
     with (
         Broken(1) as pool,
-        pytest.raises(errors.StudyError, match="the workers are gone: a process ended abruptly; what"),
+        pytest.raises(errors.StudyError, match="the workers are gone: a process ended abruptly; computed"),
     ):
         study.run(executor=pool)
     assert study.status.done <= 4
@@ -274,7 +274,7 @@ def test_units_that_failed_are_computed_by_the_next_run(complete, tmp_path, monk
         raise ArithmeticError("no luck")
 
     with monkeypatch.context() as patched:
-        patched.setattr(RUNS, "compute", broken)
+        patched.setattr(RUNS, "compute_unit", broken)
         with rocking.set_options(threads=1):
             report = study.run()
     assert set(report.failed.values()) == {"ArithmeticError: no luck"}
@@ -341,12 +341,12 @@ def test_a_write_that_fails_is_one_sentence_and_leaves_nothing_half_visible(
 def test_every_changed_bit_and_every_cut_of_a_unit_is_seen(complete):
     data, unit = (complete / "units" / "unit.1.1.0.2").read_bytes(), (1, 1, 1, 512)
     rng = np.random.default_rng(0)
-    assert decoded(data, unit).shape == (len(OUTCOMES), *unit)
+    assert decode(data, unit).shape == (len(OUTCOMES), *unit)
     for _ in range(500):
         changed = bytearray(data)
         changed[rng.integers(len(data))] ^= 1 << rng.integers(8)
-        assert decoded(bytes(changed), unit) is None
-        assert decoded(data[: rng.integers(len(data))], unit) is None
+        assert decode(bytes(changed), unit) is None
+        assert decode(data[: rng.integers(len(data))], unit) is None
 
 
 def test_a_damaged_unit_is_named_and_computed_again_on_request(complete, tmp_path):
@@ -371,14 +371,14 @@ def test_a_study_that_may_not_be_written_to_can_be_opened(tmp_path, monkeypatch)
     def refuse(*_):
         raise AssertionError("nothing is written when a study is opened")
 
-    monkeypatch.setattr(folders, "put", refuse)
+    monkeypatch.setattr(folders, "write_atomically", refuse)
     assert rocking.Study(tmp_path).results().peak_rotation.load().size
 
 
 def test_a_unit_that_is_another_s_is_found_by_computing_it_again(small_complete, tmp_path):
     shutil.copytree(small_complete, tmp_path, dirs_exist_ok=True)
     study = rocking.Study(tmp_path)
-    names = [name_of(key) for key in store_of(study).grid]
+    names = [format_key(key) for key in store_of(study).grid]
     assert study.verify(recompute=len(names)) == []
     (tmp_path / "units" / names[0]).write_bytes((tmp_path / "units" / names[1]).read_bytes())
     assert study.verify() == []
@@ -418,7 +418,7 @@ def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
     study.run()
     results = study.results()
     (tmp_path / "units" / "unit.0.0.0.0").unlink()
-    with pytest.raises(errors.StudyError, match=r"unit\.0\.0\.0\.0 is gone"):
+    with pytest.raises(errors.StudyError, match=r"unit\.0\.0\.0\.0 was removed"):
         results.load()
 
 
@@ -451,7 +451,7 @@ def test_other_blocks_and_motions_are_refused_by_name(tmp_path):
 
 def test_another_version_may_read_a_study_but_not_go_on_with_it(tmp_path, monkeypatch):
     study = made(tmp_path)
-    monkeypatch.setattr("rocking.studies.folder.program", lambda: "rocking 9.9.9 (kernels 0)")
+    monkeypatch.setattr("rocking.studies.folder.identify_program", lambda: "rocking 9.9.9 (kernels 0)")
     assert rocking.Study(tmp_path).results().sizes["block"] == 1300
     for compute in (study.run, lambda: study.verify(recompute=1), lambda: study.verify(repair=True)):
         with pytest.raises(errors.StudyError, match=r"9\.9\.9"):
@@ -516,7 +516,7 @@ def test_a_study_is_exported_to_parquet_or_says_what_is_missing(complete, tmp_pa
 
 def test_units_have_names_of_their_own_and_other_files_are_none(tmp_path):
     study = made(tmp_path)
-    names = [name_of(key) for key in store_of(study).grid]
+    names = [format_key(key) for key in store_of(study).grid]
     assert len({*names}) == len(store_of(study).grid) == 36 and names[-1] == "unit.2.1.1.2"
     (tmp_path / "units").mkdir()
     for name in ("unit.1.2.3", "unit.3.0.0.0", "unit.a.0.0.0", "unit.0.2.0.0", "unit.0.0.0.0.0", "unit."):
@@ -558,15 +558,15 @@ def test_bodies_of_another_kind_with_the_same_numbers_are_another_study(tmp_path
 
 
 def test_a_study_that_another_process_creates_meanwhile_is_opened(tmp_path, monkeypatch):
-    pilot, motion = RUNS.unit_of, rocking.pulses.one_sine(4.0, 1.0)
+    pilot, motion = RUNS.choose_unit_shape, rocking.pulses.one_sine(4.0, 1.0)
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
 
     def slow(product, unit_blocks):
-        monkeypatch.setattr(RUNS, "unit_of", pilot)
+        monkeypatch.setattr(RUNS, "choose_unit_shape", pilot)
         rocking.create_study(tmp_path, blocks, motion, unit_blocks=512).run()
         return (1, 1, 1, 1024)
 
-    monkeypatch.setattr(RUNS, "unit_of", slow)
+    monkeypatch.setattr(RUNS, "choose_unit_shape", slow)
     study = rocking.create_study(tmp_path, blocks, motion)
     assert study.results().sizes["block"] == 1300
     assert not study.verify()

@@ -18,7 +18,7 @@ import pytest
 from studies_seen import RUNS, after_each_unit, digest, store_of
 
 import rocking
-from rocking.studies.units import compute
+from rocking.studies.units import compute_unit
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="processes are killed the POSIX way")
@@ -121,18 +121,18 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
 
     # A unit kills its worker, every time: it fails, alone, and can be computed later.
     study = made(tmp_path / "unit")
-    poison = store_of(study).work((0, 7, 0, 0)).factors[0, 0, 0]
+    poison = store_of(study).create_input((0, 7, 0, 0)).factors[0, 0, 0]
 
     def deadly(work):
         if work.factors[0, 0, 0] == poison:
             os._exit(1)
-        return compute(work)
+        return compute_unit(work)
 
     cluster.start_worker()
     with connected(cluster.address) as client:
         client.wait_for_workers(2)
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 0))
-        monkeypatch.setattr(RUNS, "compute", deadly)
+        monkeypatch.setattr(RUNS, "compute_unit", deadly)
         report = study.run(executor=client)
         monkeypatch.undo()
     assert "KilledWorker" in report.failed["unit.0.7.0.0"]
@@ -158,9 +158,9 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
 
 
 def test_a_worker_with_another_program_is_told_so(tmp_path):
-    work = store_of(made(tmp_path)).work((0, 0, 0, 0))
-    with pytest.raises(rocking.errors.StudyError, match=r"has rocking .*, the study needs rocking 9\.9\.9"):
-        compute(replace(work, program="rocking 9.9.9 (kernels 0)"))
+    work = store_of(made(tmp_path)).create_input((0, 0, 0, 0))
+    with pytest.raises(rocking.errors.StudyError, match=r"has rocking .*, the study requires rocking 9\.9\.9"):
+        compute_unit(replace(work, program="rocking 9.9.9 (kernels 0)"))
 
 
 # The page

@@ -126,7 +126,7 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
     assert (again.p.tolist(), again.alpha.tolist()) == (blocks.p.tolist(), blocks.alpha.tolist())
     assert again.restitution.tolist() == blocks.restitution.tolist()
     (tmp_path / "blocks.csv").write_bytes("p;alpha;name\n2;0,2;Säule\n".encode("latin-1"))
-    with pytest.raises(rocking.errors.StudyError, match="no text table in UTF-8"):
+    with pytest.raises(rocking.errors.StudyError, match="not a text table in UTF-8"):
         read_study(file)
     (tmp_path / "blocks.csv").write_text("p,alpha\n2.0,0.2\nfast,0.2\n")
     with pytest.raises(rocking.errors.StudyError, match=r"blocks\.csv, line 3: p takes an angular velocity"):
@@ -146,13 +146,13 @@ amplitude = ["0.3g", "0.5g"] -> amplitude = "0.3h" | 11 | acceleration
 factor = [0.5, 1.0] -> refine = 1e-3 | 15 | [scales] has no refine; there are factor, pga, pgv, sa
 factor = [0.5, 1.0] -> factor = 1\npga = 2 | 15 | one measure only
 factor = [0.5, 1.0] -> sa = 2 | 15 | "sa" needs period
-factor = [0.5, 1.0] -> damping = 0.1 | 15 | damping goes with sa
+factor = [0.5, 1.0] -> damping = 0.1 | 15 | damping is only allowed with sa
 polarity = "both" -> polarity = "up" | 16 | polarity must be
 chattering = "certified=1e-9" -> chattering = "slow" | 20 | chattering must be
 ["el-centro-meloland-270"] -> ["el-centro-melolnd-270"] | 7 | did you mean the shipped record el-centro-meloland-270
 ["el-centro-meloland-270"] -> [\n"el-centro-meloland-270",\n"nowhere/*.AT2",\n] | 9 | matches this name
 ["el-centro-meloland-270"] -> "el-centro-meloland-270" | 7 | records must be a list of texts
-records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | of the records, and there
+records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | applies to records, and there
 [motions] -> [motions]\nskip_unreadable = "no" | 7 | must be true or false
 [motions] -> [motions]\nvertical = "9" | 8 | no file or shipped record '9' for the vertical motion
 [blocks] -> [[blocks]] | 1 | must be one table, [blocks], once
@@ -263,8 +263,11 @@ def test_another_study_in_the_same_folder_is_refused(run, file, tmp_path):
     file.write_text(TEXT.replace("factor = [0.5, 1.0]", "factor = [0.5, 1.5]"))
     code, _, err = run("study", "create", file, tmp_path / "kept")
     assert code == 2
-    assert f"{tmp_path / 'kept'}: this holds a study of other inputs (scales/values changed), 0 of 20 units done" in err
-    assert "create this one elsewhere, or remove that one" in err
+    assert (
+        f"{tmp_path / 'kept'}: the folder contains a study of other inputs (scales/values changed), 0 of 20 units done"
+        in err
+    )
+    assert "create this study elsewhere, or remove the other one" in err
 
 
 def test_a_folder_of_other_things_is_no_place_for_a_study(run, file, tmp_path):
@@ -272,18 +275,18 @@ def test_a_folder_of_other_things_is_no_place_for_a_study(run, file, tmp_path):
     (tmp_path / "photos" / "a.jpg").touch()
     code, out, err = run("study", "create", file, tmp_path / "photos", "--unit-blocks", 512)
     assert (code, out) == (2, "")
-    assert f"{tmp_path / 'photos'}: this holds no study, but a.jpg: name a new folder, or an empty one" in err
+    assert f"{tmp_path / 'photos'}: the folder contains no study, but a.jpg: choose a new or empty folder" in err
     assert [path.name for path in (tmp_path / "photos").iterdir()] == ["a.jpg"]
     code, _, err = run("study", "status", file)
     assert code == 2
-    assert "is a file, and a study is kept in a folder" in err
+    assert "a study is stored in a folder, but this is a file" in err
 
 
 def test_a_file_that_is_there_is_not_overwritten(run, tmp_path):
     assert run("study", "new", tmp_path / "new.toml")[0] == 0
     code, _, err = run("study", "new", tmp_path / "new.toml")
     assert code == 2
-    assert "is there already" in err
+    assert "already exists" in err
 
 
 @pytest.mark.parametrize(
@@ -291,7 +294,7 @@ def test_a_file_that_is_there_is_not_overwritten(run, tmp_path):
     [
         (["study", "crate", "a"], "there is no command crate; did you mean create?"),
         (["study", "run", "m", "--thread", "2"], "Unknown option: --thread. Did you mean --threads?"),
-        (["study", "run", "nowhere"], "nowhere: there is no study here"),
+        (["study", "run", "nowhere"], "nowhere: the folder contains no study"),
         (["study", "export", "nowhere", "all.doc"], "exported to .nc, .csv, .parquet, not to all.doc"),
     ],
 )
@@ -455,7 +458,7 @@ def test_results_without_their_description_are_no_new_study(run, file, tmp_path)
     file.write_text(TEXT.replace("1:6:5", "2:9:5"))
     code, _, err = run("study", "create", file, tmp_path / "made")
     assert code == 2
-    assert "this holds no study, but units: name a new folder" in err
+    assert "the folder contains no study, but units: choose a new" in err
 
 
 def test_units_of_a_study_that_is_there_are_not_changed_without_a_word(run, file, tmp_path):
@@ -463,7 +466,7 @@ def test_units_of_a_study_that_is_there_are_not_changed_without_a_word(run, file
     for width, code in (("512", 0), ("512", 0), ("1024", 2)):
         found, _, err = run("study", "create", file, tmp_path / "made", "--unit-blocks", width)
         assert found == code
-    assert "in units of 512 blocks: leave --unit-blocks out" in err
+    assert "in units of 512 blocks: omit --unit-blocks" in err
 
 
 @pytest.mark.thorough

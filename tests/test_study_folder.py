@@ -10,7 +10,7 @@ import pytest
 
 import rocking
 from rocking.errors import InvalidOption, StudyError
-from rocking.studies.folder import Store, exists, locked, put, require_free
+from rocking.studies.folder import Store, contains_study, lock_folder, require_empty, write_atomically
 
 
 @pytest.mark.skipif(os.name == "nt", reason="folders cannot be flushed there")
@@ -30,7 +30,7 @@ def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(os, "fsync", flush)
     monkeypatch.setattr(Path, "replace", name)
-    put(tmp_path / "unit.1", b"outcomes")
+    write_atomically(tmp_path / "unit.1", b"outcomes")
     assert done == [len(b"outcomes"), "name", "folder"]
     assert (tmp_path / "unit.1").read_bytes() == b"outcomes"
 
@@ -40,8 +40,8 @@ def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatc
 def test_the_umask_decides_who_may_read_a_study(tmp_path: Path, umask: int, mode: int) -> None:
     before = os.umask(umask)
     try:
-        put(tmp_path / "unit.1", b"outcomes")
-        with locked(tmp_path):
+        write_atomically(tmp_path / "unit.1", b"outcomes")
+        with lock_folder(tmp_path):
             pass
     finally:
         os.umask(before)
@@ -53,13 +53,13 @@ def test_the_umask_decides_who_may_read_a_study(tmp_path: Path, umask: int, mode
 @pytest.mark.parametrize("other", [False, True])
 def test_one_process_runs_a_study_or_several_run_parts_of_it(tmp_path: Path, one: bool, other: bool) -> None:
     for _ in range(2):  # a lock that was given back locks nothing
-        with locked(tmp_path, shared=one):
+        with lock_folder(tmp_path, shared=one):
             if one and other:
-                with locked(tmp_path, shared=other):
+                with lock_folder(tmp_path, shared=other):
                     pass
             else:
-                told = rf"run by process {os.getpid()} on .*; wait for it, or end it there"
-                with pytest.raises(StudyError, match=told), locked(tmp_path, shared=other):
+                told = rf"run by process {os.getpid()} on .*; wait until it ends, or stop it there"
+                with pytest.raises(StudyError, match=told), lock_folder(tmp_path, shared=other):
                     pass
 
 
@@ -67,38 +67,38 @@ def test_one_process_runs_a_study_or_several_run_parts_of_it(tmp_path: Path, one
 @pytest.mark.parametrize("shared", [False, True])
 def test_a_lock_goes_with_its_process_and_the_next_run_removes_half_written_files(tmp_path: Path, shared: bool) -> None:
     program = (
-        "import sys, time\nfrom rocking.studies.folder import locked\n"
-        f"with locked(sys.argv[1], shared={shared}):\n    print('locked', flush=True)\n    time.sleep(600)\n"
+        "import sys, time\nfrom rocking.studies.folder import lock_folder\n"
+        f"with lock_folder(sys.argv[1], shared={shared}):\n    print('locked', flush=True)\n    time.sleep(600)\n"
     )
     part = tmp_path / ".abc.part"
     part.write_bytes(b"half")
     with subprocess.Popen([sys.executable, "-c", program, tmp_path], stdout=subprocess.PIPE) as process:
         assert process.stdout is not None and process.stdout.readline() == b"locked\n"
-        with pytest.raises(StudyError, match=f"run by process {process.pid} on"), locked(tmp_path):
+        with pytest.raises(StudyError, match=f"run by process {process.pid} on"), lock_folder(tmp_path):
             pass
         assert part.exists() == shared  # others may be writing beside a part
         process.kill()
-    with locked(tmp_path):
+    with lock_folder(tmp_path):
         assert not part.exists()
 
 
 def test_where_there_is_no_study_none_is_opened(tmp_path: Path) -> None:
-    assert not exists(tmp_path)
-    with pytest.raises(StudyError, match="there is no study here: create it first"):
+    assert not contains_study(tmp_path)
+    with pytest.raises(StudyError, match="the folder contains no study: create it first"):
         Store(tmp_path)
-    with pytest.raises(StudyError, match="this is a URL, and a study is kept in a folder"):
+    with pytest.raises(StudyError, match="a study is stored in a folder, but this is a URL"):
         rocking.Study("s3://bucket/museum")
 
 
 @pytest.mark.parametrize(
-    ("names", "listed"), [(("b", "a"), "but a, b: name"), (("d", "c", "b", "a"), "but a, b, c and more: name")]
+    ("names", "listed"), [(("b", "a"), "but a, b: choose"), (("d", "c", "b", "a"), "but a, b, c and more: choose")]
 )
 def test_a_folder_of_other_files_is_no_place_for_a_study(tmp_path: Path, names: tuple[str, ...], listed: str) -> None:
-    require_free(tmp_path)
+    require_empty(tmp_path)
     for name in names:
         (tmp_path / name).touch()
     with pytest.raises(StudyError, match=listed):
-        require_free(tmp_path)
+        require_empty(tmp_path)
 
 
 @pytest.mark.parametrize("part", ["0/3", "4/3", "1", "1/", "/3", "a/b", "-1/3", "1/0", "1.5/3", 3])

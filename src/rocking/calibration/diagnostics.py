@@ -10,15 +10,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.calibration.search import AGREEMENT, RUNS, Search, unpacked
-from rocking.calibration.space import HIGHEST, Space, unit_of
+from rocking.calibration.search import MAX_R_HAT, RUN_COUNT, SearchResult, unpack
+from rocking.calibration.space import MAX_VALUES, Space, find_parameter_unit
 from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import format_count
 from rocking.errors import InvalidOption
 
 #: An interval ends at a bound if more than this share of the posterior (the share beyond one end) is within the
 #: outermost part of the range, in the logarithm.
-_OUTERMOST: Final = 0.05
+_EDGE_SHARE: Final = 0.05
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Scores:
     log_loss : float
         Mean of -log of the probability of the observed outcome, infinite for an outcome with probability zero.
     brier : float
-        Mean squared difference between probability and outcome (Brier 1950).
+        Mean squared difference between probability and outcome :cite:p:`brier1950`.
 
     See Also
     --------
@@ -57,19 +57,21 @@ class Scores:
     @classmethod
     def from_predictions(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
         """Compute the scores of predicted probabilities of m outcomes (bool)."""
-        given, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
-        if given.shape != seen.shape or not given.size:
-            raise InvalidOption(f"there must be one probability for each outcome, not {given.shape} and {seen.shape}")
-        if not np.all((given >= 0.0) & (given <= 1.0)):
-            raise InvalidOption("{} must lie between 0 and 1", "probabilities")
+        predicted, actual = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
+        if predicted.shape != actual.shape or not predicted.size:
+            raise InvalidOption(
+                f"probabilities and outcomes must have the same shape; got {predicted.shape} and {actual.shape}"
+            )
+        if not np.all((predicted >= 0.0) & (predicted <= 1.0)):
+            raise InvalidOption("{} must be between 0 and 1", "probabilities")
         return cls(
-            accuracy=float(np.mean((given > 0.5) == seen)),
-            log_loss=float(log_losses(given, seen).mean()),
-            brier=float(np.mean((given - seen) ** 2)),
+            accuracy=float(np.mean((predicted > 0.5) == actual)),
+            log_loss=float(compute_log_losses(predicted, actual).mean()),
+            brier=float(np.mean((predicted - actual) ** 2)),
         )
 
 
-def log_losses(probabilities: Floats, observed: Flags) -> Floats:
+def compute_log_losses(probabilities: Floats, observed: Flags) -> Floats:
     """Compute -log of the probability of each observed outcome, infinite for probability zero."""
     with np.errstate(divide="ignore"):
         return np.asarray(-np.log(np.where(observed, probabilities, 1.0 - probabilities)))
@@ -96,12 +98,12 @@ class BoundReached:
     share: float
 
     def __str__(self) -> str:
-        unit = unit_of(self.name)
+        unit = find_parameter_unit(self.name)
         bound = f"{self.bound:g}" + ("" if unit == "1" else f" {unit}")
         return (
             f"{self.name} reaches its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
-            f"the outermost {100 * _OUTERMOST:.0f} % of the range, so that the bound sets the {self.end} end of the "
-            "interval; unless you know that bound, "
+            f"the outermost {100 * _EDGE_SHARE:.0f} % of the range, so that the bound sets the {self.end} end of the "
+            "interval; unless this bound is certain, "
             f"set that of {self.name.partition('_')[0]} to {self.wider:g}"
         )
 
@@ -130,53 +132,53 @@ class Diagnostics:
     @property
     def notes(self) -> tuple[str, ...]:
         """Warnings about the estimates, one sentence each."""
-        notes = [f"{one}" for one in self.bounds_reached]
-        apart = [f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > AGREEMENT]
-        if apart:
-            held = "the estimates weigh what both found; double the candidates, or narrow the bounds to what you know"
-            notes.append(f"independent runs disagree (R-hat) on {', '.join(apart)}: {held}")
+        notes = [f"{bound}" for bound in self.bounds_reached]
+        disagreeing = [f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > MAX_R_HAT]
+        if disagreeing:
+            advice = "the estimates average them; double the candidates, or narrow the bounds"
+            notes.append(f"independent runs disagree (R-hat) on {', '.join(disagreeing)}: {advice}")
         if self.effective < 20.0:
-            few = f"only {format_count(round(self.effective), 'candidate')} can tell what a typical population does"
-            notes.append(f"{few}: double the candidates, or narrow the bounds to what you know")
+            shortage = f"only {format_count(round(self.effective), 'candidate')} represent a typical population"
+            notes.append(f"{shortage}: double the candidates, or narrow the bounds")
         return tuple(notes)
 
     def __str__(self) -> str:
         search = (
             f"{format_count(self.candidates, 'candidate')}, {self.effective:.0f} effective for a typical population; "
-            f"{RUNS} independent runs, R-hat at most {max(self.agreement.values()):.2f}"
+            f"{RUN_COUNT} independent runs, R-hat at most {max(self.agreement.values()):.2f}"
         )
         return "\n".join([search, *(f"note: {sentence}" for sentence in self.notes)])
 
 
-def diagnosed(found: Search, posterior: Floats) -> Diagnostics:
+def diagnose(search: SearchResult, populations: Floats) -> Diagnostics:
     """Compute the diagnostics of a search from the draws of its posterior."""
-    space = found.evidence.candidates.space
+    space = search.evidence.candidates.space
     return Diagnostics(
-        len(found.evidence.candidates.points),
-        float(np.median(found.evidence.effective(posterior))),
-        found.agreement,
-        bounds_reached(space, unpacked(posterior)[0]),
+        len(search.evidence.candidates.points),
+        float(np.median(search.evidence.count_effective(populations))),
+        search.agreement,
+        find_bounds_reached(space, unpack(populations)[0]),
     )
 
 
-def bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
+def find_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
     """Return estimates whose interval ends at a bound, from draws of the population's centre."""
-    found = []
-    for name, values in space.named(centres).items():
+    reached = []
+    for name, values in space.parameters_by_name(centres).items():
         parameter = name.partition("_")[0]
         if parameter not in space.unknown:
             continue
         k = space.unknown.index(parameter)
         low, high = float(space.lower[k]), float(space.upper[k])
-        edge = _OUTERMOST * (high - low)
-        wider = min(2.0 * math.exp(high), HIGHEST[parameter])
+        edge = _EDGE_SHARE * (high - low)
+        wider = min(2.0 * math.exp(high), MAX_VALUES[parameter])
         ends = [
             ("lower", low, 0.5 * math.exp(low), np.log(values) < low + edge),
             ("upper", high, wider, np.log(values) > high - edge),
         ]
-        for end, bound, further, near in ends:
-            share = float(near.mean())
-            # No block exceeds such a bound.
-            if share > 0.05 and bound < math.log(HIGHEST[parameter]) - 1e-9:
-                found.append(BoundReached(name, end, math.exp(bound), further, share))
-    return tuple(found)
+        for end, bound, suggested, is_near in ends:
+            share = float(is_near.mean())
+            # Bounds at the largest possible value cannot be widened.
+            if share > 0.05 and bound < math.log(MAX_VALUES[parameter]) - 1e-9:
+                reached.append(BoundReached(name, end, math.exp(bound), suggested, share))
+    return tuple(reached)

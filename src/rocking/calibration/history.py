@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.block import Block
-from rocking.calibration.space import EVERYTHING_IS_KNOWN, HIGHEST, PARAMETERS, Range, is_known, unit_of, value_range
+from rocking.calibration.space import (
+    MAX_VALUES,
+    NO_UNKNOWNS,
+    PARAMETERS,
+    Range,
+    find_parameter_unit,
+    is_known,
+    parse_range,
+)
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
@@ -29,22 +37,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Number of blocks at the start of the search.
-_CANDIDATES: Final = 2048
+_START_COUNT: Final = 2048
 
 #: Successive shares of the history to fit, and number of best fits that continue. Over the whole history the misfit has
 #: many local minima because impacts drift out of phase, over the first arcs few.
 _STAGES: Final = ((0.15, 16), (0.3, 8), (0.6, 4), (1.0, 2))
 
 #: Number of points then tried around the optimum, and widths of the clouds in standard errors.
-_AROUND: Final = 64
-_WIDTHS: Final = (6.0, 3.0, 1.5)
+_CLOUD_SIZE: Final = 64
+_CLOUD_WIDTHS: Final = (6.0, 3.0, 1.5)
 
 
 #: A sensitivity below this share of the largest counts as zero.
 _INSENSITIVE: Final = 1e-7
 
 #: Smallest step in the logarithms for differences of simulations, which are accurate to about 1e-12.
-_STEP: Final = 1e-5
+_MIN_STEP: Final = 1e-5
 
 
 @dataclass(frozen=True)
@@ -105,8 +113,14 @@ class HistoryCalibration(Result):
 
     def summary(self) -> str:
         rows = [
-            [name, one.value, float(f"{one.deviation:.2g}"), unit_of(name), "at its bound" if one.at_bound else ""]
-            for name, one in self.estimates.items()
+            [
+                name,
+                fit.value,
+                float(f"{fit.deviation:.2g}"),
+                find_parameter_unit(name),
+                "at its bound" if fit.at_bound else "",
+            ]
+            for name, fit in self.estimates.items()
         ]
         table = format_table(["parameter", "value", "std. error", "unit", ""], rows)
         return f"{table}\n\n{self._misfit_text()}"
@@ -115,7 +129,7 @@ class HistoryCalibration(Result):
         return {
             "model": self.response.model,
             "samples": len(self.residuals),
-            "estimates": {name: asdict(one) for name, one in self.estimates.items()},
+            "estimates": {name: asdict(fit) for name, fit in self.estimates.items()},
             "covariance_of_logarithms": self.covariance,
             "misfit_rad": self.misfit,
         }
@@ -125,20 +139,23 @@ class HistoryCalibration(Result):
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
         end = min(float(self.times[-1]), self.response.duration)
-        between = drawing_times(self.response, float(self.times[0]), end)
+        fine_times = drawing_times(self.response, float(self.times[0]), end)
         return draw_measured_history(
             time=self.times,
             measured=simulated + self.residuals,
             residual=self.residuals,
-            fitted_time=between,
-            fitted=self.response.rotation(between),
+            fitted_time=fine_times,
+            fitted=self.response.rotation(fine_times),
             title=title or escape_dollars(self._estimates_text()),
             ax=ax,
             figsize=figsize,
         )
 
     def _estimates_text(self) -> str:
-        texts = (f"{name.replace('_', ' ')} = {one.value:.4g} {unit_of(name)}" for name, one in self.estimates.items())
+        texts = (
+            f"{name.replace('_', ' ')} = {fit.value:.4g} {find_parameter_unit(name)}"
+            for name, fit in self.estimates.items()
+        )
         return ", ".join(text.removesuffix(" 1") for text in texts)
 
     def _headline(self) -> str:
@@ -214,41 +231,44 @@ def calibrate_history(
     >>> f"{rocking.calibrate_history(times, measured + noise).estimates['p'].value:.2f}"
     '2.50'
     """
-    at, measured = _checked(times, rotation)
-    has_two = checks.boolean(two_sided, "two_sided", InvalidOption)
-    settled, unknowns = _split({"p": p, "alpha": alpha, "restitution": restitution}, has_two)
+    sample_times, measured = _check_history(times, rotation)
+    is_two_sided = checks.boolean(two_sided, "two_sided", InvalidOption)
+    known, unknowns = _split_parameters({"p": p, "alpha": alpha, "restitution": restitution}, is_two_sided)
     if initial_rotation is not None:
-        settled["initial_rotation"] = checks.finite(initial_rotation, "initial_rotation", InvalidOption)
+        known["initial_rotation"] = checks.finite(initial_rotation, "initial_rotation", InvalidOption)
     elif motion is not None:
-        settled["initial_rotation"] = 0.0
+        known["initial_rotation"] = 0.0
     else:
-        unknowns.append(_released_from(measured))
+        unknowns.append(_bound_initial_rotation(measured))
     if not unknowns:
-        raise InvalidOption(EVERYTHING_IS_KNOWN)
-    if len(at) < 2 * len(unknowns):
+        raise InvalidOption(NO_UNKNOWNS)
+    if len(sample_times) < 2 * len(unknowns):
         raise InvalidOption(
-            f"{format_count(len(at), 'sample')} cannot determine {format_count(len(unknowns), 'parameter')}: give more"
+            f"{format_count(len(sample_times), 'sample')} cannot determine {format_count(len(unknowns), 'parameter')}: "
+            "provide more"
         )
-    problem = _Problem(at, measured, motion, model, settled, tuple(unknowns))
+    problem = _Problem(sample_times, measured, motion, model, known, tuple(unknowns))
     rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
-    return _result(problem, _best(problem, rng))
+    return _create_calibration(problem, _fit(problem, rng))
 
 
-def _checked(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
-    """Return checked copies of the times and rotations of a history."""
-    at, measured = (
+def _check_history(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
+    """Check the times and rotations of a history, and copy them."""
+    sample_times, measured = (
         np.array(checks.numbers(values, name, InvalidOption))
         for values, name in ((times, "times"), (rotation, "rotation"))
     )
-    if at.ndim != 1 or at.shape != measured.shape:
-        raise InvalidOption(f"there must be one rotation for each time, not {at.shape} and {measured.shape}")
-    if not (np.all(np.isfinite(at)) and np.all(np.isfinite(measured))):
-        raise InvalidOption("{} and {} must be finite: leave out samples that are missing", "times", "rotation")
-    if not len(at) or at[0] < 0.0 or not np.all(np.diff(at) > 0.0):
-        raise InvalidOption("{} must start at 0 or later and increase from sample to sample", "times")
+    if sample_times.ndim != 1 or sample_times.shape != measured.shape:
+        raise InvalidOption(
+            f"times and rotations must have the same shape; got {sample_times.shape} and {measured.shape}"
+        )
+    if not (np.all(np.isfinite(sample_times)) and np.all(np.isfinite(measured))):
+        raise InvalidOption("{} and {} must be finite; remove missing samples", "times", "rotation")
+    if not len(sample_times) or sample_times[0] < 0.0 or not np.all(np.diff(sample_times) > 0.0):
+        raise InvalidOption("{} must be nonnegative and increasing", "times")
     if not np.any(measured) or np.abs(measured).max() >= 0.5 * math.pi:
         raise InvalidOption("{} must be in rad, below pi/2 in size, and not zero throughout", "rotation")
-    return at, measured
+    return sample_times, measured
 
 
 @dataclass(frozen=True)
@@ -269,13 +289,13 @@ class _Problem:
     rotation: Floats
     motion: Motion | None
     model: Model
-    settled: Mapping[str, float]
+    known: Mapping[str, float]
     unknowns: tuple[_Unknown, ...]
 
-    def first(self, share: float) -> int:
-        """Return the number of samples up to this share of the integral of |rotation|."""
-        past = np.cumsum(np.abs(self.rotation) * np.gradient(self.times))
-        return int(np.searchsorted(past, share * past[-1])) + 1
+    def count_samples(self, share: float) -> int:
+        """Count the samples up to this share of the integral of |rotation|."""
+        cumulative = np.cumsum(np.abs(self.rotation) * np.gradient(self.times))
+        return int(np.searchsorted(cumulative, share * cumulative[-1])) + 1
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
@@ -285,8 +305,8 @@ class _Problem:
 
     def values(self, logs: Floats) -> dict[str, float]:
         """Return all parameters by name, known and unknown."""
-        found = {one.name: one.sign * math.exp(log) for one, log in zip(self.unknowns, logs, strict=True)}
-        return {**self.settled, **found}
+        fitted = {unknown.name: unknown.sign * math.exp(log) for unknown, log in zip(self.unknowns, logs, strict=True)}
+        return {**self.known, **fitted}
 
     def block(self, logs: Floats) -> Block:
         values = self.values(logs)
@@ -309,63 +329,63 @@ class _Problem:
         """Compute the Jacobian of the residuals in the logarithms, shape (count, k)."""
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
-        fallen = times > response.duration
-        changes = changes_along(response._history, times[~fallen], [one.name for one in self.unknowns])
-        found = np.zeros((count, len(logs)))
-        found[~fallen] = -np.column_stack([changes[one.name] for one in self.unknowns])
-        return found
+        is_overturned = times > response.duration
+        changes = changes_along(response._history, times[~is_overturned], [unknown.name for unknown in self.unknowns])
+        jacobian = np.zeros((count, len(logs)))
+        jacobian[~is_overturned] = -np.column_stack([changes[unknown.name] for unknown in self.unknowns])
+        return jacobian
 
     def error(self, logs: Floats, count: int) -> float:
         """Compute the sum of the squared residuals of the first samples."""
         return float((self.residuals(logs, count) ** 2).sum())
 
 
-def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[str, float], list[_Unknown]]:
+def _split_parameters(inputs: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[str, float], list[_Unknown]]:
     """Separate the known parameters of a block from the unknown ones."""
-    settled, unknowns = {}, []
-    for name, value in given.items():
+    known, unknowns = {}, []
+    for name, value in inputs.items():
         if is_known(value):
-            settled[name] = checks.positive(np.ravel(value)[0], name, InvalidOption)
+            known[name] = checks.positive(np.ravel(value)[0], name, InvalidOption)
             continue
-        low, high = value_range(value, name, HIGHEST[name])
+        low, high = parse_range(value, name, MAX_VALUES[name])
         sides = ("_plus", "_minus") if two_sided else ("",)
         unknowns += [_Unknown(name + side, low, high) for side in sides]
-    return settled, unknowns
+    return known, unknowns
 
 
-def _released_from(rotation: Floats) -> _Unknown:
-    """Return the unknown initial rotation, bounded around the first sample."""
+def _bound_initial_rotation(rotation: Floats) -> _Unknown:
+    """Return the unknown initial rotation with bounds around the first sample."""
     first = float(rotation[0])
     if abs(first) < 0.05 * np.abs(rotation).max():
-        text = "a release test must start at the rotation it is released from; give {}"
+        text = "a release test must start at the rotation of the release; set {}"
         raise InvalidOption(text, "initial_rotation")
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
 
-def _best(problem: _Problem, rng: np.random.Generator) -> Floats:
+def _fit(problem: _Problem, rng: np.random.Generator) -> Floats:
     """Find the logarithms of the unknowns with the least squares over the whole history."""
     from scipy.stats import qmc
 
     low, high = problem.bounds
-    survivors = qmc.scale(qmc.Halton(len(low), rng=rng).random(_CANDIDATES), low, high)
-    whole = len(problem.times)
-    with Progress("fitting", sum(kept for _, kept in _STAGES) + len(_WIDTHS)) as bar:
-        for share, kept in _STAGES:
-            count = min(max(problem.first(share), 2 * len(low)), whole)
-            errors = [problem.error(one, count) for one in survivors]
-            descended = []
-            for one in survivors[np.argsort(errors, kind="stable")[:kept]]:
-                descended.append(_descended(problem, one, count))
+    survivors = qmc.scale(qmc.Halton(len(low), rng=rng).random(_START_COUNT), low, high)
+    sample_count = len(problem.times)
+    with Progress("fitting", sum(survivor_count for _, survivor_count in _STAGES) + len(_CLOUD_WIDTHS)) as bar:
+        for share, survivor_count in _STAGES:
+            count = min(max(problem.count_samples(share), 2 * len(low)), sample_count)
+            errors = [problem.error(logs, count) for logs in survivors]
+            optima = []
+            for logs in survivors[np.argsort(errors, kind="stable")[:survivor_count]]:
+                optima.append(_descend(problem, logs, count))
                 bar.advance(1)
-            survivors = np.array(descended)
-        found = min(survivors, key=lambda one: problem.error(one, whole))
-        for width in _WIDTHS:
-            found = _shaken(problem, found, width, rng)
+            survivors = np.array(optima)
+        optimum = min(survivors, key=lambda logs: problem.error(logs, sample_count))
+        for width in _CLOUD_WIDTHS:
+            optimum = _search_nearby(problem, optimum, width, rng)
             bar.advance(1)
-    return np.asarray(found, dtype=np.float64)
+    return np.asarray(optimum, dtype=np.float64)
 
 
-def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
+def _descend(problem: _Problem, start: Floats, count: int) -> Floats:
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
@@ -373,60 +393,70 @@ def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
     return np.asarray(fit.x, dtype=np.float64)
 
 
-def _shaken(problem: _Problem, found: Floats, width: float, rng: np.random.Generator) -> Floats:
+def _search_nearby(problem: _Problem, optimum: Floats, width: float, rng: np.random.Generator) -> Floats:
     """Search within `width` standard errors of an optimum, because a forced response can be rugged on that scale."""
-    whole = len(problem.times)
-    covariance = _covariance(problem, found, problem.residuals(found, whole))
-    around = found + width * rng.multivariate_normal(np.zeros(len(found)), covariance, _AROUND, method="cholesky")
-    around = np.clip(around, *problem.bounds)
-    best = min(around, key=lambda one: problem.error(one, whole))
-    return min(found, _descended(problem, best, whole), key=lambda one: problem.error(one, whole))
+    sample_count = len(problem.times)
+    covariance = _compute_covariance(problem, optimum, problem.residuals(optimum, sample_count))
+    cloud = optimum + width * rng.multivariate_normal(
+        np.zeros(len(optimum)), covariance, _CLOUD_SIZE, method="cholesky"
+    )
+    cloud = np.clip(cloud, *problem.bounds)
+    best = min(cloud, key=lambda logs: problem.error(logs, sample_count))
+    return min(optimum, _descend(problem, best, sample_count), key=lambda logs: problem.error(logs, sample_count))
 
 
-def _result(problem: _Problem, logs: Floats) -> HistoryCalibration:
+def _create_calibration(problem: _Problem, logs: Floats) -> HistoryCalibration:
     count = len(problem.times)
     residuals = problem.residuals(logs, count)
-    covariance = _covariance(problem, logs, residuals)
+    covariance = _compute_covariance(problem, logs, residuals)
     low, high = problem.bounds
     estimates = {}
-    for one, log, variance, bottom, top in zip(problem.unknowns, logs, np.diag(covariance), low, high, strict=True):
-        at_bound = bool(min(log - bottom, top - log) < 1e-6)
-        estimates[one.name] = Measured(one.sign * math.exp(log), math.exp(log) * math.sqrt(variance), at_bound)
+    for unknown, log, variance, lowest, highest in zip(
+        problem.unknowns, logs, np.diag(covariance), low, high, strict=True
+    ):
+        at_bound = bool(min(log - lowest, highest - log) < 1e-6)
+        estimates[unknown.name] = Measured(unknown.sign * math.exp(log), math.exp(log) * math.sqrt(variance), at_bound)
     response = problem.response(logs, float(problem.times[-1]))
     return HistoryCalibration(problem.block(logs), estimates, covariance, problem.times, residuals, response)
 
 
-def _covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
+def _compute_covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
     """Compute the covariance of the logarithms: inverse curvature times variance of the autocorrelated residuals."""
-    variance = float((residuals**2).sum()) / (len(residuals) - len(logs)) * _integrated_autocorrelation(residuals)
-    slopes = _slopes(problem, logs, math.sqrt(variance))
-    sizes = np.linalg.norm(slopes, axis=0)
-    silent = [one.name for one, size in zip(problem.unknowns, sizes, strict=True) if size <= _INSENSITIVE * sizes.max()]
-    if silent:
-        raise InvalidOption(f"the history does not determine {', '.join(silent)}: give it a value, or a longer history")
-    _, values, right = np.linalg.svd(slopes / sizes, full_matrices=False)
-    if values[-1] <= _INSENSITIVE * values[0]:
-        names = ", ".join(one.name for one in problem.unknowns)
-        raise InvalidOption(f"the history does not distinguish {names}: give one of them a value")
-    return np.asarray(variance * (right.T / values**2) @ right / np.outer(sizes, sizes))
+    variance = float((residuals**2).sum()) / (len(residuals) - len(logs)) * _integrate_autocorrelation(residuals)
+    slopes = _compute_slopes(problem, logs, math.sqrt(variance))
+    norms = np.linalg.norm(slopes, axis=0)
+    undetermined = [
+        unknown.name
+        for unknown, norm in zip(problem.unknowns, norms, strict=True)
+        if norm <= _INSENSITIVE * norms.max()
+    ]
+    if undetermined:
+        raise InvalidOption(
+            f"the history does not determine {', '.join(undetermined)}: set a value, or use a longer history"
+        )
+    _, singular_values, right_vectors = np.linalg.svd(slopes / norms, full_matrices=False)
+    if singular_values[-1] <= _INSENSITIVE * singular_values[0]:
+        names = ", ".join(unknown.name for unknown in problem.unknowns)
+        raise InvalidOption(f"the history does not distinguish {names}: set the value of one")
+    return np.asarray(variance * (right_vectors.T / singular_values**2) @ right_vectors / np.outer(norms, norms))
 
 
-def _slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats:
+def _compute_slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats:
     """Differentiate the residuals, shape (n, k), by differences over about one standard error, because of jumps."""
     count, low, high = len(problem.times), *problem.bounds
     columns = []
     for k in range(len(logs)):
-        step = _STEP
+        step = _MIN_STEP
         for _ in range(4):
             ahead, behind = logs.copy(), logs.copy()
             ahead[k], behind[k] = min(logs[k] + step, high[k]), max(logs[k] - step, low[k])
             slope = (problem.residuals(ahead, count) - problem.residuals(behind, count)) / (ahead[k] - behind[k])
-            step = float(np.clip(deviation / max(float(np.linalg.norm(slope)), 1e-300), _STEP, 0.05))
+            step = float(np.clip(deviation / max(float(np.linalg.norm(slope)), 1e-300), _MIN_STEP, 0.05))
         columns.append(slope)
     return np.array(columns).T
 
 
-def _integrated_autocorrelation(residuals: Floats) -> float:
+def _integrate_autocorrelation(residuals: Floats) -> float:
     """Compute 1 + 2 times the sum of the autocorrelations up to the first nonpositive one."""
     size = 2 * len(residuals)
     power = np.abs(np.fft.rfft(residuals, size)) ** 2
@@ -434,5 +464,5 @@ def _integrated_autocorrelation(residuals: Floats) -> float:
     if correlation[0] == 0.0:
         return 1.0
     positive = correlation[1:] > 0.0
-    until = len(positive) if positive.all() else int(np.argmin(positive))
-    return 1.0 + 2.0 * float(correlation[1 : until + 1].sum() / correlation[0])
+    lag_count = len(positive) if positive.all() else int(np.argmin(positive))
+    return 1.0 + 2.0 * float(correlation[1 : lag_count + 1].sum() / correlation[0])

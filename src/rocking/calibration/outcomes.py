@@ -15,18 +15,18 @@ from rocking.analysis.levels import note_missing, number_groups
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.block import Blocks
 from rocking.block.body import Bodies
-from rocking.calibration.diagnostics import Diagnostics, Scores, diagnosed
+from rocking.calibration.diagnostics import Diagnostics, Scores, diagnose
 from rocking.calibration.search import (
     Evidence,
     Problem,
-    expected_share,
-    posterior,
+    estimate_share,
+    resample,
+    sample_posterior,
     search,
-    systematic,
-    unpacked,
+    unpack,
     with_outliers,
 )
-from rocking.calibration.space import SIDED, Knowledge, Space, unit_of
+from rocking.calibration.space import SIDED_PARAMETER, Space, ValueOrBounds, find_parameter_unit
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from rocking.plot.curves import Parameter
 
 #: Rounds of moves of draws from the posterior over populations, and draws for a fit without a fold.
-ROUNDS: Final = 4
-_DRAWS: Final = 256
+MOVE_ROUNDS: Final = 4
+DRAW_COUNT: Final = 256
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Validation:
     @property
     def scores(self) -> Scores:
         """Mean scores of the repeats."""
-        return Scores(*np.mean([astuple(one) for one in self.repeats], axis=0).tolist())
+        return Scores(*np.mean([astuple(scores) for scores in self.repeats], axis=0).tolist())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,8 +154,8 @@ class Calibration(Result):
         """
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
-        fell = overturned_under(self.blocks, motions, self.model)
-        return chances_of(self.weights @ fell, self.diagnostics.effective, self.outlier_probability)
+        overturned = simulate_outcomes(self.blocks, motions, self.model)
+        return compute_probabilities(self.weights @ overturned, self.diagnostics.effective, self.outlier_probability)
 
     def cross_validate(
         self, *, groups: Sequence[object] | None = None, folds: int = 10, repeats: int = 1, seed: int = 0
@@ -182,17 +182,17 @@ class Calibration(Result):
         InvalidOption
             If there are fewer groups than folds, or the labels do not match the motions.
         """
-        labels = group_labels(groups, len(self.observed), folds)
+        labels = label_groups(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
         evidence = replace(self._evidence)
         probabilities = np.empty((checks.integer(repeats, "repeats", InvalidOption, 1), len(self.observed)))
         for row in probabilities:
-            parts = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
-            for part in range(folds):
-                left_out = parts == part
-                kept, wanted = evidence.of_tests(~left_out), evidence.of_tests(left_out)
-                drawn = posterior(kept, _DRAWS, ROUNDS, rng)
-                row[left_out] = wanted.probabilities(drawn).mean(axis=0)
+            fold_numbers = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
+            for fold in range(folds):
+                is_left_out = fold_numbers == fold
+                fitted, predicted = evidence.select_tests(~is_left_out), evidence.select_tests(is_left_out)
+                populations = sample_posterior(fitted, DRAW_COUNT, MOVE_ROUNDS, rng)
+                row[is_left_out] = predicted.probabilities(populations).mean(axis=0)
         return Validation(probabilities, tuple(Scores.from_predictions(row, self.observed) for row in probabilities))
 
     def fragility(self, motions: Motions, *, model: Model | None = None, **options: Any) -> Fragility:
@@ -217,24 +217,34 @@ class Calibration(Result):
 
     def summary(self) -> str:
         rows = [
-            [name, one.median, one.lower, one.upper, f"{100 * one.dispersion:.0f} %", unit_of(name)]
-            for name, one in self.estimates.items()
+            [
+                name,
+                estimate.median,
+                estimate.lower,
+                estimate.upper,
+                f"{100 * estimate.dispersion:.0f} %",
+                find_parameter_unit(name),
+            ]
+            for name, estimate in self.estimates.items()
         ]
-        alike = 1.0 / float((self.weights**2).sum())
+        size = 1.0 / float((self.weights**2).sum())
         table = format_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows)
-        ensemble = f"ensemble of {format_count(len(self.blocks), 'block')}, equivalent to {alike:.0f} of equal weight"
+        ensemble = f"ensemble of {format_count(len(self.blocks), 'block')}, equivalent to {size:.0f} of equal weight"
         return f"{self._headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
 
     def to_dict(self) -> dict[str, Any]:
-        known = self.diagnostics
-        lists = {"bounds_reached": [asdict(one) for one in known.bounds_reached], "notes": [*known.notes]}
+        diagnostics = self.diagnostics
+        lists = {
+            "bounds_reached": [asdict(entry) for entry in diagnostics.bounds_reached],
+            "notes": [*diagnostics.notes],
+        }
         return {
             "model": self.model,
             "motions": len(self.observed),
             "overturned": int(self.observed.sum()),
-            "estimates": {name: asdict(one) for name, one in self.estimates.items()},
+            "estimates": {name: asdict(entry) for name, entry in self.estimates.items()},
             "fitted": asdict(self.scores),
-            "diagnostics": asdict(known) | lists,
+            "diagnostics": asdict(diagnostics) | lists,
             "probabilities": self.probabilities,
         }
 
@@ -252,20 +262,20 @@ class Calibration(Result):
         return draw_outcomes(
             probabilities=self.probabilities,
             overturned=self.observed,
-            parameters=[self._parameter(name) for name in self._evidence.candidates.space.unknown],
+            parameters=[self._create_parameter(name) for name in self._evidence.candidates.space.unknown],
             weights=self.weights,
             title=title or escape_dollars(self._headline()),
             ax=ax,
             figsize=figsize,
         )
 
-    def _parameter(self, name: str) -> Parameter:
-        """Return one parameter for a figure, for both sides if they may differ."""
+    def _create_parameter(self, name: str) -> Parameter:
+        """Create a parameter for a figure, for both sides if they may differ."""
         from rocking.plot.curves import Parameter
 
-        estimates = [one for key, one in self.estimates.items() if key.partition("_")[0] == name]
+        estimates = [estimate for key, estimate in self.estimates.items() if key.partition("_")[0] == name]
         values = getattr(self.blocks, name)[:, : len(estimates)]
-        ends = np.array([(one.median, one.lower, one.upper) for one in estimates])
+        ends = np.array([(estimate.median, estimate.lower, estimate.upper) for estimate in estimates])
         space = self._evidence.candidates.space
         low, high = (float(np.exp(end[space.unknown.index(name)])) for end in (space.lower, space.upper))
         return Parameter({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends, (low, high))
@@ -274,24 +284,24 @@ class Calibration(Result):
         return f"<Calibration: {self._headline()}; fitted: {self.scores}>"
 
 
-def overturned_under(blocks: Bodies, motions: Motions, model: Model) -> NDArray[np.float32]:
+def simulate_outcomes(blocks: Bodies, motions: Motions, model: Model) -> NDArray[np.float32]:
     """Return 1 for overturning, 0 for none, 0.5 for an abandoned simulation, shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model)
     note_missing(simulated.unfinished.values)
-    known = simulated.overturned.astype(np.float32).where(~simulated.unfinished, np.float32(0.5))
-    return np.asarray(known.transpose("block", "motion").values, dtype=np.float32)
+    outcomes = simulated.overturned.astype(np.float32).where(~simulated.unfinished, np.float32(0.5))
+    return np.asarray(outcomes.transpose("block", "motion").values, dtype=np.float32)
 
 
-def chances_of(share: Floats, effective: float, outlier_probability: float) -> Floats:
+def compute_probabilities(share: Floats, effective: float, outlier_probability: float) -> Floats:
     """Compute probabilities of recorded outcomes from a share of effective blocks, certain for a known block."""
-    expected = share if math.isinf(effective) else expected_share(share, effective)
+    expected = share if math.isinf(effective) else estimate_share(share, effective)
     return np.clip(
         with_outliers(expected, outlier_probability), 0.0, 1.0
     )  # rounding can make a sum of weights exceed 1
 
 
-def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
-    """Return the group of each motion, numbered from 0. By default each motion is a group."""
+def label_groups(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
+    """Assign a group number, from 0, to each motion. By default each motion is a group."""
     labels = number_groups(range(count) if groups is None else groups, "groups", count)
     checks.integer(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
@@ -302,9 +312,9 @@ def calibrate(
     overturned: ArrayLike,
     *,
     model: Model = "nonlinear",
-    p: Knowledge = (1.0, 10.0),
-    alpha: Knowledge = (0.02, 0.6),
-    restitution: Knowledge = (0.3, 0.999),
+    p: ValueOrBounds = (1.0, 10.0),
+    alpha: ValueOrBounds = (0.02, 0.6),
+    restitution: ValueOrBounds = (0.3, 0.999),
     two_sided: bool = True,
     outlier_probability: float = 0.005,
     candidates: int = 8192,
@@ -325,8 +335,8 @@ def calibrate(
         Known value on both sides in every test (a number, or a pair of equal numbers), or lowest and highest plausible
         value on either side (rad/s, rad, -) with a log-uniform prior. A body of known size has p =
         ``Block(width=..., height=...).p``. The restitution "housner" is computed from the slenderness as 1 - 1.5
-        sin(alpha)^2 (Housner 1963). For two sides it comes from a rectangle with an eccentric centre of mass and these
-        slendernesses, and p is the rectangle's.
+        sin(alpha)^2 :cite:p:`housner1963`. For two sides it comes from a rectangle with an eccentric centre of mass and
+        these slendernesses, and p is the rectangle's.
     two_sided : bool
         Whether the slendernesses of the two sides may differ, by a factor of at most 3. By default they may, unlike in
         `calibrate_history`, because few specimens are symmetric and outcomes alone would not reveal this.
@@ -360,10 +370,10 @@ def calibrate(
     Notes
     -----
     The block of each test is drawn from a population that is lognormal in p, alpha, restitution and the ratio of the
-    slendernesses. The posterior over populations is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra
-    2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs fill the bounds evenly, then
-    add blocks near their own best fits. Weights inverse to the density of candidates preserve the prior (deterministic
-    mixture, Owen and Zhou 2000).
+    slendernesses. The posterior over populations is sampled by sequential Monte Carlo
+    :cite:p:`delmoral2006`, with a lognormal prior on each dispersion (median 10 %). Two independent runs fill the
+    bounds evenly, then add blocks near their own best fits. Weights inverse to the density of candidates preserve the
+    prior (deterministic mixture, :cite:t:`owen2000`).
 
     Two mirrored blocks often explain the outcomes equally well. The estimates of each side are then wide, but the
     predictions are not.
@@ -372,77 +382,77 @@ def calibrate(
     --------
     >>> import rocking
     >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-    >>> found = calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-    >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
+    >>> calibration = calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+    >>> bool(calibration.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
     True
     """
-    tested = list_motions(motions)
-    observed = checked_outcomes(overturned, len(tested))
+    motion_list = list_motions(motions)
+    observed = check_outcomes(overturned, len(motion_list))
     space = Space.from_bounds(p, alpha, restitution, two_sided=checks.boolean(two_sided, "two_sided", InvalidOption))
     checks.fraction(outlier_probability, "outlier_probability", InvalidOption, below=0.5)
     checks.integer(candidates, "candidates", InvalidOption, 128)
     checks.integer(max_blocks, "max_blocks", InvalidOption, 1)
     rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
-    distinct, which = find_distinct_motions(tested)
+    distinct, motion_indices = find_distinct_motions(motion_list)
 
-    def tried(points: Floats) -> NDArray[np.float32]:
-        return np.take(overturned_under(space.blocks(points), distinct, model), which, axis=1)
+    def simulate_points(points: Floats) -> NDArray[np.float32]:
+        return np.take(simulate_outcomes(space.blocks(points), distinct, model), motion_indices, axis=1)
 
-    found = search(Problem(space, observed, outlier_probability, tried), candidates, rng)
-    evidence = found.evidence
-    final = posterior(evidence, 2 * _DRAWS, ROUNDS, rng)
-    weights = evidence.mean_weights(final)
-    kept, times = np.unique(systematic(weights, max_blocks, rng), return_counts=True)
+    result = search(Problem(space, observed, outlier_probability, simulate_points), candidates, rng)
+    evidence = result.evidence
+    populations = sample_posterior(evidence, 2 * DRAW_COUNT, MOVE_ROUNDS, rng)
+    weights = evidence.mean_weights(populations)
+    selected, counts = np.unique(resample(weights, max_blocks, rng), return_counts=True)
     calibration = Calibration(
-        blocks=space.blocks(evidence.candidates.points[kept]),
-        weights=times / max_blocks,
-        estimates=_estimates(space, final),
-        draws=space.named(unpacked(final)[0]),
-        probabilities=evidence.probabilities(final).mean(axis=0),
+        blocks=space.blocks(evidence.candidates.points[selected]),
+        weights=counts / max_blocks,
+        estimates=_compute_estimates(space, populations),
+        draws=space.parameters_by_name(unpack(populations)[0]),
+        probabilities=evidence.probabilities(populations).mean(axis=0),
         observed=observed,
         model=model,
         outlier_probability=outlier_probability,
         seed=seed,
-        diagnostics=diagnosed(found, final),
+        diagnostics=diagnose(result, populations),
     )
     object.__setattr__(calibration, "_evidence", evidence)
     return calibration
 
 
-def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
-    centres, dispersions = unpacked(populations)
+def _compute_estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
+    centres, dispersions = unpack(populations)
     sides = dispersions[:, : len(space.unknown)].copy()
     if space.two_sided:
         # The mean's logarithm plus or minus half the ratio's.
-        sided = space.unknown.index(SIDED)
+        sided = space.unknown.index(SIDED_PARAMETER)
         sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersions[:, -1])
     dispersion = dict(zip(space.unknown, sides.mean(axis=0).tolist(), strict=True))
     central = 0.9  # posterior share between the lower and upper end of an estimate
-    tails = (0.5, 0.5 * (1.0 - central), 0.5 * (1.0 + central))
+    probabilities = (0.5, 0.5 * (1.0 - central), 0.5 * (1.0 + central))
     estimates = {}
-    for name, values in space.named(centres).items():
-        median, lower, upper = np.quantile(values, tails).tolist()
+    for name, values in space.parameters_by_name(centres).items():
+        median, lower, upper = np.quantile(values, probabilities).tolist()
         estimates[name] = Estimate(median, lower, upper, dispersion[name.partition("_")[0]])
     return estimates
 
 
-def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
-    """Return outcomes (yes or no) as a read-only array, one for each motion and not all equal."""
+def check_outcomes(overturned: ArrayLike, count: int) -> Flags:
+    """Check that there is an outcome for each motion and not all are equal; return a read-only array."""
     if np.ma.is_masked(overturned):
-        raise InvalidOption("{} must be given for each motion, but some are masked", "overturned", value=overturned)
+        raise InvalidOption("{} must not be masked; provide an outcome for each motion", "overturned", value=overturned)
     values = np.asarray(overturned)
     if values.shape != (count,):
         raise InvalidOption(
-            f"{{}} must hold one outcome for each of the {count} motions, not {values.shape}",
+            f"{{}} must contain one outcome for each of the {count} motions; got shape {values.shape}",
             "overturned",
             value=overturned,
         )
     if not np.all(np.isin(values, (0, 1))):
-        raise InvalidOption("{} must hold True or False (or 1 or 0) for each motion", "overturned")
+        raise InvalidOption("{} must contain True or False (or 1 or 0) for each motion", "overturned")
     observed = values.astype(bool)
     if observed.all() or not observed.any():
         raise InvalidOption(
-            "the outcomes are all the same: calibration needs motions that overturn and motions that do not"
+            "all outcomes are equal; a calibration requires motions that overturn the block and motions that do not"
         )
     observed.flags.writeable = False
     return observed

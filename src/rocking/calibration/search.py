@@ -32,50 +32,50 @@ _DISPERSION_LOG_DEVIATION: Final = 0.6
 _BATCH: Final = 64
 
 
-#: Factor on the dispersions of a guide to draw blocks.
+#: Factor on the dispersions of fitted populations for drawing blocks.
 PROPOSAL_WIDTH: Final = 1.2
 
 #: Jeffreys' prior, Beta(1/2, 1/2), of a share estimated from n simulated blocks.
 _JEFFREYS: Final = 0.5
 
 
-def unpacked(populations: Floats) -> tuple[Floats, Floats]:
-    """Return centres and dispersions, shape (c, k) each."""
+def unpack(populations: Floats) -> tuple[Floats, Floats]:
+    """Split populations into centres and dispersions, shape (c, k) each."""
     k = populations.shape[1] // 2
     return populations[:, :k], np.exp(populations[:, k:])
 
 
-def with_dispersions(space: Space, centres: Floats, rng: np.random.Generator) -> Floats:
+def draw_dispersions(space: Space, centres: Floats, rng: np.random.Generator) -> Floats:
     """Draw dispersions from the prior for each centre."""
     scores = rng.standard_normal(centres.shape)
     return np.hstack([centres, np.log(space.dispersions) + _DISPERSION_LOG_DEVIATION * scores])
 
 
-def log_prior_of_dispersions(space: Space, populations: Floats) -> Floats:
+def compute_log_prior(space: Space, populations: Floats) -> Floats:
     """Compute the log-prior of the dispersions up to a constant, shape (c,)."""
     k = populations.shape[1] // 2
     scores = (populations[:, k:] - np.log(space.dispersions)) / _DISPERSION_LOG_DEVIATION
     return np.asarray(-0.5 * (scores**2).sum(axis=1))
 
 
-def drawn(populations: Floats, widened: float, count: int, rng: np.random.Generator) -> Floats:
-    """Draw points from populations in turn, with dispersions times `widened`, shape (count, k)."""
-    centre, dispersion = unpacked(populations[np.arange(count) % len(populations)])
-    return centre + widened * dispersion * rng.standard_normal(centre.shape)
+def draw_points(populations: Floats, width: float, count: int, rng: np.random.Generator) -> Floats:
+    """Draw points from populations in turn, with dispersions times `width`, shape (count, k)."""
+    centre, dispersion = unpack(populations[np.arange(count) % len(populations)])
+    return centre + width * dispersion * rng.standard_normal(centre.shape)
 
 
-def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
-    """Compute the log-density of the distribution of `drawn` at points, shape (n,)."""
-    centre, dispersion = unpacked(populations)
-    middle = centre.mean(axis=0)
-    centre, from_middle = centre - middle, points - middle
-    precision = (widened * dispersion) ** -2
+def compute_log_density(populations: Floats, width: float, points: Floats) -> Floats:
+    """Compute the log-density of the distribution of `draw_points` at points, shape (n,)."""
+    centre, dispersion = unpack(populations)
+    mean = centre.mean(axis=0)
+    centre, centred = centre - mean, points - mean
+    precision = (width * dispersion) ** -2
     constant = 0.5 * (np.log(precision / (2.0 * np.pi)) - precision * centre**2).sum(axis=1)
     powers = np.ascontiguousarray(np.vstack([(precision * centre).T, -0.5 * precision.T, constant]))
-    factors = np.hstack([from_middle, from_middle**2, np.ones((len(points), 1))])
-    found = np.empty(len(points))
-    kernel.write_log_sums(factors, powers, np.empty(len(populations)), found)
-    return np.asarray(found - np.log(len(populations)))
+    factors = np.hstack([centred, centred**2, np.ones((len(points), 1))])
+    log_sums = np.empty(len(points))
+    kernel.write_log_sums(factors, powers, np.empty(len(populations)), log_sums)
+    return np.asarray(log_sums - np.log(len(populations)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,22 +85,22 @@ class Candidates:
     space: Space
     points: Floats
     overturned: NDArray[np.float32]
-    evenly: int
-    guides: tuple[tuple[int, Floats], ...] = ()
+    even_count: int
+    proposals: tuple[tuple[int, Floats], ...] = ()
 
     @classmethod
-    def pooled(cls, runs: Sequence[Candidates]) -> Candidates:
+    def concatenate(cls, runs: Sequence[Candidates]) -> Candidates:
         """Concatenate candidates."""
         return cls(
             runs[0].space,
             np.concatenate([run.points for run in runs]),
             np.concatenate([run.overturned for run in runs]),
-            sum(run.evenly for run in runs),
-            tuple(guide for run in runs for guide in run.guides),
+            sum(run.even_count for run in runs),
+            tuple(proposal for run in runs for proposal in run.proposals),
         )
 
-    def of_tests(self, tests: Flags) -> Candidates:
-        """Return the same blocks under some of the motions."""
+    def select_tests(self, tests: Flags) -> Candidates:
+        """Select some of the motions."""
         return replace(self, overturned=np.ascontiguousarray(self.overturned[:, tests]))
 
     @cached_property
@@ -110,8 +110,10 @@ class Candidates:
 
     def log_density(self, points: Floats) -> Floats:
         """Compute the log-density of candidates per volume at points in the space, shape (c,)."""
-        parts = [np.full(len(points), np.log(self.evenly / self.space.volume))]
-        parts += [np.log(count) + log_density(guide, PROPOSAL_WIDTH, points) for count, guide in self.guides]
+        parts = [np.full(len(points), np.log(self.even_count / self.space.volume))]
+        parts += [
+            np.log(count) + compute_log_density(proposal, PROPOSAL_WIDTH, points) for count, proposal in self.proposals
+        ]
         return np.asarray(np.logaddexp.reduce(parts))
 
 
@@ -123,13 +125,13 @@ class Evidence:
     observed: Flags
     outlier_probability: float
 
-    def of_tests(self, tests: Flags) -> Evidence:
-        """Return the evidence of some of the tests."""
-        return replace(self, candidates=self.candidates.of_tests(tests), observed=self.observed[tests])
+    def select_tests(self, tests: Flags) -> Evidence:
+        """Select some of the tests."""
+        return replace(self, candidates=self.candidates.select_tests(tests), observed=self.observed[tests])
 
     def weights(self, populations: Floats) -> NDArray[np.float32]:
         """Compute the share of each population that each candidate represents, shape (c, n), with row sums 1."""
-        weights = self._factors(populations) @ self._powers
+        weights = self._compute_factors(populations) @ self._powers
         weights -= weights.max(axis=1, keepdims=True)
         np.exp(weights, out=weights)
         weights /= weights.sum(axis=1, keepdims=True)
@@ -143,59 +145,59 @@ class Evidence:
 
     def probabilities(self, populations: Floats) -> Floats:
         """Compute the probability of overturning for each population and motion, shape (c, m)."""
-        found, effective = self._shares(populations)
-        return with_outliers(expected_share(found, effective[:, None]), self.outlier_probability)
+        shares, effective = self._compute_shares(populations)
+        return with_outliers(estimate_share(shares, effective[:, None]), self.outlier_probability)
 
-    def effective(self, populations: Floats) -> Floats:
+    def count_effective(self, populations: Floats) -> Floats:
         """Compute the effective number of candidates that represent each population, shape (c,)."""
-        return self._shares(populations)[1]
+        return self._compute_shares(populations)[1]
 
     def log_likelihoods(self, populations: Floats) -> Floats:
         """Compute the log-likelihood of each population, shape (c,)."""
         if not len(populations):
             return np.zeros(0)
-        chances = with_outliers(self._shares(populations)[0], self.outlier_probability)
+        chances = with_outliers(self._compute_shares(populations)[0], self.outlier_probability)
         return np.asarray(np.log(np.where(self.observed, chances, 1.0 - chances)).sum(axis=1))
 
-    def _shares(self, populations: Floats) -> tuple[Floats, Floats]:
+    def _compute_shares(self, populations: Floats) -> tuple[Floats, Floats]:
         """Compute the share of each population that overturns, shape (c, m), and its effective number of candidates."""
-        overturned, powers, factors = self.candidates.overturned, self._powers, self._factors(populations)
-        found = np.empty((len(populations), overturned.shape[1]), np.float32)
+        overturned, powers, factors = self.candidates.overturned, self._powers, self._compute_factors(populations)
+        shares = np.empty((len(populations), overturned.shape[1]), np.float32)
         effective = np.empty(len(populations))
 
         def weigh(start: int, end: int) -> None:
             exponents = np.empty(powers.shape[1], np.float32)
             kernel.write_overturned_fractions(
-                factors[start:end], powers, overturned, exponents, found[start:end], effective[start:end]
+                factors[start:end], powers, overturned, exponents, shares[start:end], effective[start:end]
             )
 
-        each = max(-(-len(populations) // thread_count()), 16)
-        starts = range(0, len(populations), each)
+        batch = max(-(-len(populations) // thread_count()), 16)
+        starts = range(0, len(populations), batch)
         with ThreadPoolExecutor(max(len(starts), 1)) as pool:
-            list(pool.map(weigh, starts, (start + each for start in starts)))
+            list(pool.map(weigh, starts, (start + batch for start in starts)))
         # Rounding can make a share exceed 1.
-        return np.minimum(found, 1.0, dtype=np.float64), effective
+        return np.minimum(shares, 1.0, dtype=np.float64), effective
 
-    def _factors(self, populations: Floats) -> NDArray[np.float32]:
+    def _compute_factors(self, populations: Floats) -> NDArray[np.float32]:
         """Return factors, shape (c, 2 k + 1), of `_powers` in the logarithm of a candidate's weight."""
-        centre, dispersion = unpacked(populations)
+        centre, dispersion = unpack(populations)
         precision = dispersion**-2
-        from_middle = precision * (centre - self._middle)
-        return np.hstack([from_middle, -0.5 * precision, np.ones((len(centre), 1))]).astype(np.float32)
+        scaled = precision * (centre - self._centre)
+        return np.hstack([scaled, -0.5 * precision, np.ones((len(centre), 1))]).astype(np.float32)
 
     @cached_property
     def _powers(self) -> NDArray[np.float32]:
         """Return centred coordinates, their squares and the weights of the candidates, shape (2 k + 1, n)."""
-        points = self.candidates.points - self._middle
+        points = self.candidates.points - self._centre
         powers = np.vstack([points.T, points.T**2, self.candidates.log_weights])
         return np.ascontiguousarray(powers, dtype=np.float32)
 
     @cached_property
-    def _middle(self) -> Floats:
+    def _centre(self) -> Floats:
         return np.asarray(self.candidates.points.mean(axis=0))
 
 
-def expected_share(share: Floats, effective: ArrayLike) -> Floats:
+def estimate_share(share: Floats, effective: ArrayLike) -> Floats:
     """Compute the mean of a share estimated from this many effective blocks."""
     count = np.asarray(effective)
     return np.asarray((count * share + _JEFFREYS) / (count + 2.0 * _JEFFREYS))
@@ -207,51 +209,51 @@ def with_outliers(probabilities: Floats, outlier_probability: float) -> Floats:
 
 
 #: Number of independent runs.
-RUNS: Final = 2
+RUN_COUNT: Final = 2
 
-#: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the guiding likelihood. The
-#: search continues at most `_MORE` times if runs disagree or too few candidates are effective.
-_FILLING: Final = 2
+#: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the likelihood. The
+#: search continues at most `_MAX_EXTENSIONS` times if runs disagree or too few candidates are effective.
+_FILLING_PARTS: Final = 2
 _EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
-_MORE: Final = 2
+_MAX_EXTENSIONS: Final = 2
 
 #: Draws from a posterior, and rounds of moves after each tempering step, for the search and the comparison.
 _PROPOSAL: Final = (256, 2)
-_COMPARED: Final = (256, 4)
+_COMPARISON: Final = (256, 4)
 
 #: Largest R-hat of agreeing runs: their means differ by less than two thirds of a standard deviation.
-AGREEMENT: Final = 1.1
+MAX_R_HAT: Final = 1.1
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Calibration problem: parameter space, observed outcomes, and simulation of blocks (`tried`)."""
+    """Calibration problem: parameter space, observed outcomes, and simulation of blocks."""
 
     space: Space
     observed: Flags
     outlier_probability: float
-    tried: Callable[[Floats], NDArray[np.float32]]
+    simulate: Callable[[Floats], NDArray[np.float32]]
 
     def evidence(self, candidates: Candidates) -> Evidence:
         """Combine candidates with the observed outcomes."""
         return Evidence(candidates, self.observed, self.outlier_probability)
 
-    def filling(self, count: int, rng: np.random.Generator) -> Candidates:
+    def fill_space(self, count: int, rng: np.random.Generator) -> Candidates:
         """Simulate blocks that fill the space evenly."""
         points = self.space.quasi_random(count, rng)
-        return Candidates(self.space, points, self.tried(points), count)
+        return Candidates(self.space, points, self.simulate(points), count)
 
     def propose(self, candidates: Candidates, exponent: float, count: int, rng: np.random.Generator) -> Candidates:
         """Also simulate blocks near fitted populations, wider for a lower exponent of the likelihood."""
-        populations = posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent)
-        points = drawn(populations, PROPOSAL_WIDTH, count, rng)
+        populations = sample_posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent)
+        points = draw_points(populations, PROPOSAL_WIDTH, count, rng)
         points = points[self.space.contains(points)]
-        drawn_ones = Candidates(self.space, points, self.tried(points), 0, ((count, populations),))
-        return Candidates.pooled([candidates, drawn_ones])
+        proposed = Candidates(self.space, points, self.simulate(points), 0, ((count, populations),))
+        return Candidates.concatenate([candidates, proposed])
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
+class SearchResult:
     """Candidates of all runs together and of each run, and populations drawn from each run alone."""
 
     evidence: Evidence
@@ -259,49 +261,51 @@ class Search:
     posteriors: tuple[Floats, ...]
 
     @property
-    def effective(self) -> float:
+    def effective_candidates(self) -> float:
         """Effective number of candidates that represent a typical population."""
-        return float(np.median(self.evidence.effective(np.vstack(self.posteriors))))
+        return float(np.median(self.evidence.count_effective(np.vstack(self.posteriors))))
 
     @property
     def agreement(self) -> dict[str, float]:
         """R-hat between the runs of each parameter's centre, by name."""
-        named = [self.evidence.candidates.space.named(unpacked(one)[0]) for one in self.posteriors]
-        return {name: r_hat(np.array([one[name] for one in named])) for name in named[0]}
+        centres = [
+            self.evidence.candidates.space.parameters_by_name(unpack(populations)[0]) for populations in self.posteriors
+        ]
+        return {name: r_hat(np.array([populations[name] for populations in centres])) for name in centres[0]}
 
 
-def search(problem: Problem, candidates: int, rng: np.random.Generator) -> Search:
+def search(problem: Problem, candidates: int, rng: np.random.Generator) -> SearchResult:
     """Simulate about this many candidates, up to twice as many while runs disagree or few represent the posterior."""
-    part = max(candidates // (RUNS * (_FILLING + len(_EXPONENTS))), 1)
-    streams = rng.spawn(RUNS)
-    runs: Sequence[Candidates] = [problem.filling(_FILLING * part, stream) for stream in streams]
-    found = _compared(problem, runs, _EXPONENTS, part, streams)
-    for _ in range(_MORE):
-        if max(found.agreement.values()) >= AGREEMENT:
+    part_size = max(candidates // (RUN_COUNT * (_FILLING_PARTS + len(_EXPONENTS))), 1)
+    streams = rng.spawn(RUN_COUNT)
+    runs: Sequence[Candidates] = [problem.fill_space(_FILLING_PARTS * part_size, stream) for stream in streams]
+    result = _extend_runs(problem, runs, _EXPONENTS, part_size, streams)
+    for _ in range(_MAX_EXTENSIONS):
+        if max(result.agreement.values()) >= MAX_R_HAT:
             exponents = 0.1, 0.3, 1.0
-        elif found.effective < 100.0:  # a single block that happens to fit would make a population look excellent
+        elif result.effective_candidates < 100.0:  # few blocks overrate a population that one of them fits by chance
             exponents = 1.0, 1.0, 1.0
         else:
             break
-        found = _compared(problem, found.runs, exponents, part, streams)
-    return found
+        result = _extend_runs(problem, result.runs, exponents, part_size, streams)
+    return result
 
 
-def _compared(
+def _extend_runs(
     problem: Problem,
     runs: Sequence[Candidates],
     exponents: Sequence[float],
-    part: int,
+    part_size: int,
     streams: Sequence[np.random.Generator],
-) -> Search:
-    """Let every run add blocks near its own fits, and compare the runs."""
-    longer, posteriors = [], []
+) -> SearchResult:
+    """Extend every run by blocks near its fits, and compare the runs."""
+    extended, posteriors = [], []
     for run, rng in zip(runs, streams, strict=True):
         for exponent in exponents:
-            run = problem.propose(run, exponent, part, rng)
-        longer.append(run)
-        posteriors.append(posterior(problem.evidence(run), *_COMPARED, rng))
-    return Search(problem.evidence(Candidates.pooled(longer)), tuple(longer), tuple(posteriors))
+            run = problem.propose(run, exponent, part_size, rng)
+        extended.append(run)
+        posteriors.append(sample_posterior(problem.evidence(run), *_COMPARISON, rng))
+    return SearchResult(problem.evidence(Candidates.concatenate(extended)), tuple(extended), tuple(posteriors))
 
 
 def r_hat(runs: Floats) -> float:
@@ -309,15 +313,15 @@ def r_hat(runs: Floats) -> float:
     from scipy.special import ndtri
     from scipy.stats import rankdata
 
-    def of_ranks(values: Floats) -> float:
+    def compute_from_ranks(values: Floats) -> float:
         scores = ndtri((rankdata(values).reshape(values.shape) - 0.375) / (values.size + 0.25))
         within, between = float(scores.var(axis=1, ddof=1).mean()), float(scores.mean(axis=1).var(ddof=1))
         return math.sqrt((values.shape[1] - 1) / values.shape[1] + between / within)
 
-    return max(of_ranks(values) for values in (runs, np.abs(runs - np.median(runs))))
+    return max(compute_from_ranks(values) for values in (runs, np.abs(runs - np.median(runs))))
 
 
-def posterior(
+def sample_posterior(
     evidence: Evidence, count: int, rounds: int, rng: np.random.Generator, *, exponent: float = 1.0
 ) -> Floats:
     """Draw populations from the posterior, shape (count, 2 k), or from a tempered one if an exponent is set.
@@ -328,26 +332,26 @@ def posterior(
     """
     space, points = evidence.candidates.space, evidence.candidates.points
     centres = points[rng.choice(len(points), min(4 * count, len(points)), replace=False)]
-    particles = with_dispersions(space, centres, rng)
-    start, end = _log_densities(evidence, exponent, particles)
+    particles = draw_dispersions(space, centres, rng)
+    start, end = _compute_log_densities(evidence, exponent, particles)
     with Progress("fitting", 100) as bar:
-        done = 0.0
-        while done < 1.0:
-            step = _step(end - start, 1.0 - done)
-            bar.advance(round(100 * (done + step)) - round(100 * done))
-            done += step
-            chosen = systematic(_tempered(end - start, step), count, rng)
-            particles, start, end = particles[chosen], start[chosen], end[chosen]
+        temperature = 0.0
+        while temperature < 1.0:
+            increase = _find_step(end - start, 1.0 - temperature)
+            bar.advance(round(100 * (temperature + increase)) - round(100 * temperature))
+            temperature += increase
+            indices = resample(_temper_weights(end - start, increase), count, rng)
+            particles, start, end = particles[indices], start[indices], end[indices]
             for _ in range(rounds):
-                _move(evidence, exponent, done, particles, start, end, rng)
+                _move_particles(evidence, exponent, temperature, particles, start, end, rng)
     return particles
 
 
-def _log_densities(evidence: Evidence, exponent: float, populations: Floats) -> tuple[Floats, Floats]:
+def _compute_log_densities(evidence: Evidence, exponent: float, populations: Floats) -> tuple[Floats, Floats]:
     """Compute log-densities of the initial distribution of the particles and of the posterior."""
     candidates, centres = evidence.candidates, populations[:, : populations.shape[1] // 2]
     inside = candidates.space.contains(centres)
-    end = log_prior_of_dispersions(candidates.space, populations)
+    end = compute_log_prior(candidates.space, populations)
     start = end + np.where(inside, 0.0, -np.inf)
     start[inside] += candidates.log_density(centres[inside])
     end[inside] += exponent * evidence.log_likelihoods(populations[inside])
@@ -355,10 +359,10 @@ def _log_densities(evidence: Evidence, exponent: float, populations: Floats) -> 
     return start, end
 
 
-def _move(
+def _move_particles(
     evidence: Evidence,
     exponent: float,
-    done: float,
+    temperature: float,
     particles: Floats,
     start: Floats,
     end: Floats,
@@ -368,22 +372,22 @@ def _move(
     shuffled = rng.permutation(len(particles))
     half = len(particles) // 2
     for movers, guides in ((shuffled[:half], shuffled[half:]), (shuffled[half:], shuffled[:half])):
-        new = particles[movers] + _differences(particles[guides], len(movers), rng)
-        new_start, new_end = _log_densities(evidence, exponent, new)
+        new = particles[movers] + _draw_differences(particles[guides], len(movers), rng)
+        new_start, new_end = _compute_log_densities(evidence, exponent, new)
         with np.errstate(invalid="ignore"):
-            gain = (1.0 - done) * (new_start - start[movers]) + done * (new_end - end[movers])
+            gain = (1.0 - temperature) * (new_start - start[movers]) + temperature * (new_end - end[movers])
         accepted = np.log(rng.random(len(movers))) < gain
-        there = movers[accepted]
-        particles[there], start[there], end[there] = new[accepted], new_start[accepted], new_end[accepted]
+        indices = movers[accepted]
+        particles[indices], start[indices], end[indices] = new[accepted], new_start[accepted], new_end[accepted]
 
 
-def systematic(weights: Floats, count: int, rng: np.random.Generator) -> Integers:
+def resample(weights: Floats, count: int, rng: np.random.Generator) -> Integers:
     """Draw indices in proportion to weights with sum 1, as evenly as possible (systematic resampling)."""
     steps = np.cumsum(weights)
     return np.searchsorted(steps / steps[-1], (np.arange(count) + rng.random()) / count).astype(np.int64)
 
 
-def _differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats:
+def _draw_differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats:
     first, second = (rng.integers(len(guides), size=count) for _ in range(2))
     size = guides.shape[1]
     # 2.38/sqrt(2 d) suits a normal posterior (ter Braak 2006). Whole differences jump between optima.
@@ -392,15 +396,15 @@ def _differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats
     return scale[:, None] * (guides[first] - guides[second]) + 1e-3 * rng.standard_normal((count, size))
 
 
-def _tempered(likelihood: Floats, step: float) -> Floats:
+def _temper_weights(likelihood: Floats, step: float) -> Floats:
     weights = np.exp(step * (likelihood - likelihood.max()))
     return np.asarray(weights / weights.sum())
 
 
-def _step(likelihood: Floats, most: float) -> float:
+def _find_step(likelihood: Floats, max_step: float) -> float:
     """Find by bisection the increase of the exponent that keeps half of the particles effective."""
 
-    def too_few(step: float) -> bool:
-        return 1.0 / float((_tempered(likelihood, step) ** 2).sum()) / len(likelihood) < 0.5
+    def has_too_few(step: float) -> bool:
+        return 1.0 / float((_temper_weights(likelihood, step) ** 2).sum()) / len(likelihood) < 0.5
 
-    return bisect(0.0, most, too_few, halvings=50)[1] if too_few(most) else most
+    return bisect(0.0, max_step, has_too_few, halvings=50)[1] if has_too_few(max_step) else max_step

@@ -23,29 +23,29 @@ PARAMETERS: Final = ("p", "alpha", "restitution")
 _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "initial": "rad"}
 
 #: Largest values of a block's parameters.
-HIGHEST: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
+MAX_VALUES: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
 
 #: The sides of a rigid body differ in slenderness as much as the pivots in distance from the centre of mass. Their p
 #: and restitution differ only to second order, which outcomes do not reveal.
-SIDED: Final = "alpha"
+SIDED_PARAMETER: Final = "alpha"
 
 
 #: Restitution from the slenderness (Housner 1963), where positive. For two sides it comes from a rectangle with an
 #: eccentric centre of mass. Then p is the rectangle's and differs from the sides' values.
 HOUSNER: Final = "housner"
-_HOUSNER_ENDS: Final = math.asin(math.sqrt(2.0 / 3.0))
+_MAX_HOUSNER_ALPHA: Final = math.asin(math.sqrt(2.0 / 3.0))
 
 
 #: Message for a problem without unknowns.
-EVERYTHING_IS_KNOWN: Final = (
-    "everything is known of the block, so that nothing is to be found: give a pair (lowest, highest) for what is not "
-    "known, or ask what the known block does by simulate, and how probably it overturns by fragility"
+NO_UNKNOWNS: Final = (
+    "all parameters are known, so that there is nothing to estimate: use a pair (lowest, highest) for each unknown "
+    "parameter, or call simulate or fragility with the known block"
 )
 
 Range = tuple[float, float]
 
-#: Knowledge of a parameter: its value, its bounds, or for a restitution Housner's rule.
-Knowledge = float | Range | Literal["housner"]
+#: Input of a parameter: its value, its bounds, or for a restitution Housner's rule.
+ValueOrBounds = float | Range | Literal["housner"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,30 +63,32 @@ class Space:
     ratio: float
 
     @classmethod
-    def from_bounds(cls, p: Knowledge, alpha: Knowledge, restitution: Knowledge, *, two_sided: bool) -> Space:
+    def from_bounds(
+        cls, p: ValueOrBounds, alpha: ValueOrBounds, restitution: ValueOrBounds, *, two_sided: bool
+    ) -> Space:
         """Create the space of the unknown parameters."""
         bounds, known = {}, {}
-        for name, given in zip(PARAMETERS, (p, alpha, restitution), strict=True):
-            if isinstance(given, str):
-                if name != "restitution" or given != HOUSNER:
-                    wanted = "a value or a pair (lowest, highest)" + f", or {HOUSNER!r}" * (name == "restitution")
-                    raise InvalidOption(f"{{}} must be {wanted}, not {given!r}", name, value=given)
-            elif is_known(given):
-                known[name] = known_value(np.ravel(given)[0], name)
+        for name, value in zip(PARAMETERS, (p, alpha, restitution), strict=True):
+            if isinstance(value, str):
+                if name != "restitution" or value != HOUSNER:
+                    alternatives = "a value or a pair (lowest, highest)" + f", or {HOUSNER!r}" * (name == "restitution")
+                    raise InvalidOption(f"{{}} must be {alternatives}; got {value!r}", name, value=value)
+            elif is_known(value):
+                known[name] = check_known_value(np.ravel(value)[0], name)
             else:
-                bounds[name] = value_range(given, name, HIGHEST[name])
+                bounds[name] = parse_range(value, name, MAX_VALUES[name])
         if not bounds:
-            raise InvalidOption(EVERYTHING_IS_KNOWN)
-        steepest = bounds.get("alpha", (0.0, known.get("alpha", 0.0)))[1]
-        if "restitution" not in {*bounds, *known} and steepest >= _HOUSNER_ENDS:
+            raise InvalidOption(NO_UNKNOWNS)
+        max_alpha = bounds.get("alpha", (0.0, known.get("alpha", 0.0)))[1]
+        if "restitution" not in {*bounds, *known} and max_alpha >= _MAX_HOUSNER_ALPHA:
             raise InvalidOption(
-                f"Housner's restitution is positive for {{}} below {_HOUSNER_ENDS:.4f} rad only", "alpha"
+                f"Housner's restitution is positive for {{}} below {_MAX_HOUSNER_ALPHA:.4f} rad only", "alpha"
             )
         lower, upper = np.log(list(bounds.values())).T
         ratio = 0.0
-        if two_sided and SIDED in bounds:
+        if two_sided and SIDED_PARAMETER in bounds:
             # Narrow bounds limit the ratio. Otherwise their box would be almost empty.
-            ratio = min(math.log(3.0), math.log(bounds[SIDED][1] / bounds[SIDED][0]))
+            ratio = min(math.log(3.0), math.log(bounds[SIDED_PARAMETER][1] / bounds[SIDED_PARAMETER][0]))
         return cls(tuple(bounds), known, lower, upper, ratio)
 
     @property
@@ -111,11 +113,11 @@ class Space:
 
         low, high = self.box
         sequence = qmc.Halton(len(low), rng=rng)
-        found = np.empty((0, len(low)))
-        while len(found) < count:
+        inside = np.empty((0, len(low)))
+        while len(inside) < count:
             points = qmc.scale(sequence.random(count), low, high)
-            found = np.concatenate([found, points[self.contains(points)]])
-        return found[:count]
+            inside = np.concatenate([inside, points[self.contains(points)]])
+        return inside[:count]
 
     @cached_property
     def volume(self) -> float:
@@ -135,8 +137,8 @@ class Space:
 
     def sides(self, points: Floats) -> dict[str, Floats]:
         """Return p, alpha and restitution by name, for side + and side -, shape (n, 2) each."""
-        found = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
-        values = found | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
+        unknown_values = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
+        values = unknown_values | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
         if "restitution" not in values and self.two_sided:
             factors, values["restitution"] = eccentric_rectangles(values["alpha"])
             values["p"] = values["p"] * factors
@@ -144,13 +146,13 @@ class Space:
             values["restitution"] = np.vectorize(housner_restitution)(values["alpha"])
         return values
 
-    def named(self, points: Floats) -> dict[str, Floats]:
+    def parameters_by_name(self, points: Floats) -> dict[str, Floats]:
         """Return the unknown parameters by name, for each side if they differ, shape (n,) each."""
         values = np.exp(self._log_sides(points))
         return {
             name + side: values[:, i, k]
             for k, name in enumerate(self.unknown)
-            for i, side in enumerate(("_plus", "_minus") if self.two_sided and name == SIDED else ("",))
+            for i, side in enumerate(("_plus", "_minus") if self.two_sided and name == SIDED_PARAMETER else ("",))
         }
 
     def blocks(self, points: Floats) -> Blocks:
@@ -164,38 +166,38 @@ class Space:
         f = len(self.unknown)
         half = np.zeros((len(points), f))
         if self.two_sided:
-            half[:, self.unknown.index(SIDED)] = 0.5 * points[:, f]
+            half[:, self.unknown.index(SIDED_PARAMETER)] = 0.5 * points[:, f]
         return np.stack([points[:, :f] + half, points[:, :f] - half], axis=1)
 
 
-def unit_of(estimate: str) -> str:
+def find_parameter_unit(estimate: str) -> str:
     """Return the unit of an estimate: a parameter (of either side) or the initial rotation."""
     return _UNITS[estimate.partition("_")[0]]
 
 
-def is_known(given: Any) -> bool:
+def is_known(value: Any) -> bool:
     """Return whether a parameter has a value: a number, or a pair of equal numbers."""
-    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
+    if isinstance(value, str) or not isinstance(value, Sequence | np.ndarray):
         return True
-    return len(given) == 2 and all(np.ndim(end) == 0 for end in given) and bool(given[0] == given[1])
+    return len(value) == 2 and all(np.ndim(end) == 0 for end in value) and bool(value[0] == value[1])
 
 
-def known_value(value: object, name: str) -> float:
-    """Return the value of a known parameter, within the range allowed for blocks."""
-    known = checks.positive(value, name, InvalidOption, unit_of(name))
-    if known > HIGHEST[name]:
-        raise InvalidOption(f"{{}} must be at most {HIGHEST[name]:g}, not {known:g}", name, value=known)
+def check_known_value(value: object, name: str) -> float:
+    """Check a known parameter against the range allowed for blocks."""
+    known = checks.positive(value, name, InvalidOption, find_parameter_unit(name))
+    if known > MAX_VALUES[name]:
+        raise InvalidOption(f"{{}} must be at most {MAX_VALUES[name]:g}, not {known:g}", name, value=known)
     return known
 
 
-def value_range(pair: Any, name: str, highest: float) -> Range:
-    """Return the ends of a range, increasing numbers between 0 and `highest`."""
+def parse_range(pair: Any, name: str, max_value: float) -> Range:
+    """Parse the ends of a range, increasing numbers between 0 and `max_value`."""
     try:
         low, high = (checks.real(value, f"each of {name}", InvalidOption) for value in pair)
     except (TypeError, ValueError):
         raise InvalidOption(f"{{}} must be a pair (lowest, highest), not {pair!r}", name, value=pair) from None
-    if not 0.0 < low < high <= highest or math.isinf(high):
-        limit = "" if math.isinf(highest) else f" and at most {highest:g}"
+    if not 0.0 < low < high <= max_value or math.isinf(high):
+        limit = "" if math.isinf(max_value) else f" and at most {max_value:g}"
         hint = checks.hint_at_degrees(high) if name == "alpha" else ""
         raise InvalidOption(
             f"{{}} must be a pair (lowest, highest) of positive, increasing numbers{limit}, "

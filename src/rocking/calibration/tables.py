@@ -24,11 +24,11 @@ from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.records.named import load_motion, load_vertical, path_exists
 
-_ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
+_BOOLEANS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class MeasuredHistory:
     """Measured rotation: times (s) and rotations (rad), shape (n,) each."""
 
     times: Floats
@@ -56,36 +56,38 @@ class _Table:
         """Return the numbers of a column."""
         return np.array([self.convert(line, row[column], float, "a number") for line, row in self.rows])
 
-    def answers(self, column: str) -> tuple[bool, ...]:
+    def booleans(self, column: str) -> tuple[bool, ...]:
         """Return the truth values of a column: 1 or 0, yes or no, true or false."""
-        read, what = _ANSWERS.__getitem__, "0 or 1, no or yes, false or true"
-        return tuple(self.convert(line, row[column].lower(), read, what) for line, row in self.rows)
+        parse, expected = _BOOLEANS.__getitem__, "0 or 1, no or yes, false or true"
+        return tuple(self.convert(line, row[column].lower(), parse, expected) for line, row in self.rows)
 
-    def convert(self, line: int, text: str, how: Callable[[str], Any], what: str) -> Any:
+    def convert(self, line: int, text: str, parse: Callable[[str], Any], expected: str) -> Any:
         """Convert a cell, or raise an error with its line and the expected kind of value."""
         try:
-            return how(text)
+            return parse(text)
         except (ValueError, KeyError):
-            raise self.error(f"{text!r} is not {what}; correct it", line=line, value=text) from None
+            raise self.create_error(f"{text!r} is not {expected}; correct it", line=line, value=text) from None
 
-    def error(self, message: str, *arguments: str, line: int | None = 1, value: object = None) -> UnreadableRecord:
-        """Return an error about a line of the table, by default its header."""
+    def create_error(
+        self, message: str, *arguments: str, line: int | None = 1, value: object = None
+    ) -> UnreadableRecord:
+        """Create an error about a line of the table, by default its header."""
         return UnreadableRecord(message, *arguments, path=str(self.path), line=line, value=value)
 
 
 def read_calibration(
     path: Path, *, channel: str | None, dt: float | None, units: str | None
-) -> list[ShakeTest] | History:
+) -> list[ShakeTest] | MeasuredHistory:
     """Read tests (see `read_tests`) or a history with columns `time_s` and `rotation_rad` or `rotation_deg`."""
     table = read_table(path)
     if {"motion", "overturned"} <= set(table.columns):
-        return _tests_of(table, channel=channel, dt=dt, units=units)
+        return _create_tests(table, channel=channel, dt=dt, units=units)
     if {"rotation_rad", "rotation_deg"} <= set(table.columns):
-        raise table.error("rotation must be there once, in rad or in deg, but rotation_rad and rotation_deg are there")
+        raise table.create_error("the table must contain either rotation_rad or rotation_deg, not both")
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
         if {"time_s", column} <= set(table.columns):
-            return History(table.numbers("time_s"), unit * table.numbers(column))
-    raise table.error(
+            return MeasuredHistory(table.numbers("time_s"), unit * table.numbers(column))
+    raise table.create_error(
         "the columns must be motion,overturned (outcomes) or time_s,rotation_rad or time_s,rotation_deg (a history), "
         f"not {','.join(table.columns)}"
     )
@@ -100,11 +102,13 @@ def read_ensemble(path: Path) -> Ensemble:
     ]
     missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
     if missing:
-        raise table.error(f"no ensemble of a calibration, whose ensemble.csv has {' and '.join(missing)}")
-    known: dict[str, Model] = {name: name for name in get_args(Model)}
-    models = {table.convert(line, row["model"], known.__getitem__, "linear or nonlinear") for line, row in table.rows}
+        raise table.create_error(f"not the ensemble.csv of a calibration: {' and '.join(missing)} missing")
+    model_names: dict[str, Model] = {name: name for name in get_args(Model)}
+    models = {
+        table.convert(line, row["model"], model_names.__getitem__, "linear or nonlinear") for line, row in table.rows
+    }
     if len(models) > 1:
-        raise table.error("an ensemble has one model, not both; correct the column model", line=None)
+        raise table.create_error("an ensemble must have one model, not both; correct the column model", line=None)
     try:
         blocks = Blocks(*(np.column_stack([table.numbers(side) for side in sides]) for sides in columns))
     except RockingError as error:
@@ -114,79 +118,85 @@ def read_ensemble(path: Path) -> Ensemble:
     return Ensemble(blocks, table.numbers("weight"), models.pop())
 
 
-def read_table(path: Path, name: Callable[[str], str] = str) -> _Table:
+def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Table:
     """Read a CSV table with distinct columns, whose header cells are converted by `name`."""
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
-        raise UnreadableRecord(f"it cannot be read: {error.strerror}", path=str(path)) from None
+        raise UnreadableRecord(f"the file cannot be read: {error.strerror}", path=str(path)) from None
     except UnicodeDecodeError:
-        raise UnreadableRecord("it is no text table; save it as CSV", path=str(path)) from None
+        raise UnreadableRecord("the file is not a text table in UTF-8; save it as CSV", path=str(path)) from None
     cells = read_csv_rows(text)
     if len(cells) < 2:
-        raise UnreadableRecord("it holds no rows below its header", path=str(path))
+        raise UnreadableRecord("the table has no rows below its header", path=str(path))
     (_, header), *rows = cells
-    columns = [name(cell) for cell in header]
-    if doubled := [column for column in dict.fromkeys(columns) if columns.count(column) > 1]:
-        text = f"each column must be there once, but {' and '.join(doubled)} several times"
+    columns = [convert_heading(cell) for cell in header]
+    if duplicates := [column for column in dict.fromkeys(columns) if columns.count(column) > 1]:
+        text = f"column names must be distinct; got {' and '.join(duplicates)} more than once"
         raise UnreadableRecord(text, path=str(path), line=1)
     for line, row in rows:
         if len(row) != len(columns):
-            found = f"{format_count(len(row), 'cell')} under {format_count(len(columns), 'column')}"
-            raise UnreadableRecord(f"{found}; correct it", path=str(path), line=line)
+            mismatch = f"{format_count(len(row), 'cell')} under {format_count(len(columns), 'column')}"
+            raise UnreadableRecord(f"{mismatch}; correct it", path=str(path), line=line)
     return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
 
-def _tests_of(table: _Table, **about: Any) -> list[ShakeTest]:
-    """Return the tests of a table with these columns."""
+def _create_tests(table: _Table, **metadata: Any) -> list[ShakeTest]:
+    """Create the tests of a table with these columns."""
     specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
     if len(specimens) > 1:
-        raise table.error(f"the tests are of {format_count(len(specimens), 'specimen')}: give each a table of its own")
-    overturned, motions = table.answers("overturned"), _motions_of(table, **about)
+        raise table.create_error(f"the tests are of {format_count(len(specimens), 'specimen')}; use a table for each")
+    overturned, motions = table.booleans("overturned"), _load_row_motions(table, **metadata)
     names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
-    return [ShakeTest(*each) for each in zip(motions, overturned, names, groups, strict=True)]
+    return [ShakeTest(*row) for row in zip(motions, overturned, names, groups, strict=True)]
 
 
-def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
+def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
     """Read each row's motion, scaled and with its vertical. The row's channel, dt_s and units take precedence."""
     several = len({row["motion"] for _, row in table.rows}) > 1
-    read: dict[tuple[object, ...], Motion] = {}
+    loaded: dict[tuple[object, ...], Motion] = {}
     motions = []
     for line, row in table.rows:
-        scale = table.convert(line, row.get("scale") or "1", _finite, "a number")
+        scale = table.convert(line, row.get("scale") or "1", _parse_finite, "a number")
         step = row.get("dt_s") or ""
-        own = row.get("channel"), table.convert(line, step, float, "a number") if step else None, row.get("units")
-        about = {"channel": own[0] or channel, "dt": dt if own[1] is None else own[1], "units": own[2] or units}
+        cells = row.get("channel"), table.convert(line, step, float, "a number") if step else None, row.get("units")
+        metadata = {
+            "channel": cells[0] or channel,
+            "dt": dt if cells[1] is None else cells[1],
+            "units": cells[2] or units,
+        }
         name, vertical = row["motion"], row.get("vertical") or ""
         try:
-            if (key := (name, vertical, *own)) not in read:
-                read[key] = _motion_of(table.path, name, vertical, several=several and not any(own), **about)
-            motions.append(read[key] if scale == 1.0 else read[key].scaled(scale))
+            if (key := (name, vertical, *cells)) not in loaded:
+                loaded[key] = _load_row_motion(
+                    table.path, name, vertical, several=several and not any(cells), **metadata
+                )
+            motions.append(loaded[key] if scale == 1.0 else loaded[key].scaled(scale))
         except RockingError as error:
-            where = str(error).removesuffix(str(error.message))  # file of the record, before the table
-            raise table.error(
-                where + error.message.template, *error.message.arguments, line=line, value=error.value
+            record_file = str(error).removesuffix(str(error.message))  # file of the record, before the table
+            raise table.create_error(
+                record_file + error.message.template, *error.message.arguments, line=line, value=error.value
             ) from error
     return tuple(motions)
 
 
-def _motion_of(table: Path, name: str, vertical: str, *, several: bool, **about: Any) -> Motion:
+def _load_row_motion(table: Path, name: str, vertical: str, *, several: bool, **metadata: Any) -> Motion:
     """Read a record or pulse (in command syntax) with its optional vertical component."""
-    record = _beside(table, name)
-    upwards = _beside(table, vertical) if vertical else None
+    record = _resolve_path(table, name)
+    vertical_source = _resolve_path(table, vertical) if vertical else None
     if record != name or name.partition(":")[0] not in FAMILIES:
-        return load_motion(record, vertical=upwards, **about, several=several)
+        return load_motion(record, vertical=vertical_source, **metadata, several=several)
     pulse = named_pulse(name)
-    return pulse if upwards is None else pulse.with_vertical(load_vertical(upwards, record, **about))
+    return pulse if vertical_source is None else pulse.with_vertical(load_vertical(vertical_source, record, **metadata))
 
 
-def _beside(table: Path, name: str) -> str:
-    """Return the path of a file relative to the table's folder if it exists there."""
-    beside = table.parent / name
-    return str(beside) if path_exists(beside) else name
+def _resolve_path(table: Path, name: str) -> str:
+    """Resolve a file name relative to the table's folder if such a file exists."""
+    sibling = table.parent / name
+    return str(sibling) if path_exists(sibling) else name
 
 
-def _finite(text: str) -> float:
+def _parse_finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
         raise ValueError(text)
@@ -236,8 +246,8 @@ def read_tests(
     """
     table = read_table(checks.path(path, "path of a table", UnreadableRecord))
     if not {"motion", "overturned"} <= {*table.columns}:
-        raise table.error(f"the columns must be motion and overturned, each once, not {','.join(table.columns)}")
-    return _tests_of(table, channel=channel, dt=dt, units=units)
+        raise table.create_error(f"the columns must include motion and overturned; got {','.join(table.columns)}")
+    return _create_tests(table, channel=channel, dt=dt, units=units)
 
 
 def read_observed(
@@ -251,29 +261,29 @@ def read_observed(
     """
     table = read_table(path, normalise_heading)
     columns = table.columns
-    found = [name for name in columns if name in HEADINGS]
-    if "overturned" not in columns or len(found) + ("motion" in columns) != 1:
-        raise table.error(
+    intensities = [name for name in columns if name in HEADINGS]
+    if "overturned" not in columns or len(intensities) + ("motion" in columns) != 1:
+        raise table.create_error(
             f"the columns must be overturned and either motion or one of {', '.join(HEADINGS)}, not {','.join(columns)}"
         )
-    counts = "trials" in columns
+    has_trials = "trials" in columns
     observed: dict[str, Any] = {
-        "exceeded": table.numbers("overturned") if counts else [*table.answers("overturned")],
-        "trials": table.numbers("trials") if counts else 1,
-        "clusters": _clusters(table, {}) if "group" in columns else None,
+        "exceeded": table.numbers("overturned") if has_trials else [*table.booleans("overturned")],
+        "trials": table.numbers("trials") if has_trials else 1,
+        "clusters": _join_clusters(table, {}) if "group" in columns else None,
     }
-    if found:
-        observed |= _against_intensity(table, found[0], measure)
+    if intensities:
+        observed |= _pair_with_intensity(table, intensities[0], measure)
     else:
-        observed |= _under_motions(table, measure, channel=channel, dt=dt, units=units)
+        observed |= _pair_with_motions(table, measure, channel=channel, dt=dt, units=units)
     outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(table.rows)))))
     return observed | {"description": f"{format_count(outcomes, 'observed outcome')} in {path.name}"}
 
 
-def _against_intensity(table: _Table, heading: str, measure: Measure) -> dict[str, Any]:
+def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[str, Any]:
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
-        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
+        raise InvalidOption("a spectral acceleration requires {}, in s", "period", path=str(table.path))
     if measure.name not in ("pga", kind):  # "pga" is the default
         raise InvalidOption(
             f"{{}} is {measure.name}, but the outcomes are given by {kind}: leave it out",
@@ -283,24 +293,28 @@ def _against_intensity(table: _Table, heading: str, measure: Measure) -> dict[st
     return {"intensity": factor * table.numbers(heading), "measure": measure if kind == "sa" else Measure(kind)}
 
 
-def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, Any]:
+def _pair_with_motions(table: _Table, measure: Measure, **metadata: Any) -> dict[str, Any]:
     if measure.in_block_units:
-        raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
-    motions = _motions_of(table, **files)
-    of_name = {row["motion"]: motion for (_, row), motion in zip(table.rows, motions, strict=True) if motion.pga > 0.0}
-    families = dict(zip(of_name, number_families([*of_name.values()]), strict=True)) if of_name else {}
+        raise InvalidOption(f"{measure.name} is in units of the block, which is unknown for observed outcomes; use pga")
+    motions = _load_row_motions(table, **metadata)
+    motions_by_name = {
+        row["motion"]: motion for (_, row), motion in zip(table.rows, motions, strict=True) if motion.pga > 0.0
+    }
+    families = (
+        dict(zip(motions_by_name, number_families([*motions_by_name.values()]), strict=True)) if motions_by_name else {}
+    )
     intensity = [measure.value(motion) for motion in motions]
-    return {"intensity": intensity, "measure": measure, "clusters": _clusters(table, families)}
+    return {"intensity": intensity, "measure": measure, "clusters": _join_clusters(table, families)}
 
 
-def _clusters(table: _Table, families: Mapping[str, int]) -> list[int]:
-    """Return the cluster of each row: a common motion (or multiple) or group, even indirectly, joins rows."""
+def _join_clusters(table: _Table, families: Mapping[str, int]) -> list[int]:
+    """Assign a cluster to each row: a common motion (or a multiple of it) or group joins rows, even indirectly."""
     clusters = [*range(len(table.rows))]
     first: dict[tuple[str, str | int], int] = {}
     for k, (_, row) in enumerate(table.rows):
         for column in ("motion", "group"):
             if label := row.get(column):
-                same = families.get(label, label) if column == "motion" else label
-                one, other = clusters[first.setdefault((column, same), k)], clusters[k]
-                clusters = [one if cluster == other else cluster for cluster in clusters]
+                key = families.get(label, label) if column == "motion" else label
+                kept_cluster, merged_cluster = clusters[first.setdefault((column, key), k)], clusters[k]
+                clusters = [kept_cluster if cluster == merged_cluster else cluster for cluster in clusters]
     return clusters

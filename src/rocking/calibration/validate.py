@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from rocking.analysis import levels
 from rocking.analysis.levels import describe_pool, normalise_weights
 from rocking.block.body import Bodies, Body
-from rocking.calibration.diagnostics import Scores, log_losses
-from rocking.calibration.outcomes import Calibration, Validation, chances_of, overturned_under
+from rocking.calibration.diagnostics import Scores, compute_log_losses
+from rocking.calibration.outcomes import Calibration, Validation, compute_probabilities, simulate_outcomes
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
@@ -67,14 +67,16 @@ class ShakeTest:
     group: str = ""
 
     def __post_init__(self) -> None:
-        motion, fell = check_motion(self.motion), self.overturned
+        motion, outcome = check_motion(self.motion), self.overturned
         if motion is None:
-            raise InvalidMotion("a test needs the {} of what the specimen stood on, not None", "motion")
+            raise InvalidMotion("a test requires the {} of the base; got None", "motion")
         for label in ("name", "group"):
             checks.text(getattr(self, label), label, InvalidOption)
-        if not isinstance(fell, (bool, int, np.bool_, np.integer)) or fell not in (0, 1):
-            raise InvalidOption(f"{{}} must be True or False, not {checks.short_repr(fell)}", "overturned", value=fell)
-        object.__setattr__(self, "overturned", bool(fell))
+        if not isinstance(outcome, (bool, int, np.bool_, np.integer)) or outcome not in (0, 1):
+            raise InvalidOption(
+                f"{{}} must be True or False, not {checks.short_repr(outcome)}", "overturned", value=outcome
+            )
+        object.__setattr__(self, "overturned", bool(outcome))
         object.__setattr__(self, "name", self.name or motion.name)
 
     def __repr__(self) -> str:
@@ -137,7 +139,7 @@ class ShareInBin:
     predicted, observed : float
         Predicted and observed shares that overturn.
     band_lower, band_upper : float
-        Ends of the central 90 % of the shares in simulations from the predictions (Broecker and Smith 2007).
+        Ends of the central 90 % of the shares in simulations from the predictions :cite:p:`broecker2007`.
     """
 
     lower: float
@@ -194,34 +196,38 @@ class ModelValidation(Result):
     def notes(self) -> tuple[str, ...]:
         """Warnings about the scores, one sentence each."""
         notes = []
-        fell = sum(test.overturned for test in self.tests)
-        if fell in (0, len(self.tests)):
-            all_or_none = "all tests" if fell else "no test"
-            notes.append(f"{all_or_none} overturned the specimen: the base rate is perfect, and no skill is known")
+        overturned_count = sum(test.overturned for test in self.tests)
+        if overturned_count in (0, len(self.tests)):
+            all_or_none = "all tests" if overturned_count else "no test"
+            notes.append(
+                f"{all_or_none} overturned the specimen: the base rate is perfect, so that the skill is undefined"
+            )
         if self.brier.clusters < 10:
-            few = format_count(self.brier.clusters, "cluster")
-            notes.append(f"the tests belong to {few} only: standard errors are rough")
+            cluster_text = format_count(self.brier.clusters, "cluster")
+            notes.append(f"the tests belong to {cluster_text} only: standard errors are rough")
         if math.isinf(self.log_loss.value):
-            notes.append("the log loss is infinite, as a certainty failed: give what is not known of the specimen")
+            notes.append(
+                "the log loss is infinite because a certain prediction failed: include the uncertainty of the specimen"
+            )
         return tuple(notes)
 
     def _headline(self) -> str:
-        fell = sum(test.overturned for test in self.tests)
-        by = f", {self.model} model" if self.model else ""
-        return f"{self.description}{by}: {format_count(len(self.tests), 'test')}, {fell} overturned"
+        overturned_count = sum(test.overturned for test in self.tests)
+        model_text = f", {self.model} model" if self.model else ""
+        return f"{self.description}{model_text}: {format_count(len(self.tests), 'test')}, {overturned_count} overturned"
 
     def summary(self) -> str:
         scores = [
-            [name, *_with_error(score.value, score.error), *_with_error(score.skill, score.skill_error)]
+            [name, *_format_with_error(score.value, score.error), *_format_with_error(score.skill, score.skill_error)]
             for name, score in (("Brier", self.brier), ("log loss", self.log_loss))
         ]
-        doubt = "not " if self.reliability_chance < 0.05 else ""
+        negation = "not " if self.reliability_chance < 0.05 else ""
         parts = [
             self._headline(),
             "",
             format_table(["score", "mean", "+-", "skill", "+-"], scores),
             "",
-            f"reliability: {doubt}as if the predictions were right (p = {self.reliability_chance:.2g})",
+            f"reliability: {negation}as if the predictions were right (p = {self.reliability_chance:.2g})",
         ]
         return "\n".join([*parts, *(f"note: {sentence}" for sentence in self.notes)])
 
@@ -311,107 +317,107 @@ def validate(
     >>> rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9)).brier.value
     0.25
     """
-    given = checks.items(tests, "tests", InvalidOption)
-    if not given:
-        raise InvalidOption("{} must hold at least one test", "tests", value=tests)
-    for test in given:
+    items = checks.items(tests, "tests", InvalidOption)
+    if not items:
+        raise InvalidOption("{} must contain at least one test", "tests", value=tests)
+    for test in items:
         if not isinstance(test, ShakeTest):
             raise InvalidOption(
-                f"{{}} must hold tests, ShakeTest(motion, overturned), not {checks.short_repr(test)}",
-                "tests",
-                value=test,
+                f"{{}} must contain ShakeTest(motion, overturned); got {checks.short_repr(test)}", "tests", value=test
             )
     checks.integer(bins, "bins", InvalidOption, 1, 1000)
     checks.integer(simulations, "simulations", InvalidOption, 100)
     rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
     if outlier_probability is not None:
         checks.between(outlier_probability, "outlier_probability", InvalidOption, 0.0, 0.5)
-    distinct, which = find_distinct_motions([test.motion for test in given])
-    observed = np.array([test.overturned for test in given], dtype=bool)
+    distinct, indices = find_distinct_motions([test.motion for test in items])
+    observed = np.array([test.overturned for test in items], dtype=bool)
     clusters = levels.number_labels(
-        [("group", test.group) if test.group else ("motion", k) for test, k in zip(given, which, strict=True)]
+        [("group", test.group) if test.group else ("motion", k) for test, k in zip(items, indices, strict=True)]
     )
-    description, how = "predictions of tests that were left out", ""
+    description, equation = "predictions of tests that were left out", ""
     if isinstance(blocks, Validation):
-        probabilities = _left_out(blocks, len(given), weights, outlier_probability)
+        probabilities = _average_left_out(blocks, len(items), weights, outlier_probability)
     else:
         if isinstance(blocks, Calibration):
             if weights is not None:
-                raise InvalidOption("a calibration has {} of its own: leave them out", "weights")
-            description, how = f"calibration, {format_count(len(blocks.blocks), 'block')}", model or blocks.model
+                raise InvalidOption("a calibration contains its own {}: omit the argument", "weights")
+            description, equation = f"calibration, {format_count(len(blocks.blocks), 'block')}", model or blocks.model
             bodies: Bodies = blocks.blocks
             shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
             outlier_probability = blocks.outlier_probability if outlier_probability is None else outlier_probability
         else:
-            description, how = describe_pool(blocks, weights), model or "nonlinear"
+            description, equation = describe_pool(blocks, weights), model or "nonlinear"
             bodies = bodies_of(blocks)
             slenderness_of(bodies)  # checked before the simulations
             shares = normalise_weights(weights, len(bodies)) / len(bodies)
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
-        fell = overturned_under(bodies, distinct, how)
-        probabilities = chances_of(shares @ fell, effective, outlier_probability or 0.0)[which]
-    outcomes = rng.random((simulations, len(given))) < probabilities
-    places = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
-    term = miscalibration(probabilities, np.vstack([observed, outcomes]), places)
+        overturned = simulate_outcomes(bodies, distinct, equation)
+        probabilities = compute_probabilities(shares @ overturned, effective, outlier_probability or 0.0)[indices]
+    outcomes = rng.random((simulations, len(items))) < probabilities
+    bin_indices = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
+    terms = compute_miscalibration(probabilities, np.vstack([observed, outcomes]), bin_indices)
     # Summation order changes the last digits.
-    larger = np.count_nonzero(term[1:] >= term[0] - 1e-9 * abs(term[0]))
-    rows = zip(make_names_unique([test.name for test in given]), given, probabilities.tolist(), strict=True)
+    larger_count = np.count_nonzero(terms[1:] >= terms[0] - 1e-9 * abs(terms[0]))
+    rows = zip(make_names_unique([test.name for test in items]), items, probabilities.tolist(), strict=True)
     return ModelValidation(
         tests=tuple(JudgedTest(name, test.motion.name, test.overturned, chance) for name, test, chance in rows),
-        brier=score_of((probabilities - observed) ** 2, observed, lambda share: share * (1.0 - share), clusters),
-        log_loss=score_of(log_losses(probabilities, observed), observed, _entropy, clusters),
-        reliability=tuple(_bin(k, bins, places == k, probabilities, observed, outcomes) for k in np.unique(places)),
-        reliability_chance=float((1.0 + larger) / (simulations + 1.0)),
+        brier=compute_score((probabilities - observed) ** 2, observed, lambda share: share * (1.0 - share), clusters),
+        log_loss=compute_score(compute_log_losses(probabilities, observed), observed, _compute_entropy, clusters),
+        reliability=tuple(
+            _summarise_bin(k, bins, bin_indices == k, probabilities, observed, outcomes) for k in np.unique(bin_indices)
+        ),
+        reliability_chance=float((1.0 + larger_count) / (simulations + 1.0)),
         description=description,
-        model=how,
+        model=equation,
     )
 
 
-def _left_out(source: Validation, count: int, weights: object, outlier_probability: float | None) -> Floats:
-    """Return the predicted probabilities of left-out tests of a calibration."""
+def _average_left_out(source: Validation, count: int, weights: object, outlier_probability: float | None) -> Floats:
+    """Average the predicted probabilities of left-out tests over the repeats."""
     if weights is not None or outlier_probability is not None:
         name = "outlier_probability" if weights is None else "weights"
-        raise InvalidOption("predictions of tests that were left out take no {}: leave it out", name)
-    known = source.probabilities.shape[1]
-    if known != count:
+        raise InvalidOption("{} cannot be combined with predictions of left-out tests: omit it", name)
+    predicted_count = source.probabilities.shape[1]
+    if predicted_count != count:
         raise InvalidOption(
-            f"the predictions are of {format_count(known, 'test')}, and {format_count(count, 'test')} are given: "
+            f"the predictions are of {format_count(predicted_count, 'test')}; got {format_count(count, 'test')}: "
             "{} must be those of the calibration, in their order",
             "tests",
         )
     return np.asarray(source.probabilities.mean(axis=0))
 
 
-def score_of(each: Floats, observed: Flags, base: Callable[[float], float], clusters: Integers) -> Score:
-    """Compute mean score and skill against the base rate, whose score is `base` of the share that overturned."""
+def compute_score(scores: Floats, observed: Flags, base_score: Callable[[float], float], clusters: Integers) -> Score:
+    """Compute mean score, and skill against the base rate, whose score is `base_score` of the overturned share."""
 
-    def mean(chosen: Integers) -> float:
-        return float(each[chosen].mean())
+    def mean(indices: Integers) -> float:
+        return float(scores[indices].mean())
 
-    def skill(chosen: Integers) -> float:
-        reference = base(float(observed[chosen].mean()))
-        return 1.0 - mean(chosen) / reference if reference > 0.0 else math.nan
+    def skill(indices: Integers) -> float:
+        reference = base_score(float(observed[indices].mean()))
+        return 1.0 - mean(indices) / reference if reference > 0.0 else math.nan
 
-    errors, whole = [_jackknife(statistic, clusters) for statistic in (mean, skill)], np.arange(len(each))
-    return Score(mean(whole), errors[0], skill(whole), errors[1], len(each), len(np.unique(clusters)))
+    errors, all_tests = [_jackknife(statistic, clusters) for statistic in (mean, skill)], np.arange(len(scores))
+    return Score(mean(all_tests), errors[0], skill(all_tests), errors[1], len(scores), len(np.unique(clusters)))
 
 
 def _jackknife(statistic: Callable[[Integers], float], clusters: Integers) -> float:
     """Compute the standard error of a statistic of tests by leaving out each cluster."""
-    each = np.unique(clusters)
-    if len(each) < 2:
+    labels = np.unique(clusters)
+    if len(labels) < 2:
         return math.nan
-    found = np.array([statistic(np.flatnonzero(clusters != label)) for label in each])
-    if not np.all(np.isfinite(found)):
+    estimates = np.array([statistic(np.flatnonzero(clusters != label)) for label in labels])
+    if not np.all(np.isfinite(estimates)):
         return math.nan
-    return math.sqrt((len(each) - 1.0) / len(each) * float(((found - found.mean()) ** 2).sum()))
+    return math.sqrt((len(labels) - 1.0) / len(labels) * float(((estimates - estimates.mean()) ** 2).sum()))
 
 
-def _entropy(share: float) -> float:
+def _compute_entropy(share: float) -> float:
     return -sum(part * math.log(part) for part in (share, 1.0 - share) if part > 0.0)
 
 
-def miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Floats:
+def compute_miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Floats:
     """Compute the reliability term of the Brier score (Murphy 1973) of outcomes (s, m) in bins (m,)."""
     counts = np.bincount(bins)
     member = (bins[:, None] == np.arange(len(counts))).astype(np.float64)
@@ -419,15 +425,17 @@ def miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Fl
     return np.asarray((excess**2 / np.maximum(counts, 1)).sum(axis=1) / len(bins))
 
 
-def _bin(k: int, bins: int, chosen: Flags, probabilities: Floats, observed: Flags, drawn: Flags) -> ShareInBin:
-    """Return the share of the tests in bin k, and the band of simulated shares with at most 5 % beyond each end."""
-    band = np.quantile(drawn[:, chosen].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
-    shares = float(probabilities[chosen].mean()), float(observed[chosen].mean())
-    return ShareInBin(k / bins, (k + 1) / bins, int(chosen.sum()), *shares, *band)
+def _summarise_bin(
+    k: int, bins: int, in_bin: Flags, probabilities: Floats, observed: Flags, simulated: Flags
+) -> ShareInBin:
+    """Compute the shares of bin k, and the band of simulated shares with at most 5 % beyond each end."""
+    band = np.quantile(simulated[:, in_bin].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
+    shares = float(probabilities[in_bin].mean()), float(observed[in_bin].mean())
+    return ShareInBin(k / bins, (k + 1) / bins, int(in_bin.sum()), *shares, *band)
 
 
-def _with_error(value: float, error: float) -> tuple[str, str]:
-    """Return value and standard error as text, to two digits of the error."""
+def _format_with_error(value: float, error: float) -> tuple[str, str]:
+    """Format value and standard error to two digits of the error."""
     if not (math.isfinite(value) and math.isfinite(error)):
         if math.isinf(value):
             return ("infinite" if value > 0.0 else "-infinite"), "-"

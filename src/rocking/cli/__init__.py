@@ -26,11 +26,11 @@ app = App(
 )
 
 
-def _lines_of(module: str) -> dict[str, str]:
-    """Return the first docstring line of each function, without importing the module."""
-    parsed = ast.parse(Path(__file__).with_name(f"{module}.py").read_text("utf-8"))
-    functions = [each for each in parsed.body if isinstance(each, ast.FunctionDef)]
-    return {each.name: (ast.get_docstring(each) or "").partition("\n")[0] for each in functions}
+def _read_help_lines(module: str) -> dict[str, str]:
+    """Read the first docstring line of each function, without importing the module."""
+    tree = ast.parse(Path(__file__).with_name(f"{module}.py").read_text("utf-8"))
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    return {node.name: (ast.get_docstring(node) or "").partition("\n")[0] for node in functions}
 
 
 for _module, _commands in {
@@ -41,17 +41,17 @@ for _module, _commands in {
     "mesh": ("mesh",),
     "explore": ("explore",),
 }.items():
-    _lines = _lines_of(_module)
+    _lines = _read_help_lines(_module)
     for _command in _commands:
         app.command(f"rocking.cli.{_module}:{_command}", name=_command, help=_lines[_command])
 app.command(
     "rocking.cli.study:study",
     name="study",
-    help="Run a study too long for one sitting: created once, resumed after anything.",
+    help="Run many simulations in a study, which can be interrupted and resumed.",
 )
 
 
-def _version(*, verbose: bool = False) -> None:
+def _print_version(*, verbose: bool = False) -> None:
     """Display the version.
 
     Parameters
@@ -68,18 +68,18 @@ def _version(*, verbose: bool = False) -> None:
     if not verbose:
         print(rocking.__version__)
         return
-    below = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy"))
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy"))
     rows = {
         "rocking": rocking.__version__,
         "Python": f"{platform.python_version()} on {platform.platform()}",
-        "packages": below,
+        "packages": versions,
         "compiled code": compiled.describe_mode(),
     }
     for name, value in rows.items():
         print(f"{name:13}  {value}")
 
 
-app.command(_version, name=["--version", "-V"], help="Display the version.")
+app.command(_print_version, name=["--version", "-V"], help="Display the version.")
 app.register_install_completion_command(help="Install completion of commands and options for this shell.")
 
 
@@ -90,9 +90,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # characters outside the locale become question marks
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        _run(given)
+        _run_command(words)
         return
     except KeyboardInterrupt:
         pass
@@ -101,8 +101,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _close_output()
         return
     except Exception as error:
-        if not _is_of_an_interrupt(error):
-            sentence = _sentence(error, given)
+        if not _is_interrupt(error):
+            sentence = _format_error(error, words)
             if not sentence:
                 raise
             print(f"rocking: {sentence}", file=sys.stderr)
@@ -112,49 +112,53 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.exit(130)
 
 
-def _is_of_an_interrupt(error: BaseException | None) -> bool:
-    """Whether an error replaced an interrupt, as in a lock of `threading`."""
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Return whether an interrupt caused an error, as in a lock of `threading`."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
     return error is not None
 
 
-def _sentence(error: Exception, given: list[str]) -> str:
-    """Return an error as one line that names options; empty for a bug of the program."""
+def _format_error(error: Exception, words: list[str]) -> str:
+    """Format an error as one line with option names; empty for an unexpected exception."""
     if isinstance(error, DamagedStudy):
         return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
     if isinstance(error, RockingError):
-        return error.text(spelling_of(command_of(given))).rstrip(".")
+        return error.text(create_spelling(find_command(words))).rstrip(".")
     if isinstance(error, UnknownCommandError):
-        unknown, commands = (error.unused_tokens or given)[0], [*filter(str.isalpha, command_of(given))]
+        unknown, commands = (error.unused_tokens or words)[0], [*filter(str.isalpha, find_command(words))]
         hint = suggest(unknown, commands, f"there are {', '.join(commands)}")
         return f"there is no command {unknown}; {hint}"
     if isinstance(error, MissingArgumentError) and (missing := error.argument) is not None:
-        is_given = any(each.partition("=")[0] in missing.names for each in given)
-        wants = f"{missing.name} needs a value" if is_given else f"{_named(given)} needs {_name(missing)}"
-        return f"{wants}; see {_named(given)} --help"
+        is_given = any(word.partition("=")[0] in missing.names for word in words)
+        requirement = (
+            f"{missing.name} needs a value"
+            if is_given
+            else f"{_format_command(words)} needs {_format_argument(missing)}"
+        )
+        return f"{requirement}; see {_format_command(words)} --help"
     if isinstance(error, CycloptsError):
         sentence = " ".join(str(error).split()).rstrip(".")
-        return sentence if sentence.endswith("?") else f"{sentence}; see {_named(given)} --help"
+        return sentence if sentence.endswith("?") else f"{sentence}; see {_format_command(words)} --help"
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         # File errors have their own sentence; this is printing to a full disk.
         _close_output()
-        return f"the output cannot be written: {os.strerror(error.errno)}; send it elsewhere"
+        return f"the output cannot be written: {os.strerror(error.errno)}; redirect it to another disk"
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}; name another place"
+        return f"{error.filename}: {error.strerror}; choose another path"
     return ""
 
 
-def _run(given: list[str]) -> None:
+def _run_command(words: list[str]) -> None:
     """Run the command in the arguments."""
-    called = command_of(given)
-    if called.default_command is not None:
-        called.help = None  # The help of a command is its whole docstring, not its line in the list.
-    command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
-    refuse_unknown_options(bound.args, given)
+    command = find_command(words)
+    if command.default_command is not None:
+        command.help = None  # The help of a command is its whole docstring, not its line in the list.
+    function, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
+    reject_unknown_options(bound.args, words)
     quiet = any(getattr(value, "quiet", False) for value in bound.arguments.values())
-    with notes_for("nobody" if quiet else "everybody", spelling_of(called)):
-        command(*bound.args, **bound.kwargs)
+    with notes_for("nobody" if quiet else "everybody", create_spelling(command)):
+        function(*bound.args, **bound.kwargs)
     sys.stdout.flush()
 
 
@@ -163,52 +167,61 @@ def _close_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def spelling_of(command: App) -> Spelling:
-    """Return a function that spells an argument as the command's option, if there is one."""
+def create_spelling(command: App) -> Spelling:
+    """Create a function that spells an argument as the command's option, if there is one."""
 
     @functools.cache  # The command is inspected only when a message names an argument.
     def options() -> frozenset[str]:
-        return frozenset(_options(command))
+        return frozenset(_list_options(command))
 
     return lambda name: write_option_name(name) if write_option_name(name) in options() else name
 
 
-def command_of(arguments: Sequence[str]) -> App:
-    """Return the called command, or the program if there is none. The parser treats --help as a command."""
-    return app.parse_commands(arguments)[1][len(_words(arguments))]
+def find_command(arguments: Sequence[str]) -> App:
+    """Find the called command, or the program if there is none. The parser treats --help as a command."""
+    return app.parse_commands(arguments)[1][len(_find_command_words(arguments))]
 
 
-def refuse_unknown_options(given: Iterable[object], arguments: Sequence[str]) -> None:
+def reject_unknown_options(values: Iterable[object], arguments: Sequence[str]) -> None:
     """Check that no record name is an unknown option. After "--" any name is allowed."""
     typed = arguments[: arguments.index("--")] if "--" in arguments else arguments
-    for name in given:
-        if isinstance(name, str) and name.startswith("-") and name.lstrip("-")[:1].isalpha() and name in typed:
-            option = name.partition("=")[0]
+    for value in values:
+        if isinstance(value, str) and value.startswith("-") and value.lstrip("-")[:1].isalpha() and value in typed:
+            option = value.partition("=")[0]
             # Short names are too alike to guess: a suggestion must not lead to another quantity.
-            known = [each for each in _options(command_of(arguments)) if min(len(each), len(option)) > len("--pga")]
-            words = {each.lstrip("-"): each for each in known}
-            hint = suggest(option.lstrip("-"), words, "see its --help", 0.8)  # a typo of one or two letters in six
-            raise InvalidOption(f"{_named(arguments)} has no option {option}; {hint}")
+            candidates = [
+                name for name in _list_options(find_command(arguments)) if min(len(name), len(option)) > len("--pga")
+            ]
+            options_by_word = {name.lstrip("-"): name for name in candidates}
+            # The cutoff allows a typo of one or two letters in six.
+            hint = suggest(option.lstrip("-"), options_by_word, "see its --help", 0.8)
+            raise InvalidOption(f"{_format_command(arguments)} has no option {option}; {hint}")
 
 
-def _named(arguments: Sequence[str]) -> str:
-    """Return the called command as it is typed."""
-    return " ".join(["rocking", *_words(arguments)])
+def _format_command(arguments: Sequence[str]) -> str:
+    """Format the called command as it is typed."""
+    return " ".join(["rocking", *_find_command_words(arguments)])
 
 
-def _words(arguments: Sequence[str]) -> list[str]:
-    return [each for each in app.parse_commands(arguments)[0] if each not in app.help_flags]
+def _find_command_words(arguments: Sequence[str]) -> list[str]:
+    return [word for word in app.parse_commands(arguments)[0] if word not in app.help_flags]
 
 
-def _options(command: App) -> Iterable[str]:
-    """Return the options of a command without its positional arguments."""
+def _list_options(command: App) -> Iterable[str]:
+    """List the options of a command without its positional arguments."""
     if command.default_command is None:
         return ()
     arguments = command.assemble_argument_collection()
-    return [name for each in arguments if not _is_positional(each) for name in each.names if name.startswith("-")]
+    return [
+        name
+        for argument in arguments
+        if not _is_positional(argument)
+        for name in argument.names
+        if name.startswith("-")
+    ]
 
 
-def _name(argument: Argument) -> str:
+def _format_argument(argument: Argument) -> str:
     return argument.name.lstrip("-").upper() if _is_positional(argument) else argument.name
 
 

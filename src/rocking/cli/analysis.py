@@ -16,22 +16,22 @@ from rocking.block import Block, Blocks
 from rocking.chattering.report import chattering_report, critical_report
 from rocking.cli.options import (
     BLOCK,
+    INTEGER,
     MEASURE,
     MODEL,
     RECORDS,
-    WHOLE,
     BlockOptions,
     EnsembleOptions,
-    HeldOptions,
+    LoadedRecords,
     MeasureOptions,
     ModelOptions,
     MotionOptions,
     Names,
-    ReadRecords,
+    RestrainedOptions,
     SchemeOptions,
     UnscaledOptions,
-    ensemble_of,
-    labels_of,
+    parse_labels,
+    read_ensemble_arguments,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results
 from rocking.core.result import DatasetResult
@@ -41,7 +41,7 @@ from rocking.inputs.declared import SHAPES
 from rocking.inputs.quantities import read_angle, read_array, read_length, read_tilt
 
 #: Descriptions of a block for which the slenderness alone suffices.
-_SLENDER: Final = tuple(
+_SLENDER_SHAPES: Final = tuple(
     shape._replace(needed=("alpha",), optional=("p",)) if "alpha" in shape.needed else shape for shape in SHAPES
 )
 
@@ -84,32 +84,29 @@ def spectrum(
         Abscissa of the figure.
     """
     if alpha is None and ensemble is None:
-        raise InvalidOption("a spectrum needs {}, or the {} of a calibration", "alpha", "ensemble")
+        raise InvalidOption("a spectrum requires {}, or the {} of a calibration", "alpha", "ensemble")
     if ensemble is not None and (alpha is not None or restitution is not None):
         raise InvalidOption(
-            "the blocks of {} have slendernesses and restitutions of their own: leave {} and {} out",
-            "ensemble",
-            "alpha",
-            "restitution",
+            "the file of {} contains slendernesses and restitutions: omit {} and {}", "ensemble", "alpha", "restitution"
         )
     with output.folder() as folder:
         axes: dict[str, Any] = {
             "p": None if p is None else read_array(p, "p"),
             "size": None if size is None else read_array(size, "size", read_length),
         }
-        how = model.chosen()
+        settings = model.arguments()
         if alpha is not None:
             restitutions = None if restitution is None else read_array(restitution, "restitution")
             blocks = Blocks.grid(alpha=read_array(alpha, "alpha", read_tilt), restitution=restitutions, **axes)
             axes = {}
         elif ensemble is not None:
-            given = ensemble_of(ensemble, model)
-            blocks = given.pop("blocks")
-            how |= given
+            ensemble_arguments = read_ensemble_arguments(ensemble, model)
+            blocks = ensemble_arguments.pop("blocks")
+            settings |= ensemble_arguments
         shares = read_array(fractiles, "fractiles").tolist()
-        read = motion.read_all(names)
-        found = rocking_spectrum(blocks, [*read.motions.values()], **axes, fractiles=shares, **how)
-        _deliver(found, "spectrum", read, folder=folder, as_json=output.as_json, against=against)
+        loaded = motion.read_all(names)
+        result = rocking_spectrum(blocks, [*loaded.motions.values()], **axes, fractiles=shares, **settings)
+        _deliver_with_records(result, "spectrum", loaded, folder=folder, as_json=output.as_json, against=against)
 
 
 def map(
@@ -151,30 +148,30 @@ def map(
     rtol
         Width of the refined boundaries, relative to the amplitude.
     """
-    given: dict[str, Any] = {
+    parameters: dict[str, Any] = {
         "cycles": cycles,
         "phase": None if phase is None else read_angle(phase, "phase"),
         "gamma": gamma,
         "kind": kind,
     }
     with output.folder() as folder:
-        found = overturning_map(
-            _slender(block),
+        result = overturning_map(
+            _create_slender_block(block),
             pulse,
             amplitudes=read_array(amplitudes, "amplitudes"),
             frequencies=read_array(frequencies, "frequencies"),
             model=model.model,
             rtol=rtol,
-            **{name: value for name, value in given.items() if value is not None},
+            **{name: value for name, value in parameters.items() if value is not None},
         )
-        _deliver(found, "map", None, folder=folder, as_json=output.as_json)
+        _deliver_with_records(result, "map", None, folder=folder, as_json=output.as_json)
 
 
 def ida(
     *names: Names,
     rtol: float = 1e-6,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    block: Annotated[HeldOptions, BLOCK] = HeldOptions(),
+    block: Annotated[RestrainedOptions, BLOCK] = RestrainedOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -193,10 +190,10 @@ def ida(
     """
     body = block.body()
     with output.folder() as folder:
-        read = motion.read_all(names)
-        motions = [*read.motions.values()]
-        found = incremental_dynamic_analysis(body, motions, **measure.chosen(), model=model.model, rtol=rtol)
-        _deliver(found, "ida", read, folder=folder, as_json=output.as_json)
+        loaded = motion.read_all(names)
+        motions = [*loaded.motions.values()]
+        result = incremental_dynamic_analysis(body, motions, **measure.arguments(), model=model.model, rtol=rtol)
+        _deliver_with_records(result, "ida", loaded, folder=folder, as_json=output.as_json)
 
 
 def measures(
@@ -228,36 +225,42 @@ def measures(
     """
     bodies = block.blocks(model)
     with output.folder() as folder:
-        read = motion.read_all(names)
-        found = compare_measures(
-            motions=[*read.motions.values()],
+        loaded = motion.read_all(names)
+        result = compare_measures(
+            motions=[*loaded.motions.values()],
             periods=read_array(periods, "periods"),
             damping=damping,
-            clusters=labels_of(clusters),
+            clusters=parse_labels(clusters),
             **bodies,
         )
-        _deliver(found, "measures", read, folder=folder, as_json=output.as_json)
+        _deliver_with_records(result, "measures", loaded, folder=folder, as_json=output.as_json)
 
 
-def _deliver(
-    found: DatasetResult, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
+def _deliver_with_records(
+    analysis: DatasetResult,
+    stem: str,
+    loaded: LoadedRecords | None,
+    *,
+    folder: Path | None,
+    as_json: bool,
+    **figure: Any,
 ) -> None:
     """Write and print an analysis, with the records of the motions."""
-    result = found.to_dict()
-    if read is not None:
-        result |= read.to_dict()
-        found = replace(found, data=found.data.assign_coords(record=("motion", [*read.motions])))
-    deliver(found, stem, folder=folder, as_json=as_json, result=result, **figure)
+    result = analysis.to_dict()
+    if loaded is not None:
+        result |= loaded.to_dict()
+        analysis = replace(analysis, data=analysis.data.assign_coords(record=("motion", [*loaded.motions])))
+    deliver(analysis, stem, folder=folder, as_json=as_json, result=result, **figure)
 
 
-def _slender(options: BlockOptions) -> Block:
+def _create_slender_block(options: BlockOptions) -> Block:
     """Return a block for which the slenderness alone suffices: p is then 1."""
-    values = options.read()
+    values = options.read_values()
     if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
         raise InvalidBlock(
-            "the restitution of two different sides follows from {} and {} of both: give {}, too", "p", "alpha", "p"
+            "the restitution of two different sides follows from {} and {} of both: also set {}", "p", "alpha", "p"
         )
-    block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER)
+    block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_SHAPES)
     note_likely_mistakes([block])
     return block
 
@@ -268,8 +271,8 @@ def chatter(
     eta: float,
     *,
     p: float | None = None,
-    order: Annotated[int, WHOLE] = 4,
-    resolved: Annotated[int | None, WHOLE] = None,
+    order: Annotated[int, INTEGER] = 4,
+    resolved: Annotated[int | None, INTEGER] = None,
     table: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:

@@ -10,17 +10,17 @@ from typing import Annotated, Any, Final
 from cyclopts import Parameter
 
 from rocking.calibration.history import HistoryCalibration, calibrate_history
-from rocking.calibration.outcomes import Calibration, checked_outcomes, group_labels
-from rocking.calibration.outcomes import calibrate as calibrated
+from rocking.calibration.outcomes import Calibration, check_outcomes, label_groups
+from rocking.calibration.outcomes import calibrate as run_calibration
 from rocking.calibration.space import HOUSNER
-from rocking.calibration.tables import History, read_calibration, read_tests
+from rocking.calibration.tables import MeasuredHistory, read_calibration, read_tests
 from rocking.calibration.validate import ShakeTest
-from rocking.calibration.validate import validate as judged
+from rocking.calibration.validate import validate as run_validation
 from rocking.cli.options import (
     BLOCK,
+    INTEGER,
     MODEL,
     RECORDS,
-    WHOLE,
     EnsembleOptions,
     FileOptions,
     ModelOptions,
@@ -45,12 +45,12 @@ def calibrate(
     alpha: str | None = None,
     restitution: str | None = None,
     two_sided: bool | None = None,
-    candidates: Annotated[int, WHOLE] = _CANDIDATES,
-    folds: Annotated[int, WHOLE] = 0,
+    candidates: Annotated[int, INTEGER] = _CANDIDATES,
+    folds: Annotated[int, INTEGER] = 0,
     predict: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
     motion: str | None = None,
     initial_rotation: str | None = None,
-    seed: Annotated[int, WHOLE] = 0,
+    seed: Annotated[int, INTEGER] = 0,
     file: Annotated[ScaledPulseOptions, RECORDS] = ScaledPulseOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
@@ -97,61 +97,63 @@ def calibrate(
         if restitution in (None, HOUSNER)
         else read_bounds(restitution, "restitution", read_number),
     }
-    start = None if initial_rotation is None else read_tilt(initial_rotation, "initial_rotation")
-    given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
-    choices = {name: value for name, value in given.items() if value is not None}
+    rotation = None if initial_rotation is None else read_tilt(initial_rotation, "initial_rotation")
+    settings: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
+    arguments = {name: value for name, value in settings.items() if value is not None}
     with output.folder() as folder:
-        table = read_calibration(data, **file.about())
-        others: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
-        if isinstance(table, History):
-            others = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
-        for name in [name for name, value in others.items() if value]:
-            belong_to = "outcomes" if isinstance(table, History) else "a history"
-            raise InvalidOption(f"{{}} is for {belong_to}; the columns of this table are not", name)
+        table = read_calibration(data, **file.metadata())
+        conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
+        if isinstance(table, MeasuredHistory):
+            conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
+        for name in [name for name, value in conflicting.items() if value]:
+            kind = "outcomes" if isinstance(table, MeasuredHistory) else "a history"
+            raise InvalidOption(f"{{}} requires a table of {kind}, which this is not", name)
         records = predict if motion is None else (motion,)
-        motions = _motions(records, file, "motion" if isinstance(table, History) else "predict")
-        if isinstance(table, History):
+        motions = _read_motions(records, file, "motion" if isinstance(table, MeasuredHistory) else "predict")
+        if isinstance(table, MeasuredHistory):
             if len(motions) > 1:
-                raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
-            shaking = next(iter(motions.values()), None)
-            choices |= {"initial_rotation": start, "seed": seed}
-            found: Calibration | HistoryCalibration = calibrate_history(table.times, table.rotation, shaking, **choices)
-            result, text = found.to_dict(), found.summary()
+                raise InvalidOption("a history has one motion of the base: use {}, or a single {}", "motion", "pulse")
+            base_motion = next(iter(motions.values()), None)
+            arguments |= {"initial_rotation": rotation, "seed": seed}
+            result: Calibration | HistoryCalibration = calibrate_history(
+                table.times, table.rotation, base_motion, **arguments
+            )
+            numbers, text = result.to_dict(), result.summary()
         else:
             # Invalid outcomes, and more folds than groups, are rejected before the computation.
-            fell = checked_outcomes([test.overturned for test in table], len(table)).tolist()
+            overturned = check_outcomes([test.overturned for test in table], len(table)).tolist()
             if folds:
-                group_labels([test.group for test in table], len(table), folds)
-            choices |= {"candidates": candidates, "seed": seed}
-            found = calibration = calibrated([test.motion for test in table], fell, **choices)
-            result, text = _of_outcomes(calibration, table, motions, folds)
+                label_groups([test.group for test in table], len(table), folds)
+            arguments |= {"candidates": candidates, "seed": seed}
+            result = calibration = run_calibration([test.motion for test in table], overturned, **arguments)
+            numbers, text = _summarise_calibration(calibration, table, motions, folds)
             if folder is not None:
                 calibration.to_csv(folder / "ensemble.csv")
         if folder is not None:
-            write_results(folder, figures={"calibration": found.plot}, result=result)
-        print_result(result, text, as_json=output.as_json)
+            write_results(folder, figures={"calibration": result.plot}, result=numbers)
+        print_result(numbers, text, as_json=output.as_json)
 
 
-def _motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
+def _read_motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
     """Read records and pulses and reject options of motions if there are none."""
     motions = {name: file.motion(name) for name in records} | file.pulses()
-    for name in {} if motions else file.given("scale", "pga", "pgv", "sa", "vertical"):
-        raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
+    for name in {} if motions else file.supplied("scale", "pga", "pgv", "sa", "vertical"):
+        raise InvalidOption("{} requires motions from {} or {}: add one, or omit it", name, option, "pulse")
     return motions
 
 
-def _of_outcomes(
-    found: Calibration, tests: Sequence[ShakeTest], others: Mapping[str, Motion], folds: int
+def _summarise_calibration(
+    calibration: Calibration, tests: Sequence[ShakeTest], motions: Mapping[str, Motion], folds: int
 ) -> tuple[dict[str, Any], str]:
-    """Return the numbers and text of a calibration, optionally with predictions and a cross-validation."""
-    predicted = dict(zip(others, found.predict([*others.values()]), strict=True))
-    numbers, parts = {**found.to_dict(), "predicted": predicted}, [found.summary()]
+    """Summarise a calibration as numbers and text, optionally with predictions and a cross-validation."""
+    predicted = dict(zip(motions, calibration.predict([*motions.values()]), strict=True))
+    numbers, parts = {**calibration.to_dict(), "predicted": predicted}, [calibration.summary()]
     if folds:
-        scores = found.cross_validate(groups=[test.group for test in tests], folds=folds).scores
+        scores = calibration.cross_validate(groups=[test.group for test in tests], folds=folds).scores
         numbers["cross_validated"] = asdict(scores)
         parts.append(f"left-out motions: {scores} ({format_count(folds, 'fold')})")
     if predicted:
-        rows = [(name, float(chance)) for name, chance in predicted.items()]
+        rows = [(name, float(probability)) for name, probability in predicted.items()]
         parts.append("\n" + format_table(["motion", "probability"], rows))
     return numbers, "\n".join(parts)
 
@@ -160,8 +162,8 @@ def validate(
     tests: Path,
     *,
     outlier_probability: float | None = None,
-    bins: Annotated[int, WHOLE] = 10,
-    seed: Annotated[int, WHOLE] = 0,
+    bins: Annotated[int, INTEGER] = 10,
+    seed: Annotated[int, INTEGER] = 0,
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     file: Annotated[FileOptions, RECORDS] = FileOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
@@ -185,10 +187,12 @@ def validate(
         Seed of the simulations for bands and probabilities.
     """
     with output.folder() as folder:
-        rows = read_tests(tests, **file.about())
-        found = judged(rows, **block.blocks(model), outlier_probability=outlier_probability, bins=bins, seed=seed)
-        result = found.to_dict()
+        rows = read_tests(tests, **file.metadata())
+        validation = run_validation(
+            rows, **block.blocks(model), outlier_probability=outlier_probability, bins=bins, seed=seed
+        )
+        result = validation.to_dict()
         if folder is not None:
-            write_tables(folder, found)
-            write_results(folder, figures={"validation": found.plot}, result=result)
-        print_result(result, found.summary(), as_json=output.as_json)
+            write_tables(folder, validation)
+            write_results(folder, figures={"validation": validation.plot}, result=result)
+        print_result(result, validation.summary(), as_json=output.as_json)

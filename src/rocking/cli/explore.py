@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from rocking.cli.options import WHOLE
+from rocking.cli.options import INTEGER
 from rocking.cli.output import OUTPUT, QuietOptions
 from rocking.errors import InvalidOption
 from rocking.records.named import is_shipped
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def explore(
     motion: str | None = None,
     *,
-    port: Annotated[int, WHOLE] = 0,
+    port: Annotated[int, INTEGER] = 0,
     no_open: Annotated[bool, Parameter(negative="")] = False,
     address: str = "127.0.0.1",
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
@@ -48,26 +48,26 @@ def explore(
 
     explorer = Explorer()
     is_study = motion is not None and Path(motion).is_dir()
-    study = _study(Path(motion)) if motion is not None and is_study else None
-    texts = {"view": "map"} if is_study else {} if motion is None else _opening(explorer, motion)
+    study = _open_study(Path(motion)) if motion is not None and is_study else None
+    texts = {"view": "map"} if is_study else {} if motion is None else _describe_initial_motion(explorer, motion)
     server = start_listening(explorer, texts, study, address=address, port=port)
     server.announce(open_browser=not no_open)
     server.run()
 
 
-def _study(folder: Path) -> StudyView:
-    """Return the study in a folder, for display as maps."""
+def _open_study(folder: Path) -> StudyView:
+    """Open the study in a folder, for display as maps."""
     from rocking.explorer.studies import StudyView
-    from rocking.studies.folder import exists
+    from rocking.studies.folder import contains_study
 
-    if not exists(folder):
-        sentence = "this folder holds no study; name one record, and drop the other files on the page"
+    if not contains_study(folder):
+        sentence = "this folder contains no study; pass one record, and drop the other files on the page"
         raise InvalidOption(sentence, path=str(folder))
     return StudyView(folder)
 
 
-def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
-    """Return the texts of the initial motion."""
+def _describe_initial_motion(explorer: Explorer, motion: str) -> dict[str, str]:
+    """Describe the initial motion in texts of the page."""
     from rocking.explorer.motions import create_pulse, is_pulse
     from rocking.records.formats.source import unreadable_file_error
 

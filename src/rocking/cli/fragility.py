@@ -12,25 +12,25 @@ from cyclopts import Parameter
 
 from rocking.analysis.curve import check_nrml_names
 from rocking.analysis.fragility import Fragility, fit_fragility
-from rocking.analysis.fragility import fragility as run
+from rocking.analysis.fragility import fragility as fit_simulated
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.risk import check_measure
 from rocking.calibration.tables import read_observed
 from rocking.cli.options import (
     BLOCK,
+    INTEGER,
     MEASURE,
     MODEL,
     RECORDS,
-    WHOLE,
     EnsembleOptions,
     MeasureOptions,
     MotionOptions,
     Names,
     SchemeOptions,
-    labels_of,
+    parse_labels,
     parse_limit_states,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, skip_on_error, write_results
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import write_csv
@@ -55,7 +55,7 @@ def fragility(
     confidence: float = 0.9,
     taxonomy: str = "rocking-block",
     hazard: Path | None = None,
-    site: Annotated[int, WHOLE] = 0,
+    site: Annotated[int, INTEGER] = 0,
     years: float = _YEARS,
     standing: float | None = None,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
@@ -101,66 +101,66 @@ def fragility(
         --hazard the probability of its survival, and survival.png and .pdf to --out.
     """
     if outcomes is not None:
-        beside = {
+        conflicting = {
             "records": names, "levels": measure.levels, "ensemble": block.ensemble, "clusters": clusters,
             "limit_states": limit_states != "overturning", "polarity": polarity != "+", "model": model.equation,
-            "chattering": model.chattering != "certified", **block.given(),
-            **motion.given("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
+            "chattering": model.chattering != "certified", **block.supplied(),
+            **motion.supplied("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
         }  # fmt: skip
-        _refuse_beside_outcomes(beside)
+        _reject_options_beside_outcomes(conflicting)
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", InvalidOption)
-    curve = _hazard(hazard, site, years, measure.period)
+    curve = _read_hazard(hazard, site, years, measure.period)
     states = parse_limit_states(limit_states)
     if output.out is not None:
         check_nrml_names([taxonomy], "taxonomy")
         check_nrml_names(states, "a limit state")
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
-        not_passed = _limit_of_standing([*states])
+        standing_limit = _find_standing_limit([*states])
     checks.fraction(confidence, "confidence", InvalidOption)
     with output.folder() as folder:
-        read = None
+        loaded = None
         if outcomes is not None:
-            observed = read_observed(outcomes, measure.wanted, **motion.about())
+            observed = read_observed(outcomes, measure.intensity_measure, **motion.metadata())
             _check_hazard(curve, observed["measure"])
             fitted = fit_fragility(**observed, confidence=confidence)
         else:
-            _check_hazard(curve, measure.wanted)
-            read = motion.read_all(names)
-            with _outcomes_kept(folder):
-                fitted = run(
-                    motions=list(read.motions.values()),
-                    **measure.chosen(),
-                    **model.chosen() | bodies,
+            _check_hazard(curve, measure.intensity_measure)
+            loaded = motion.read_all(names)
+            with _save_outcomes_on_failure(folder):
+                fitted = fit_simulated(
+                    motions=list(loaded.motions.values()),
+                    **measure.arguments(),
+                    **model.arguments() | bodies,
                     limit_states=states,
                     polarity=polarity,
-                    clusters=labels_of(clusters),
+                    clusters=parse_labels(clusters),
                     confidence=confidence,
                 )
-        found, text = fitted.to_dict() | ({} if read is None else read.to_dict()), [fitted.summary()]
+        result, texts = fitted.to_dict() | ({} if loaded is None else loaded.to_dict()), [fitted.summary()]
         figures: dict[str, Callable[[], Figure]] = {"fragility": fitted.plot}
         if curve is not None:
             risk = fitted.annual_rate(curve)
-            found["risk"], figures["risk"] = risk.to_dict(years), risk.plot
-            text.append(risk.summary(years))
+            result["risk"], figures["risk"] = risk.to_dict(years), risk.plot
+            texts.append(risk.summary(years))
         if standing is not None:
-            survived = fitted.survival(standing, curve, limit_state=not_passed)
-            found["survival"], figures["survival"] = survived.to_dict(), survived.plot
-            text.append(survived.summary())
+            survival = fitted.survival(standing, curve, limit_state=standing_limit)
+            result["survival"], figures["survival"] = survival.to_dict(), survival.plot
+            texts.append(survival.summary())
         if folder is not None:
-            with left_out(name := "fragility.xml"):
+            with skip_on_error(name := "fragility.xml"):
                 fitted.to_nrml(folder / name, taxonomy=taxonomy)
             fitted.to_csv(folder / "fragility.csv")
             if fitted.outcomes is not None:
-                _with_records(fitted, found.get("records", [])).to_csv(folder / "outcomes.csv", "outcomes")
-            write_results(folder, figures=figures, result=found)
-        print_result(found, "\n\n".join(text), as_json=output.as_json)
+                _add_record_names(fitted, result.get("records", [])).to_csv(folder / "outcomes.csv", "outcomes")
+            write_results(folder, figures=figures, result=result)
+        print_result(result, "\n\n".join(texts), as_json=output.as_json)
 
 
-def _refuse_beside_outcomes(given: Mapping[str, object]) -> None:
-    for option in [option for option, value in given.items() if value]:
-        sentence = "{} are observed, of a block and under motions of their own: leave {} out"
+def _reject_options_beside_outcomes(options: Mapping[str, object]) -> None:
+    for option in [option for option, value in options.items() if value]:
+        sentence = "{} are observed, for their own block and motions: omit {}"
         raise InvalidOption(sentence, "outcomes", option)
 
 
@@ -169,41 +169,41 @@ def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
         check_measure(curve, measure)
 
 
-def _limit_of_standing(names: list[str]) -> str:
-    """Return the limit that a standing block has not exceeded: overturning, or the only one."""
+def _find_standing_limit(names: list[str]) -> str:
+    """Find the limit state that a standing block has not exceeded: overturning, or the only one."""
     if len(names) > 1 and "overturning" not in names:
-        sentence = f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}"
+        sentence = f"{{}} requires overturning or a single limit state; got {' and '.join(names)}: choose one in {{}}"
         raise InvalidOption(sentence, "standing", "limit_states", value=names)
     return "overturning" if "overturning" in names else names[0]
 
 
-def _with_records(found: Fragility, records: list[dict[str, Any]]) -> Fragility:
+def _add_record_names(fitted: Fragility, records: list[dict[str, Any]]) -> Fragility:
     """Add the record to the name of the motion of each outcome."""
-    if not records or found.outcomes is None:
-        return found
-    named = found.outcomes.copy()
-    named.insert(0, "record", named["motion"].map({row["motion"]: row["record"] for row in records}))
-    return replace(found, outcomes=named)
+    if not records or fitted.outcomes is None:
+        return fitted
+    table = fitted.outcomes.copy()
+    table.insert(0, "record", table["motion"].map({row["motion"]: row["record"] for row in records}))
+    return replace(fitted, outcomes=table)
 
 
 @contextlib.contextmanager
-def _outcomes_kept(folder: Path | None) -> Iterator[None]:
+def _save_outcomes_on_failure(folder: Path | None) -> Iterator[None]:
     """Write simulated outcomes even if the fit fails."""
     try:
         yield
-    except Unfitted as refused:
-        if folder is not None and refused.outcomes is not None:
-            write_csv(folder / "outcomes.csv", refused.outcomes)
-            note(f"what was simulated is in {folder / 'outcomes.csv'}")
+    except Unfitted as error:
+        if folder is not None and error.outcomes is not None:
+            write_csv(folder / "outcomes.csv", error.outcomes)
+            note(f"the simulated outcomes are in {folder / 'outcomes.csv'}")
         raise
 
 
-def _hazard(file: Path | None, site: int, years: float, period: float | None) -> HazardCurve | None:
+def _read_hazard(file: Path | None, site: int, years: float, period: float | None) -> HazardCurve | None:
     """Read a hazard curve, if any, with notes."""
     if file is None:
         for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
             if is_given:
-                raise InvalidOption("{} is for a curve of {}: give one, or leave it out", name, "hazard")
+                raise InvalidOption("{} requires a curve from {}: add one, or omit it", name, "hazard")
         return None
     curve = HazardCurve.read(file, site=site, period=period)
     for sentence in hazard_notes(curve.intensity, curve.measure):

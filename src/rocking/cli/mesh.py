@@ -64,24 +64,24 @@ def mesh(
     """
     with output.folder() as folder:
         if restitution is not None and azimuth is None:
-            raise InvalidOption("{} is for the blocks of {}: give one, or leave it out", "restitution", "azimuth")
+            raise InvalidOption("{} requires blocks from {}: add one, or omit it", "restitution", "azimuth")
         solid = Solid.from_mesh(
             file,
             density=None if density is None else read_densities(density, "density"),
-            support=None if support is None else [_numbers(corner, "support") for corner in support.split(";")],
+            support=None if support is None else [_read_numbers(corner, "support") for corner in support.split(";")],
             tolerance=None if tolerance is None else read_length(tolerance, "tolerance"),
-            up=_numbers(up, "up") if up is not None and "," in up else up,
+            up=_read_numbers(up, "up") if up is not None and "," in up else up,
             unit=unit if unit.isalpha() else read_number(unit, "unit"),
             turn=0.0 if turn is None else read_number(turn, "turn"),
         )
         rose = solid.rose()
         e = None if restitution is None else read_sides(restitution, "restitution")
         azimuths = [] if azimuth is None else read_array(azimuth, "azimuth").tolist()
-        blocks = [_row(at, solid.block(at, restitution=e)) for at in azimuths]
-        found: dict[str, Any] = {"solid": solid.to_dict(), **rose.to_dict(), "blocks": blocks}
-        text = [solid.summary(), rose.summary()]
+        blocks = [_create_block_row(degrees, solid.block(degrees, restitution=e)) for degrees in azimuths]
+        result: dict[str, Any] = {"solid": solid.to_dict(), **rose.to_dict(), "blocks": blocks}
+        texts = [solid.summary(), rose.summary()]
         if blocks:
-            text.append(format_table([*blocks[0]], [[*row.values()] for row in blocks]))
+            texts.append(format_table([*blocks[0]], [[*row.values()] for row in blocks]))
         if folder is not None:
             write_tables(folder, rose)
             rose.to_netcdf(folder / "rose.nc")
@@ -89,22 +89,22 @@ def mesh(
                 import pandas as pd
 
                 write_csv(folder / "blocks.csv", pd.DataFrame(blocks))
-            write_results(folder, figures={"rose": rose.plot}, result=found)
-        print_result(found, "\n\n".join(text), as_json=output.as_json)
+            write_results(folder, figures={"rose": rose.plot}, result=result)
+        print_result(result, "\n\n".join(texts), as_json=output.as_json)
 
 
-def _row(azimuth: float, block: Block) -> dict[str, float]:
-    """Return a table row with a block's pivots and the parameters of both sides, with notes on the block."""
+def _create_block_row(azimuth: float, block: Block) -> dict[str, float]:
+    """Create a table row with a block's pivots and the parameters of both sides, with notes on the block."""
     for sentence in block_notes(block):
         note(f"azimuth {azimuth:g}: {sentence}")
     plus, minus = block.sides
-    squared = block.gravity * plus.radius / plus.p**2 - plus.radius**2
+    gyration_squared = block.gravity * plus.radius / plus.p**2 - plus.radius**2
     return {
         "azimuth_deg": azimuth,
         "pivot_plus_m": plus.radius * math.sin(plus.alpha),
         "pivot_minus_m": minus.radius * math.sin(minus.alpha),
         "height_of_mass_m": plus.radius * math.cos(plus.alpha),
-        "gyration_m": math.sqrt(squared),
+        "gyration_m": math.sqrt(gyration_squared),
         **{
             f"{name}_{sign}{unit}": getattr(side, name)
             for name, unit in (("p", "_rad_s"), ("alpha", "_rad"), ("restitution", ""))
@@ -113,6 +113,6 @@ def _row(azimuth: float, block: Block) -> dict[str, float]:
     }
 
 
-def _numbers(text: str, name: str) -> Sequence[float]:
-    """Return numbers separated by commas."""
+def _read_numbers(text: str, name: str) -> Sequence[float]:
+    """Read numbers separated by commas."""
     return [read_number(part, name) for part in text.split(",")]

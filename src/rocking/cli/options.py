@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from rocking.block import Block
     from rocking.block.body import Body
 
-Made = TypeVar("Made")
-Options = TypeVar("Options", bound="InputOptions")
+Item = TypeVar("Item")
+OptionsClass = TypeVar("OptionsClass", bound="InputOptions")
 
 #: Spread over the options of a command, each group under its own heading in the help.
 MEASURE: Final = Parameter(name="*", group=Group("Intensity", sort_key=0))
@@ -51,170 +51,182 @@ Names = Annotated[
 ]
 
 
-def hint(text: str) -> Parameter:
-    """Return the help of an option."""
+def describe_option(text: str) -> Parameter:
+    """Describe an option in the help."""
     return Parameter(help=text)
 
 
-def written(text: str) -> Parameter:
-    """Return the help of a numeric option whose value may begin with a minus sign."""
+def describe_signed_option(text: str) -> Parameter:
+    """Describe a numeric option whose value may begin with a minus sign."""
     return Parameter(help=text, allow_leading_hyphen=True)
 
 
-def _whole(_: Any, tokens: Sequence[Token]) -> int:
+def _convert_integer(_: Any, tokens: Sequence[Token]) -> int:
     if not re.fullmatch(r"[+-]?\d+", tokens[0].value):
         raise ValueError(f"{tokens[0].value} is not a whole number")
     return int(tokens[0].value)
 
 
 #: Reader of integers; the parser itself would round 1.5 to an integer.
-WHOLE: Final = Parameter(converter=_whole)
+INTEGER: Final = Parameter(converter=_convert_integer)
 
 
 @dataclass(frozen=True)
 class InputOptions:
-    """Texts of some inputs."""
+    """Options that are texts of inputs."""
 
-    def given(self, *names: str) -> dict[str, Any]:
+    def supplied(self, *names: str) -> dict[str, Any]:
         """Return the texts that were supplied, or the named ones."""
-        texts = {each.name: getattr(self, each.name) for each in fields(self)}
-        return {n: text for n, text in texts.items() if text not in (None, False, ()) and (not names or n in names)}
+        texts = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {
+            name: text for name, text in texts.items() if text not in (None, False, ()) and (not names or name in names)
+        }
 
-    def read(self, *names: str) -> dict[str, Any]:
+    def read_values(self, *names: str) -> dict[str, Any]:
         """Return the values of the supplied texts, or of the named ones."""
-        return {name: INPUTS[name].read(text) for name, text in self.given(*names).items() if name in INPUTS}
+        return {name: INPUTS[name].read(text) for name, text in self.supplied(*names).items() if name in INPUTS}
 
 
 #: Types and defaults of options that are not a text.
-_TYPES: Final[Mapping[str, tuple[Any, Any]]] = {"flag": (bool, False), "texts": (tuple[str, ...], ())}
+_OPTION_TYPES: Final[Mapping[str, tuple[Any, Any]]] = {"flag": (bool, False), "texts": (tuple[str, ...], ())}
 
 
-def _with(*names: str) -> Callable[[type[Options]], type[Options]]:
+def _with_inputs(*names: str) -> Callable[[type[OptionsClass]], type[OptionsClass]]:
     """Add a field for each of some inputs to a class of options."""
 
-    def decorated(options: type[Options]) -> type[Options]:
-        made: list[Any] = []
+    def add_fields(options: type[OptionsClass]) -> type[OptionsClass]:
+        new_fields: list[Any] = []
         for name in names:
-            each = INPUTS[name]
-            kind, default = _TYPES.get(each.kind, (str | None, None))
-            is_signed = each.kind in declared.READERS or "acceleration" in each.kind
-            of = Parameter(help=each.help, negative="", allow_leading_hyphen=is_signed)
-            made.append((name, Annotated[kind, of], default))
-        about = {"__doc__": options.__doc__, "__module__": options.__module__}
-        return make_dataclass(options.__name__, made, bases=(options,), frozen=True, namespace=about)
+            option_input = INPUTS[name]
+            kind, default = _OPTION_TYPES.get(option_input.kind, (str | None, None))
+            is_signed = option_input.kind in declared.READERS or "acceleration" in option_input.kind
+            parameter = Parameter(help=option_input.help, negative="", allow_leading_hyphen=is_signed)
+            new_fields.append((name, Annotated[kind, parameter], default))
+        namespace = {"__doc__": options.__doc__, "__module__": options.__module__}
+        return make_dataclass(options.__name__, new_fields, bases=(options,), frozen=True, namespace=namespace)
 
-    return decorated
+    return add_fields
 
 
-@_with(*(name for name in declared.BLOCK if name != "mass"))
+@_with_inputs(*(name for name in declared.BLOCK if name != "mass"))
 class BlockOptions(InputOptions):
     """Block described by its sizes, parameters, or pivots."""
 
     def block(self) -> Block:
         """Return the block, with notes on likely mistakes."""
-        block = bodies.create_block(self.read(*declared.BLOCK))
+        block = bodies.create_block(self.read_values(*declared.BLOCK))
         bodies.note_likely_mistakes([block])
         return block
 
 
-@_with("mass", *declared.SUPPORTS)
-class HeldOptions(BlockOptions):
+@_with_inputs("mass", *declared.SUPPORTS)
+class RestrainedOptions(BlockOptions):
     """Block with restraints."""
 
     def body(self) -> Body:
         """Return the block, with its restraints if any."""
-        given, block = self.given(), bodies.create_block(self.read(*declared.BLOCK))
-        forces = [_made(declared.FORCES[name], text, name) for name in declared.FORCES for text in given.get(name, ())]
+        texts, block = self.supplied(), bodies.create_block(self.read_values(*declared.BLOCK))
+        forces = [
+            _create_from_pairs(declared.FORCES[name], text, name)
+            for name in declared.FORCES
+            for text in texts.get(name, ())
+        ]
         for name, couple in declared.COUPLES.items():
-            if name in given:
-                with _about(name):
-                    forces.append(couple(INPUTS[name].read(given[name])))
+            if name in texts:
+                with _add_option_to_errors(name):
+                    forces.append(couple(INPUTS[name].read(texts[name])))
         try:
-            body = bodies.create_body(block, self.read("restitution", "one_sided", "lean"), forces)
-        except InvalidBlock as wrong:
-            if not forces or wrong.argument != "offset":
+            body = bodies.create_body(block, self.read_values("restitution", "one_sided", "lean"), forces)
+        except InvalidBlock as error:
+            if not forces or error.argument != "offset":
                 raise
-            raise InvalidBlock(literal(str(wrong))) from wrong  # offset of a restraint, not the --offset of the block
+            raise InvalidBlock(literal(str(error))) from error  # offset of a restraint, not the --offset of the block
         bodies.note_likely_mistakes([block], [body])
         return body
 
 
 @dataclass(frozen=True)
-class EnsembleOptions(HeldOptions):
+class EnsembleOptions(RestrainedOptions):
     """Block described by its sizes or parameters, or an ensemble from a calibration."""
 
     ensemble: Annotated[
         Path | None,
-        hint("In place of a block the ensemble.csv that rocking calibrate writes, with its weights and its model."),
+        describe_option("File ensemble.csv from rocking calibrate, instead of a block; includes weights and model."),
     ] = None
 
     def blocks(self, model: ModelOptions) -> dict[str, Any]:
         """Return blocks, weights and equation of motion as arguments."""
         if self.ensemble is None:
             return {"blocks": self.body(), "model": model.model}
-        if given := self.of_block():
-            raise InvalidBlock(f"{{}} has blocks of its own: leave {bodies.name_all(given)} out", "ensemble", *given)
-        return ensemble_of(self.ensemble, model)
+        if conflicting := self.block_options():
+            raise InvalidBlock(
+                f"{{}} replaces the block: omit {bodies.name_all(conflicting)}", "ensemble", *conflicting
+            )
+        return read_ensemble_arguments(self.ensemble, model)
 
-    def of_block(self) -> list[str]:
+    def block_options(self) -> list[str]:
         """Return the supplied options of a block."""
-        return [name for name in self.given() if name != "ensemble"]
+        return [name for name in self.supplied() if name != "ensemble"]
 
 
-def ensemble_of(file: Path, model: ModelOptions) -> dict[str, Any]:
-    """Return blocks, weights and equation of motion of an ensemble as arguments."""
+def read_ensemble_arguments(file: Path, model: ModelOptions) -> dict[str, Any]:
+    """Read blocks, weights and equation of motion of an ensemble as arguments."""
     from rocking.calibration.tables import read_ensemble
 
-    found = read_ensemble(file)
-    return {"blocks": found.blocks, "weights": found.weights, "model": model.equation or found.model}
+    ensemble = read_ensemble(file)
+    return {"blocks": ensemble.blocks, "weights": ensemble.weights, "model": model.equation or ensemble.model}
 
 
 @contextmanager
-def _about(option: str) -> Iterator[None]:
+def _add_option_to_errors(option: str) -> Iterator[None]:
     """Add the option to errors on its parameters, because other options share their names."""
     try:
         yield
-    except RockingError as wrong:
-        raise InvalidOption(f"{{}}: {literal(str(wrong))}", option) from wrong
+    except RockingError as error:
+        raise InvalidOption(f"{{}}: {literal(str(error))}", option) from error
 
 
-def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
+def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
     """Create an object from an option with NAME=VALUE pairs."""
-    given: dict[str, Any] = {}
-    flags = {name for name, each in inspect.signature(kind).parameters.items() if isinstance(each.default, bool)}
+    values: dict[str, Any] = {}
+    flags = {
+        name for name, parameter in inspect.signature(kind).parameters.items() if isinstance(parameter.default, bool)
+    }
     for part in text.split(","):
-        name, equals, value = (each.strip() for each in part.partition("="))
+        name, equals, value = (parameter.strip() for parameter in part.partition("="))
         name = name.replace("-", "_")
-        if not equals or name in given:
-            sentence = "{} takes NAME=VALUE with commas between, each name once, not "
+        if not equals or name in values:
+            sentence = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
             raise InvalidOption(sentence + literal(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
-            raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
-        given[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
-    bodies.check_parameters(kind, given, "{}", option)
-    with _about(option):
-        return kind(**given)
+            raise InvalidOption(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
+        values[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
+    bodies.check_parameters(kind, values, "{}", option)
+    with _add_option_to_errors(option):
+        return kind(**values)
 
 
-@_with("channel", "dt", "units")
+@_with_inputs("channel", "dt", "units")
 class FileOptions(InputOptions):
     """Metadata that a record file lacks."""
 
-    def about(self) -> dict[str, Any]:
+    def metadata(self) -> dict[str, Any]:
         """Return channel, step and units as arguments."""
-        return {"channel": None, "dt": None, "units": None} | self.read("channel", "dt", "units")
+        return {"channel": None, "dt": None, "units": None} | self.read_values("channel", "dt", "units")
 
     def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
         """Return the scaled motion of a record or pulse, with notes."""
-        given, vertical = self.given(), self.given().get("vertical")
+        texts, vertical = self.supplied(), self.supplied().get("vertical")
         # Mistakes in the options are reported before a long file is read.
-        target = read_scaling({n: given[n] for n in ("scale", "pga", "pgv", "sa") if n in given}, positive_acceleration)
+        target = read_scaling(
+            {key: texts[key] for key in ("scale", "pga", "pgv", "sa") if key in texts}, read_positive_acceleration
+        )
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
-                motion = motion.with_vertical(load_vertical(vertical, name, **self.about()))
+                motion = motion.with_vertical(load_vertical(vertical, name, **self.metadata()))
         else:
-            motion = load_motion(name, **self.about(), vertical=vertical, several=several)
+            motion = load_motion(name, **self.metadata(), vertical=vertical, several=several)
         notes = motion_notes(motion)
         for sentence in (*notes, *vertical_notes(motion)):
             note(f"{name}: {sentence}")
@@ -228,15 +240,15 @@ class FileOptions(InputOptions):
 
     def pulses(self) -> dict[str, Motion]:
         """Return the pulses by their texts."""
-        return {text: self.motion(text, is_pulse=True) for text in self.given().get("pulse", ())}
+        return {text: self.motion(text, is_pulse=True) for text in self.supplied().get("pulse", ())}
 
 
-@_with("vertical", "scale", "pga", "pgv", "sa", "pulse")
+@_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse")
 class ScaledPulseOptions(FileOptions):
     """One record at a time, or pulses, scaled."""
 
 
-class ReadRecords(NamedTuple):
+class LoadedRecords(NamedTuple):
     """Motions of records and pulses.
 
     Attributes
@@ -251,7 +263,7 @@ class ReadRecords(NamedTuple):
 
     motions: dict[str, Motion]
     skipped: dict[str, str]
-    single: bool
+    is_single: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Return the records and skipped files for JSON."""
@@ -260,30 +272,30 @@ class ReadRecords(NamedTuple):
         return {"records": create_record_columns([*self.motions], [*self.motions.values()]), "skipped": self.skipped}
 
 
-def refusal(name: str, error: RockingError) -> str:
-    """Return why a record cannot be read, for the command line."""
+def describe_refusal(name: str, error: RockingError) -> str:
+    """Describe why a record cannot be read, for the command line."""
     reason = error.text(
         lambda argument: write_option_name(argument) if argument in ("channel", "dt", "units") else argument
     )
     return reason if error.path == name else f"{name}: {reason}"
 
 
-def read_each(
-    names: Sequence[str], read: Callable[[str], Made], *, keep_going: bool
-) -> tuple[dict[str, Made], dict[str, str]]:
+def read_records(
+    names: Sequence[str], read: Callable[[str], Item], *, keep_going: bool
+) -> tuple[dict[str, Item], dict[str, str]]:
     """Read records one by one; return the motions and, if reading continues after errors, the errors."""
-    found: dict[str, Made] = {}
-    refused: dict[str, str] = {}
+    results: dict[str, Item] = {}
+    reasons: dict[str, str] = {}
     with Progress("reading records", total=len(names)) as progress:
         for name in names:
             try:
-                found[name] = read(name)
+                results[name] = read(name)
             except (UnreadableRecord, InvalidMotion) as error:
                 if not keep_going:
                     raise
-                refused[name] = refusal(name, error)
+                reasons[name] = describe_refusal(name, error)
             progress.advance()
-    return found, refused
+    return results, reasons
 
 
 @dataclass(frozen=True)
@@ -294,16 +306,15 @@ class _RecordOptions(FileOptions):
         bool, Parameter(name="--keep-going", negative="", help="Skip records that cannot be read, and list them.")
     ] = False
 
-    def read_all(self, names: Sequence[str]) -> ReadRecords:
+    def read_all(self, names: Sequence[str]) -> LoadedRecords:
         """Return the motions by name."""
-        records, pulses = expand_record_names(names), self.given().get("pulse", ())
+        records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
         if not records and not pulses:
             raise InvalidOption(
-                "give one record or more: files, folders, or names of shipped records (see rocking records), or {}",
-                "pulse",
+                "at least one record is required: file, folder, or name of a shipped record, or {}", "pulse"
             )
-        made = self.pulses()
-        motions, skipped = read_each(
+        pulse_motions = self.pulses()
+        motions, skipped = read_records(
             records, lambda name: self.motion(name, several=len(records) > 1), keep_going=self.keep_going
         )
         if records and not motions:
@@ -312,16 +323,16 @@ class _RecordOptions(FileOptions):
             )
         for reason in skipped.values():
             note(f"skipped: {reason}")
-        motions |= made
-        return ReadRecords(motions, skipped, [*motions] == [*names, *pulses] and len(motions) == 1)
+        motions |= pulse_motions
+        return LoadedRecords(motions, skipped, [*motions] == [*names, *pulses] and len(motions) == 1)
 
 
-@_with("vertical", "pulse")
+@_with_inputs("vertical", "pulse")
 class UnscaledOptions(_RecordOptions):
     """Several records and pulses with vertical motions, scaled by the analysis itself."""
 
 
-@_with("vertical", "scale", "pga", "pgv", "sa", "pulse")
+@_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse")
 class MotionOptions(_RecordOptions):
     """Several records and pulses, scaled."""
 
@@ -332,16 +343,16 @@ class IntensityOptions:
 
     measure: Annotated[
         IntensityName,
-        hint(
-            "Intensity: PGA, PGV, spectral acceleration, or in the block's own units PGA and p PGV "
-            "over the acceleration that lifts it."
+        describe_option(
+            "Intensity: PGA, PGV, spectral acceleration, or PGA and p PGV divided by the uplift acceleration of the "
+            "block."
         ),
     ] = "pga"
-    period: Annotated[float | None, hint("Period of the spectral acceleration, s.")] = None
-    damping: Annotated[float, hint("Its fraction of critical damping.")] = 0.05
+    period: Annotated[float | None, describe_option("Period of the spectral acceleration, s.")] = None
+    damping: Annotated[float, describe_option("Fraction of critical damping of the spectral acceleration.")] = 0.05
 
     @property
-    def wanted(self) -> Measure:
+    def intensity_measure(self) -> Measure:
         """Return the intensity measure."""
         return Measure(self.measure, self.period, self.damping)
 
@@ -352,21 +363,23 @@ class MeasureOptions(IntensityOptions):
 
     levels: Annotated[
         str | None,
-        written(
+        describe_signed_option(
             "Levels to scale every motion to, as 0.1g,0.2g or 0.1g:1g:10 (velocities as 0.4 (m/s) or 40cm/s, ratios as "
             "plain numbers); START:STOP:COUNT:log for equal ratios."
         ),
     ] = None
 
-    def chosen(self) -> dict[str, Any]:
+    def arguments(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
         readers: Mapping[str, Quantity] = {
-            "pga": positive_acceleration,
-            "sa": positive_acceleration,
+            "pga": read_positive_acceleration,
+            "sa": read_positive_acceleration,
             "pgv": read_velocity,
         }
-        levels = None if self.levels is None else read_array(self.levels, "levels", readers.get(self.measure, _ratio))
-        return {"measure": self.wanted, "levels": levels}
+        levels = (
+            None if self.levels is None else read_array(self.levels, "levels", readers.get(self.measure, _read_ratio))
+        )
+        return {"measure": self.intensity_measure, "levels": levels}
 
 
 @dataclass(frozen=True)
@@ -385,63 +398,63 @@ class ModelOptions:
 class SchemeOptions(ModelOptions):
     """Equation of motion and chattering scheme."""
 
-    chattering: Annotated[str, hint(INPUTS["chattering"].help)] = "certified"
+    chattering: Annotated[str, describe_option(INPUTS["chattering"].help)] = "certified"
 
-    def chosen(self) -> dict[str, Any]:
+    def arguments(self) -> dict[str, Any]:
         """Return model and scheme as arguments."""
         from rocking.engine.schemes import chattering_scheme
 
         return {"model": self.model, "chattering": chattering_scheme(self.chattering)}
 
 
-@_with("duration", "initial_rotation", "initial_velocity")
+@_with_inputs("duration", "initial_rotation", "initial_velocity")
 class StartOptions(InputOptions):
     """Start and end of a simulation."""
 
 
-def labels_of(clusters: str | None) -> str | list[str] | None:
-    """Return the labels of an option that groups motions."""
+def parse_labels(clusters: str | None) -> str | list[str] | None:
+    """Parse the labels of an option that groups motions."""
     from rocking.analysis.levels import BY_STATION
 
     return clusters if clusters in (None, BY_STATION) else [label.strip() for label in clusters.split(",")]
 
 
-def positive_acceleration(text: str, name: str) -> float:
-    """Return a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
+def read_positive_acceleration(text: str, name: str) -> float:
+    """Read a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
     if not read_acceleration(text, name) > 0.0:
         raise InvalidOption(
-            f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
+            f"{{}} must be positive; got {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
         )
     return read_noted_acceleration(text, name)
 
 
-def _ratio(text: str, name: str) -> float:
-    """Return a level of a measure in the units of the block."""
+def _read_ratio(text: str, name: str) -> float:
+    """Read a level of a measure in the units of the block."""
     try:
         return read_number(text, name)
     except InvalidOption:
-        sentence = "{} takes plain numbers with this {}, which counts in the block's own units, not "
+        sentence = "{} must be plain numbers with this {}, which is in units of the block; got "
         raise InvalidOption(sentence + repr(text.strip()), name, "measure") from None
 
 
 def parse_limit_states(text: str) -> dict[str, float]:
-    """Return limit states by name: overturning, or rotations divided by the slenderness, as half=0.5."""
+    """Parse limit states by name: overturning, or rotations divided by the slenderness, as half=0.5."""
     limits = {}
     for part in text.split(","):
-        name, given, value = part.strip().partition("=")
-        if not given and name != "overturning":
+        name, equals, value = part.strip().partition("=")
+        if not equals and name != "overturning":
             raise InvalidOption(
-                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}",
+                f"{{}} must be overturning or NAME=ROTATION divided by slenderness; got {part.strip()!r}",
                 "limit_states",
                 value=text,
             )
-        if name in limits or (given and name in ("", "overturning")):
-            why = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
-            raise InvalidOption(f"{{}} {why}; name each limit state once, as half=0.5", "limit_states")
+        if name in limits or (equals and name in ("", "overturning")):
+            fault = f"contains {name} twice" if name in limits else f"must not name a rotation {name!r}"
+            raise InvalidOption(f"{{}} {fault}; name each limit state once, as half=0.5", "limit_states")
         try:
-            limits[name] = read_number(value, "limit_states") if given else math.inf
+            limits[name] = read_number(value, "limit_states") if equals else math.inf
         except InvalidOption:
             raise InvalidOption(
-                f"{{}} {name} takes a number, not {value.strip()!r}", "limit_states", value=text
+                f"{{}} {name} must be a number; got {value.strip()!r}", "limit_states", value=text
             ) from None
     return limits

@@ -29,7 +29,7 @@ OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))
 class QuietOptions:
     """Options of every command."""
 
-    quiet: Annotated[bool, Parameter(name="--quiet", negative="", help="No notes on stderr.")] = False
+    quiet: Annotated[bool, Parameter(name="--quiet", negative="", help="Suppress notes on stderr.")] = False
 
 
 @dataclass(frozen=True)
@@ -53,30 +53,30 @@ class OutputOptions(PrintOptions):
 def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
     """Write named figures (PNG and PDF) and a result (JSON) into a folder."""
     for stem, draw in figures.items():
-        with left_out(f"{stem}.png and {stem}.pdf"):
+        with skip_on_error(f"{stem}.png and {stem}.pdf"):
             figure = draw()
             write_figure(folder / f"{stem}.png", figure, dpi=160)
             write_figure(folder / f"{stem}.pdf", figure)
     write_text(folder / "result.json", to_json(result) + "\n")  # last: marks a complete folder
 
 
-def write_tables(folder: Path, found: Result) -> None:
+def write_tables(folder: Path, result: Result) -> None:
     """Write every table of a result into its own file in a folder."""
-    for table in found.TABLES:
-        found.to_csv(folder / f"{table}.csv", table)
+    for table in result.TABLES:
+        result.to_csv(folder / f"{table}.csv", table)
 
 
 @contextmanager
-def left_out(files: str, refusal: type[InvalidOption] = InvalidOption) -> Iterator[None]:
+def skip_on_error(files: str, error_type: type[InvalidOption] = InvalidOption) -> Iterator[None]:
     """Skip files whose content is rejected, with a note."""
     try:
         yield
-    except refusal as error:
+    except error_type as error:
         note(Message(f"{literal(files)} left out: {error.message.template}", error.message.arguments))
 
 
 def deliver(
-    found: DatasetResult,
+    analysis: DatasetResult,
     stem: str,
     *,
     folder: Path | None,
@@ -85,12 +85,12 @@ def deliver(
     **figure: Any,
 ) -> None:
     """Write a result into a folder, if any (figure, tables, dataset, result), and print it."""
-    result = found.to_dict() if result is None else result
+    result = analysis.to_dict() if result is None else result
     if folder is not None:
-        write_tables(folder, found)
-        found.to_netcdf(folder / f"{stem}.nc")
-        write_results(folder, figures={stem: functools.partial(found.plot, **figure)}, result=result)
-    print_result(result, found.summary(), as_json=as_json)
+        write_tables(folder, analysis)
+        analysis.to_netcdf(folder / f"{stem}.nc")
+        write_results(folder, figures={stem: functools.partial(analysis.plot, **figure)}, result=result)
+    print_result(result, analysis.summary(), as_json=as_json)
 
 
 def print_result(result: Mapping[str, Any], text: str, *, as_json: bool) -> None:
@@ -109,8 +109,8 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
     OutputError
         If the folder cannot be created or written to.
     """
-    made = [each for each in (folder, *folder.parents) if not each.exists()]
-    before = _written_at(folder)
+    new_folders = [path for path in (folder, *folder.parents) if not path.exists()]
+    old_times = _read_modification_times(folder)
     try:
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -119,16 +119,16 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
             sentence = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
             raise OutputError(sentence, "out", path=str(folder)) from error
         yield folder
-        now = _written_at(folder)
-        written = [name for name, time in now.items() if before.get(name) != time]
+        new_times = _read_modification_times(folder)
+        written = [name for name, time in new_times.items() if old_times.get(name) != time]
         if listed:
             print(f"\nwritten to {folder}: {', '.join(sorted({Path(name).parts[0] for name in written}))}")
-        if replaced := [name for name in written if name in before]:
+        if replaced := [name for name in written if name in old_times]:
             note(f"replaced in {folder}: {', '.join(replaced)}")
     except BaseException:
         with suppress(OSError):
-            for each in made:
-                each.rmdir()
+            for path in new_folders:
+                path.rmdir()
         raise
 
 
@@ -141,7 +141,7 @@ def subfolder(folder: Path, name: str) -> Path:
     return folder / name
 
 
-def _written_at(folder: Path) -> dict[str, int]:
-    """Return the modification times, ns, of the files below a folder."""
+def _read_modification_times(folder: Path) -> dict[str, int]:
+    """Read the modification times, ns, of the files below a folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
     return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}

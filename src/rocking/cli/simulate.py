@@ -17,15 +17,23 @@ from rocking.cli.options import (
     RECORDS,
     BlockOptions,
     FileOptions,
-    HeldOptions,
     ModelOptions,
     MotionOptions,
     Names,
+    RestrainedOptions,
     SchemeOptions,
     StartOptions,
-    read_each,
+    read_records,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, PrintOptions, left_out, print_result, subfolder, write_results
+from rocking.cli.output import (
+    OUTPUT,
+    OutputOptions,
+    PrintOptions,
+    print_result,
+    skip_on_error,
+    subfolder,
+    write_results,
+)
 from rocking.core.progress import note
 from rocking.core.tables import format_table, to_json
 from rocking.errors import InvalidOption, UnreadableRecord
@@ -43,18 +51,18 @@ from rocking.records.named import (
 from rocking.response import PRECISION, Response, steps_within
 from rocking.response.mechanics import friction_coefficient
 from rocking.rules import check as apply_rules
-from rocking.simulation.simulate import simulate as run
+from rocking.simulation.simulate import simulate as run_simulation
 
 
 @dataclass(frozen=True)
-class _Start(StartOptions):
+class _ResponseOptions(StartOptions):
     """Start and end of a simulation, and optional results."""
 
     friction: Annotated[
-        float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
+        float | None, Parameter(help="Coefficient of friction, to report whether and when the block would slide.")
     ] = None
     precision: Annotated[
-        float, Parameter(help="Relative precision of the record: the outcome is also counted in 11 motions within it.")
+        float, Parameter(help="Relative precision of the record; 11 motions within it are also simulated.")
     ] = PRECISION
 
 
@@ -62,8 +70,8 @@ def simulate(
     *names: Names,
     each: Annotated[bool, Parameter(negative="")] = False,
     energy: Annotated[bool, Parameter(negative="")] = False,
-    start: Annotated[_Start, MODEL] = _Start(),
-    block: Annotated[HeldOptions, BLOCK] = HeldOptions(),
+    start: Annotated[_ResponseOptions, MODEL] = _ResponseOptions(),
+    block: Annotated[RestrainedOptions, BLOCK] = RestrainedOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
     model: Annotated[SchemeOptions, MODEL] = SchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -86,39 +94,42 @@ def simulate(
     if start.friction is not None:
         friction_coefficient(start.friction)  # checked before the simulation
     steps_within(start.precision)
-    shown: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
+    summary_options: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
     body = block.body()
-    options: dict[str, Any] = {**model.chosen(), **start.read()}
-    for name in [name for name, chosen in (("each", each), ("energy", energy)) if chosen and output.out is None]:
-        raise InvalidOption("{} writes files; name the folder for them with {}", name, "out")
+    options: dict[str, Any] = {**model.arguments(), **start.read_values()}
+    for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
+        raise InvalidOption("{} writes files; set their folder with {}", name, "out")
     with output.folder() as folder:
-        read = motion.read_all(names)
-        if read.single:
-            ((record, shaking),) = read.motions.items()
-            response = run(body, shaking, **options)
-            result, text = _result(response, record, shown, folder, energy), response.summary(**shown)
+        loaded = motion.read_all(names)
+        if loaded.is_single:
+            ((record, base_motion),) = loaded.motions.items()
+            response = run_simulation(body, base_motion, **options)
+            result, text = (
+                _write_response(response, record, summary_options, folder, energy),
+                response.summary(**summary_options),
+            )
         else:
             if energy and not each:
-                raise InvalidOption("{} draws single responses; of several records give {}, too", "energy", "each")
-            found = replace(survey(body, read.motions, **shown, **options), skipped=read.skipped)
+                raise InvalidOption("{} draws single responses; with several records also use {}", "energy", "each")
+            results = replace(survey(body, loaded.motions, **summary_options, **options), skipped=loaded.skipped)
             if folder is not None:
-                found.to_csv(folder / "summary.csv")
-                found.to_json(folder / "summary.json")
-                with left_out("summary.xlsx"):
-                    found.to_excel(folder / "summary.xlsx")
+                results.to_csv(folder / "summary.csv")
+                results.to_json(folder / "summary.json")
+                with skip_on_error("summary.xlsx"):
+                    results.to_excel(folder / "summary.xlsx")
             if folder is not None and each:
-                folders = create_folder_names(found.records)
-                for name, record, response in zip(folders, found.records, found.responses, strict=True):
-                    _result(response, record, shown, subfolder(folder, name), energy)
-            result, text = found.to_dict(), found.summary()
+                folders = create_folder_names(results.records)
+                for name, record, response in zip(folders, results.records, results.responses, strict=True):
+                    _write_response(response, record, summary_options, subfolder(folder, name), energy)
+            result, text = results.to_dict(), results.summary()
         print_result(result, text, as_json=output.as_json)
 
 
-def _result(
-    response: Response, record: str, shown: dict[str, Any], folder: Path | None, energy: bool
+def _write_response(
+    response: Response, record: str, summary_options: dict[str, Any], folder: Path | None, energy: bool
 ) -> dict[str, Any]:
-    """Return the result, and write it with figures, histories and events into a folder, if any."""
-    result = response.to_dict(**shown)
+    """Write the result, figures, histories and events into a folder, if any, and return the result."""
+    result = response.to_dict(**summary_options)
     # The record also names the motion, as in tables of several records.
     result |= {"motion": {"record": record, **result["motion"]}}
     if folder is not None:
@@ -152,15 +163,17 @@ def check(
         Some of west,ishiyama,housner,asce_43_05,priestley. By default all.
     """
     body = block.block()
-    chosen = None if rules is None else [name.strip() for name in rules.split(",")]
+    rule_names = None if rules is None else [name.strip() for name in rules.split(",")]
     with output.folder() as folder:
-        read = motion.read_all(names)
-        found = replace(apply_rules(body, read.motions, rules=chosen, model=model.model), skipped=read.skipped)
-        result = found.to_dict()
+        loaded = motion.read_all(names)
+        comparison = replace(
+            apply_rules(body, loaded.motions, rules=rule_names, model=model.model), skipped=loaded.skipped
+        )
+        result = comparison.to_dict()
         if folder is not None:
-            found.to_csv(folder / "check.csv")
+            comparison.to_csv(folder / "check.csv")
             write_results(folder, figures={}, result=result)
-        print_result(result, found.summary(), as_json=output.as_json)
+        print_result(result, comparison.summary(), as_json=output.as_json)
 
 
 def records(
@@ -174,47 +187,60 @@ def records(
     """
     files = expand_record_names(names)
     several = len(files) > 1
-    found, refused = read_each(files, lambda name: _contents(name, file, several=several), keep_going=several)
-    shown = [*found.values()] if files else [shipped()]
+    loaded, reasons = read_records(files, lambda name: _read_contents(name, file, several=several), keep_going=several)
+    listings = [*loaded.values()] if files else [shipped()]
     if output.as_json:
-        listed = [each.to_dict() for each in shown] + [{"file": name, "error": refused[name]} for name in refused]
-        print(to_json(listed[0] if len(listed) == 1 else {"files": listed}))
+        entries = [listing.to_dict() for listing in listings] + [
+            {"file": name, "error": reasons[name]} for name in reasons
+        ]
+        print(to_json(entries[0] if len(entries) == 1 else {"files": entries}))
     else:
-        print("\n\n".join([each.summary() for each in shown] + [*refused.values()]))
-    if refused:
-        names_of = ", ".join([*refused][:5]) + (f" and {len(refused) - 5} more" if len(refused) > 5 else "")
-        raise UnreadableRecord(f"{len(refused)} of {len(files)} files cannot be read: {names_of}")
+        print("\n\n".join([listing.summary() for listing in listings] + [*reasons.values()]))
+    if reasons:
+        unreadable = ", ".join([*reasons][:5]) + (f" and {len(reasons) - 5} more" if len(reasons) > 5 else "")
+        raise UnreadableRecord(f"{len(reasons)} of {len(files)} files cannot be read: {unreadable}")
 
 
-def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
+def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:
     if is_shipped(name):
         if not several:
-            reject_redundant_arguments(name, **file.about())
+            reject_redundant_arguments(name, **file.metadata())
         return shipped(name)
     source = sys.stdin.buffer if name == STANDARD_INPUT else name
-    found = contents(source, **file.about(), several=several)
-    for motion, entry in zip(found.motions, found.entries, strict=True):
+    listing = contents(source, **file.metadata(), several=several)
+    for motion, entry in zip(listing.motions, listing.entries, strict=True):
         for sentence in reading_notes(motion):
             note(f"{name}, channel {entry['channel']}: {sentence}")
-    return found
+    return listing
 
 
 def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
     """List the pulses that --pulse accepts, with their parameters and defaults."""
     families = FAMILIES.values()
     if output.as_json:
-        units = [{name: one.unit(name) for name in (*one.needed, *one.optional)} for one in families]
-        known = [{"name": one.name, "needs": one.needed, "takes": one.optional} for one in families]
-        print(to_json({"pulses": [one | {"units": of_one} for one, of_one in zip(known, units, strict=True)]}))
+        units = [{name: family.unit(name) for name in (*family.needed, *family.optional)} for family in families]
+        entries = [{"name": family.name, "needs": family.needed, "takes": family.optional} for family in families]
+        print(
+            to_json(
+                {"pulses": [family | {"units": unit_names} for family, unit_names in zip(entries, units, strict=True)]}
+            )
+        )
         return
-    rows = [(one.name, _listed(one, dict.fromkeys(one.needed)), _listed(one, one.optional)) for one in families]
+    rows = [
+        (
+            family.name,
+            _format_parameters(family, dict.fromkeys(family.needed)),
+            _format_parameters(family, family.optional),
+        )
+        for family in families
+    ]
     print(format_table(["pulse", "needs", "takes"], rows))
     print("\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:")
     print("rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1")
 
 
-def _listed(family: PulseFamily, parameters: Mapping[str, Any]) -> str:
-    """Return the parameters of a pulse with units and defaults."""
+def _format_parameters(family: PulseFamily, parameters: Mapping[str, Any]) -> str:
+    """Format the parameters of a pulse with units and defaults."""
     units = {name: f" ({family.unit(name)})" if family.unit(name) else "" for name in parameters}
     defaults = {
         name: "" if value is None else f" = {value:g}" if isinstance(value, float) else f" = {value}"

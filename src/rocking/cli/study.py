@@ -1,4 +1,4 @@
-"""`rocking study`: long runs of simulations, from a text file to results."""
+"""`rocking study`: long runs of simulations, from a study file to results."""
 
 from __future__ import annotations
 
@@ -10,8 +10,16 @@ from typing import Annotated, Final
 
 from cyclopts import App, Parameter
 
-from rocking.cli.options import MEASURE, WHOLE, IntensityOptions, parse_limit_states
-from rocking.cli.output import OUTPUT, PrintOptions, QuietOptions, left_out, output_folder, print_result, write_results
+from rocking.cli.options import INTEGER, MEASURE, IntensityOptions, parse_limit_states
+from rocking.cli.output import (
+    OUTPUT,
+    PrintOptions,
+    QuietOptions,
+    output_folder,
+    print_result,
+    skip_on_error,
+    write_results,
+)
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.result import Result
@@ -20,16 +28,16 @@ from rocking.core.threads import set_options
 from rocking.errors import InvalidOption, OutputError, StudyError, Unfitted
 from rocking.inputs.quantities import read_array
 from rocking.studies.file import TEMPLATE, read_study
-from rocking.studies.results import StudyOutcome, checked_fractiles
-from rocking.studies.study import Study, study_of
+from rocking.studies.results import StudyOutcome, check_fractiles
+from rocking.studies.study import Study, open_or_create
 
 study = App(name="study")
 
 #: Maximum number of failed units that are named.
-_SHOWN: Final = 5
+_MAX_REPORTED: Final = 5
 
 #: Writers of a study, by the suffix of the file.
-FORMATS: Final = {".nc": Study.to_netcdf, ".csv": Study.to_csv, ".parquet": Study.to_parquet}
+WRITERS: Final = {".nc": Study.to_netcdf, ".csv": Study.to_csv, ".parquet": Study.to_parquet}
 
 
 @study.command
@@ -42,7 +50,7 @@ def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT] = QuietOptions())
         TOML file to write. An existing file is not replaced.
     """
     if file.exists():
-        raise OutputError("the file is there already: choose another name, or remove it first", path=str(file))
+        raise OutputError("the file already exists; choose another name, or remove it first", path=str(file))
     write_text(file, TEMPLATE)
     print(f"written to {file}; edit it, then: rocking study run {file}")
 
@@ -52,7 +60,7 @@ def create(
     file: Path,
     folder: str,
     *,
-    unit_blocks: Annotated[int | None, WHOLE] = None,
+    unit_blocks: Annotated[int | None, INTEGER] = None,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
     """Create the study of a file in a folder; if the folder exists, check that it contains the same study.
@@ -67,7 +75,7 @@ def create(
         Number of blocks in a unit (one motion and scale), a multiple of 512. By default a unit runs for about five
         seconds.
     """
-    print(f"{folder}: {_created(file, folder, unit_blocks).status}; next: rocking study run {folder}")
+    print(f"{folder}: {_create_study(file, folder, unit_blocks).status}; next: rocking study run {folder}")
 
 
 @study.command
@@ -75,7 +83,7 @@ def run(
     folder: str,
     into: str | None = None,
     *,
-    threads: Annotated[int | None, WHOLE] = None,
+    threads: Annotated[int | None, INTEGER] = None,
     part: str | None = None,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
@@ -93,14 +101,14 @@ def run(
         Fixed share of the units to compute, as 3/10. Shares may run at the same time, as an array of jobs.
     """
     if into is not None and not folder.endswith(".toml"):
-        raise InvalidOption(f"{into} is for a study from a TOML file, which {folder} is not; name one place only")
+        raise InvalidOption(f"{into} is only allowed with a TOML file, which {folder} is not; pass one folder only")
     is_file = folder.endswith(".toml")
-    found = _created(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
+    opened = _create_study(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
     with set_options(threads=threads):
-        report = found.run(part=part)
-    print(f"{report}\n{found.folder}: {found.status}")
-    for unit, why in [*report.failed.items()][:_SHOWN]:
-        note(f"{unit} failed: {why}")
+        report = opened.run(part=part)
+    print(f"{report}\n{opened.folder}: {opened.status}")
+    for unit, reason in [*report.failed.items()][:_MAX_REPORTED]:
+        note(f"{unit} failed: {reason}")
     if report.failed:
         raise StudyError(f"{format_count(len(report.failed), 'unit')} failed; run the study again to try again")
     if report.stopped:
@@ -124,7 +132,7 @@ def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOption
 def verify(
     folder: str,
     *,
-    recompute: Annotated[int, WHOLE] = 0,
+    recompute: Annotated[int, INTEGER] = 0,
     repair: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
@@ -139,14 +147,14 @@ def verify(
     repair
         Recompute damaged units and store them.
     """
-    found = Study(folder)
-    faults = found.verify(recompute, repair=repair)
+    opened = Study(folder)
+    faults = opened.verify(recompute, repair=repair)
     for fault in faults:
         print(fault)
     if faults and not repair:
         raise StudyError(f"{format_count(len(faults), 'fault')} found; {{}} computes damaged units again", "repair")
-    state, repaired = found.status, f"; {format_count(len(faults), 'fault')} repaired" if faults else ""
-    print(f"{state.done} of {format_count(state.units, 'unit')} done and sound{repaired}")
+    status, repaired = opened.status, f"; {format_count(len(faults), 'fault')} repaired" if faults else ""
+    print(f"{status.done} of {format_count(status.units, 'unit')} done and sound{repaired}")
 
 
 @study.command
@@ -169,9 +177,9 @@ def export(
     critical
         Write the scales between which this outcome of a block changes instead.
     """
-    if file.suffix not in FORMATS:
-        raise InvalidOption(f"a study is exported to {', '.join(FORMATS)}, not to {file.name}", "file", value=file)
-    FORMATS[file.suffix](Study(folder), file, critical=critical)
+    if file.suffix not in WRITERS:
+        raise InvalidOption(f"a study is exported to {', '.join(WRITERS)}, not to {file.name}", "file", value=file)
+    WRITERS[file.suffix](Study(folder), file, critical=critical)
     print(f"written to {file}")
 
 
@@ -204,24 +212,24 @@ def report(
     fractiles
         Fractions of the motions that stay below the fractiles of the spectrum.
     """
-    how, states = measure.wanted, parse_limit_states(limit_states)
-    shares = checked_fractiles(read_array(fractiles, "fractiles").tolist())
+    intensity_measure, limits = measure.intensity_measure, parse_limit_states(limit_states)
+    fractions = check_fractiles(read_array(fractiles, "fractiles").tolist())
     checks.fraction(confidence, "confidence", InvalidOption)
-    found, made = Study(folder), dict[str, Result]()
-    fit = found.fragility if together else found.block_fragilities
+    opened, results = Study(folder), dict[str, Result]()
+    fit = opened.fragility if together else opened.block_fragilities
     with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
-        with left_out("fragility", Unfitted):
-            made["fragility"] = fit(measure=how, limit_states=states, confidence=confidence)
-        made["spectrum"] = found.spectrum(shares.tolist())
-        for name, one in made.items():
-            one.to_csv(target / f"{name}.csv")
-        result = {name: one.to_dict() for name, one in made.items()}
-        write_results(target, figures={name: one.plot for name, one in made.items()}, result=result)
-        print_result(result, "\n\n".join(one.summary() for one in made.values()), as_json=output.as_json)
+        with skip_on_error("fragility", Unfitted):
+            results["fragility"] = fit(measure=intensity_measure, limit_states=limits, confidence=confidence)
+        results["spectrum"] = opened.spectrum(fractions.tolist())
+        for name, analysis in results.items():
+            analysis.to_csv(target / f"{name}.csv")
+        result = {name: analysis.to_dict() for name, analysis in results.items()}
+        write_results(target, figures={name: analysis.plot for name, analysis in results.items()}, result=result)
+        print_result(result, "\n\n".join(analysis.summary() for analysis in results.values()), as_json=output.as_json)
 
 
-def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
-    described = read_study(file)
-    for sentence in described.skipped:
+def _create_study(file: Path, folder: str, unit_blocks: int | None) -> Study:
+    study_file = read_study(file)
+    for sentence in study_file.skipped:
         note(f"left out: {sentence}")
-    return study_of(folder, described.product, unit_blocks, described.records)
+    return open_or_create(folder, study_file.product, unit_blocks, study_file.records)

@@ -47,18 +47,18 @@ _MEASURES: Final[Mapping[str, quantities.Quantity]] = {
 }
 
 #: Keys of restraints; keys of tables are plurals.
-_HELD: Final = tuple(f"{name}s" if name in FORCES else name for name in SUPPORTS)
+_RESTRAINT_KEYS: Final = tuple(f"{name}s" if name in FORCES else name for name in SUPPORTS)
 
 #: Tables of a file and their keys.
 SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
-    "blocks": ("csv", *BLOCK, *_HELD),
+    "blocks": ("csv", *BLOCK, *_RESTRAINT_KEYS),
     "motions": ("records", "channel", "vertical", "units", "dt", "skip_unreadable", "pulses"),
     "scales": (*_MEASURES, "period", "damping", "polarity"),
     "simulation": ("model", "chattering", "duration"),
 }
 
 #: Keys whose values are not numbers, and the required type (also of the items of a list).
-_TYPES: Final[Mapping[str, tuple[Any, str]]] = {
+_VALUE_TYPES: Final[Mapping[str, tuple[Any, str]]] = {
     **dict.fromkeys(("csv", "vertical", "units", "polarity", "model", "chattering"), (str, "text")),
     **dict.fromkeys(("one_sided", "skip_unreadable"), (bool, "true or false")),
     **{f"{name}s": ([dict], f"tables, [[blocks.{name}s]]") for name in FORCES},
@@ -68,7 +68,7 @@ _TYPES: Final[Mapping[str, tuple[Any, str]]] = {
 }
 
 #: Parameters that may differ between the two sides, in table columns with these suffixes.
-_SIDES: Final = ("_plus", "_minus")
+_SIDE_SUFFIXES: Final = ("_plus", "_minus")
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,8 @@ def read_study(path: str | Path) -> StudyFile:
     """
     tables = Tables(path)
     _check_tables(tables)
-    blocks, scales = _bodies(tables), _scales(tables)
-    motions, names, skipped = _motions(tables, scales)
+    blocks, scales = _read_bodies(tables), _read_scales(tables)
+    motions, names, skipped = _load_motions(tables, scales)
     rules, polarity = tables.table("simulation"), tables.table("scales").get("polarity", "+")
     with tables.locating_errors("simulation", key="chattering"):
         chattering = chattering_scheme(rules.get("chattering", "certified"))
@@ -135,104 +135,107 @@ def _check_tables(tables: Tables) -> None:
     """Check table names, keys, and types of non-numeric values."""
     for table, content in tables.tables.items():
         if table not in SCHEMA:
-            moved = "its options are now those of rocking study report"
-            hint = moved if table == "report" else suggest_key(table, SCHEMA)
+            moved_hint = "its options are now those of rocking study report"
+            hint = moved_hint if table == "report" else suggest_key(table, SCHEMA)
             raise tables.create_error(table, None, f"there is no table [{{}}]; {hint}", table)
         if not isinstance(content, dict):
             raise tables.create_error(table, None, f"{{}} must be one table, [{table}], once", table)
         for key, value in content.items():
             if key not in SCHEMA[table]:
                 raise tables.create_error(table, key, f"[{table}] has no {{}}; {suggest_key(key, SCHEMA[table])}", key)
-            kind, wanted = _TYPES.get(key, (object, ""))
-            is_right = isinstance(value, list if isinstance(kind, list) else kind)
-            if not is_right or (isinstance(kind, list) and not all(isinstance(one, kind[0]) for one in value)):
-                sentence = f"{{}} must be {wanted}, not {checks.short_repr(value)}"
+            kind, expected = _VALUE_TYPES.get(key, (object, ""))
+            is_valid = isinstance(value, list if isinstance(kind, list) else kind)
+            if not is_valid or (isinstance(kind, list) and not all(isinstance(item, kind[0]) for item in value)):
+                sentence = f"{{}} must be {expected}, not {checks.short_repr(value)}"
                 raise tables.create_error(table, key, sentence, key, value=value)
     for needed in ("blocks", "motions"):
         if needed not in tables.tables:
             raise StudyError("the table [{}] is missing", needed, path=str(tables.file))
 
 
-def _bodies(tables: Tables) -> Bodies:
-    """Return the bodies of all combinations in [blocks], or of its table."""
-    given = tables.table("blocks")
-    if "csv" in given:
-        if len(given) > 1:
-            raise tables.create_error("blocks", "csv", "{} goes without other keys", "csv")
-        return _blocks_of_csv(tables, tables.file.parent / given["csv"])
+def _read_bodies(tables: Tables) -> Bodies:
+    """Read the bodies of all combinations in [blocks], or of its CSV table."""
+    entries = tables.table("blocks")
+    if "csv" in entries:
+        if len(entries) > 1:
+            raise tables.create_error("blocks", "csv", "{} cannot be combined with other keys", "csv")
+        return _read_blocks_csv(tables, tables.file.parent / entries["csv"])
     with tables.locating_errors("blocks"):
-        find_shape(given)
+        find_shape(entries)
     axes: dict[str, Any] = {}
-    for name in (*(name for name in given if name in BLOCK), "one_sided", "lean", *COUPLES):
+    for name in (*(name for name in entries if name in BLOCK), "one_sided", "lean", *COUPLES):
         with tables.locating_errors("blocks", key=name):
-            if name in given:
-                values = INPUTS[name].axis(given[name])
+            if name in entries:
+                values = INPUTS[name].axis(entries[name])
                 axes[name] = [COUPLES[name](value) for value in values] if name in COUPLES else values
     for name in FORCES:
-        for k in range(len(given.get(f"{name}s", []))):
-            axes[f"{name} {k + 1}"] = _forces(tables, name, k)
+        for k in range(len(entries.get(f"{name}s", []))):
+            axes[f"{name} {k + 1}"] = _create_forces(tables, name, k)
     with tables.locating_errors("blocks"):
-        if "p" in given and axes.keys() <= {*BLOCK}:
+        if "p" in entries and axes.keys() <= {*BLOCK}:
             return Blocks.grid(**axes)
         checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
         rows = [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
         blocks = [create_block(row) for row in rows]
         pairs = zip(blocks, rows, strict=True)
         bodies: list[Any] = [
-            create_body(block, row, [one for one in row.values() if isinstance(one, Restraint)]) for block, row in pairs
+            create_body(block, row, [value for value in row.values() if isinstance(value, Restraint)])
+            for block, row in pairs
         ]
         note_likely_mistakes(blocks, bodies)
         return Blocks.from_bodies(bodies)
 
 
-def _made(
+def _create_objects(
     tables: Tables,
     table: str,
     k: int,
-    given: Mapping[str, Any],
-    reader: Callable[[str], quantities.Quantity | None],
-    make: Callable[[dict[str, Any]], Any],
+    entries: Mapping[str, Any],
+    find_quantity: Callable[[str], quantities.Quantity | None],
+    create: Callable[[dict[str, Any]], Any],
 ) -> list[Any]:
     """Create the object of the k-th table, or several for lists or ranges."""
     axes: dict[str, Any] = {}
-    for key, value in given.items():
+    for key, value in entries.items():
         with tables.locating_errors(table, key=key, occurrence=k):
-            quantity = None if isinstance(value, bool) else reader(key)
+            quantity = None if isinstance(value, bool) else find_quantity(key)
             axes[key] = [value] if quantity is None else quantities.read_axis(value, key, quantity)
     with tables.locating_errors(table, occurrence=k):
-        return [make(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())]
+        return [create(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())]
 
 
-def _forces(tables: Tables, name: str, k: int) -> list[Any]:
+def _create_forces(tables: Tables, name: str, k: int) -> list[Any]:
     table = f"blocks.{name}s"
 
-    def made(values: dict[str, Any]) -> Any:
+    def create_force(values: dict[str, Any]) -> Any:
         check_parameters(FORCES[name], values, f"[[{table}]]")
         return FORCES[name](**values)
 
-    return _made(tables, table, k, tables.table(table, k), find_reader, made)
+    return _create_objects(tables, table, k, tables.table(table, k), find_reader, create_force)
 
 
-def _pulses(tables: Tables, k: int) -> list[Motion]:
-    given, table = dict(tables.table("motions.pulses", k)), "motions.pulses"
+def _create_pulses(tables: Tables, k: int) -> list[Motion]:
+    entries, table = dict(tables.table("motions.pulses", k)), "motions.pulses"
     with tables.locating_errors(table, key="family", occurrence=k):
-        family = find_family(str(given.pop("family", "")))
-    return _made(tables, table, k, given, family.quantity, family.create_motion)
+        family = find_family(str(entries.pop("family", "")))
+    return _create_objects(tables, table, k, entries, family.quantity, family.create_motion)
 
 
-def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
+def _read_blocks_csv(tables: Tables, file: Path) -> Blocks:
     try:
         rows = read_csv_rows(file.read_text("utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is no text table in UTF-8; save it as CSV"
-        raise tables.create_error("blocks", "csv", f"{file} cannot be read: {why}") from None
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text table in UTF-8; save it as CSV"
+        raise tables.create_error("blocks", "csv", f"{file} cannot be read: {reason}") from None
     if len(rows) < 2:
-        raise tables.create_error("blocks", "csv", f"{file} holds no blocks: a heading and a row for each are needed")
-    headings, known = rows[0][1], [name + end for name in BLOCK for end in ("", *_SIDES)]
+        raise tables.create_error(
+            "blocks", "csv", f"{file} contains no blocks: a heading and a row for each are required"
+        )
+    headings, known_names = rows[0][1], [name + suffix for name in BLOCK for suffix in ("", *_SIDE_SUFFIXES)]
     for name in headings:
-        meant = "" if name in known else checks.suggest(name, known, "")
-        if meant or name in _HELD or (name in known and headings.count(name) > 1):
-            fault = meant or ("it goes under [blocks]" if name in _HELD else "it is there twice")
+        suggestion = "" if name in known_names else checks.suggest(name, known_names, "")
+        if suggestion or name in _RESTRAINT_KEYS or (name in known_names and headings.count(name) > 1):
+            fault = suggestion or ("it belongs under [blocks]" if name in _RESTRAINT_KEYS else "it occurs twice")
             raise tables.create_error("blocks", "csv", f"column {name} of {file} cannot be read; {fault}")
     blocks = []
     for line, row in rows[1:]:
@@ -242,78 +245,81 @@ def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
                     f"{format_count(len(row), 'cell')} under {format_count(len(headings), 'column')}; correct it"
                 )
             cells = dict(zip(headings, row, strict=True))
-            texts = {name: ",".join(cells[name + end] for end in _SIDES if name + end in cells) for name in BLOCK}
-            given = {name: cells.get(name, text) for name, text in texts.items()}
-            blocks.append(create_block({name: INPUTS[name].read(text) for name, text in given.items() if text}))
+            texts = {
+                name: ",".join(cells[name + suffix] for suffix in _SIDE_SUFFIXES if name + suffix in cells)
+                for name in BLOCK
+            }
+            nonempty = {name: cells.get(name, text) for name, text in texts.items()}
+            blocks.append(create_block({name: INPUTS[name].read(text) for name, text in nonempty.items() if text}))
     note_likely_mistakes(blocks)
     return Blocks.from_bodies(blocks)
 
 
-def _scales(tables: Tables) -> Scales:
-    given = tables.table("scales")
-    measures = [name for name in _MEASURES if name in given]
+def _read_scales(tables: Tables) -> Scales:
+    entries = tables.table("scales")
+    measures = [name for name in _MEASURES if name in entries]
     if len(measures) > 1:
-        listed = " and ".join(["{}"] * len(measures))
-        sentence = f"motions can be scaled to one measure only, not to {listed}"
+        placeholders = " and ".join(["{}"] * len(measures))
+        sentence = f"motions can be scaled to one measure only, not to {placeholders}"
         raise tables.create_error("scales", measures[0], sentence, *measures)
-    options = {option: given[option] for option in ("period", "damping") if option in given}
-    for option in () if "sa" in given else options:
-        raise tables.create_error("scales", option, "{} goes with {}, and only with it", option, "sa")
+    options = {option: entries[option] for option in ("period", "damping") if option in entries}
+    for option in () if "sa" in entries else options:
+        raise tables.create_error("scales", option, "{} is only allowed with {}", option, "sa")
     if not measures:
         return Scales.from_levels(None, FACTOR)
     (name,) = measures
     with tables.locating_errors("scales", key=name):
-        values = quantities.read_axis(given[name], name, _MEASURES[name])
+        values = quantities.read_axis(entries[name], name, _MEASURES[name])
         checks.positive_numbers(values, name, InvalidOption)
         return Scales.from_levels(values, Measure(cast(MeasureName, name), **options))
 
 
-def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
-    """Return the motions, their records, and a sentence for each skipped record."""
-    given, folder = tables.table("motions"), tables.file.parent
-    if "vertical" in given and not given.get("records"):
-        raise tables.create_error("motions", "vertical", "{} is that of the records, and there are none", "vertical")
-    found: dict[str, str] = {}  # names in the file by path or record name
-    for name in given.get("records", []):
+def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
+    """Load the motions; return them, their records, and a sentence for each skipped record."""
+    entries, folder = tables.table("motions"), tables.file.parent
+    if "vertical" in entries and not entries.get("records"):
+        raise tables.create_error("motions", "vertical", "{} applies to records, and there are none", "vertical")
+    names_by_path: dict[str, str] = {}  # names in the file by path or record name
+    for name in entries.get("records", []):
         with tables.locating_record_errors(name):
-            found |= dict.fromkeys(_records_of(folder, name), name)
+            names_by_path |= dict.fromkeys(_match_records(folder, name), name)
     motions, names, skipped = [], [], []
-    for path, name in found.items():
+    for path, name in names_by_path.items():
         try:
             with tables.locating_record_errors(name):
-                motion = _record(tables, path, several=len(found) > 1)
+                motion = _load_record(tables, path, several=len(names_by_path) > 1)
                 scales.factors(motion)  # raises if the motion cannot be scaled
         except (UnreadableRecord, InvalidMotion) as error:
-            if not given.get("skip_unreadable", False):
+            if not entries.get("skip_unreadable", False):
                 raise
             skipped.append(str(error))
         else:
             motions.append(motion)
-            beside = path_exists(path) and Path(path).is_relative_to(folder)
-            names.append(str(Path(path).relative_to(folder)) if beside else path)
-    for k in range(len(given.get("pulses", []))):
-        motions += _pulses(tables, k)
+            is_sibling = path_exists(path) and Path(path).is_relative_to(folder)
+            names.append(str(Path(path).relative_to(folder)) if is_sibling else path)
+    for k in range(len(entries.get("pulses", []))):
+        motions += _create_pulses(tables, k)
     if not motions:
-        raise tables.create_error("motions", None, "[motions] holds no motion that can be read: name records or pulses")
+        raise tables.create_error("motions", None, "[motions] contains no readable motion: add records or pulses")
     return motions, names + [""] * (len(motions) - len(names)), skipped
 
 
-def _record(tables: Tables, path: str, *, several: bool) -> Motion:
-    given = tables.table("motions")
-    about = {name: given[name] for name in ("dt", "units") if name in given}
-    if "channel" in given:
-        about["channel"] = str(given["channel"])
-    if "vertical" in given:  # a file beside the study file, or any other name
-        beside = str(tables.file.parent / given["vertical"])
-        about["vertical"] = beside if path_exists(beside) else given["vertical"]
-    motion = load_motion(path, **about, several=several)
+def _load_record(tables: Tables, path: str, *, several: bool) -> Motion:
+    entries = tables.table("motions")
+    metadata = {name: entries[name] for name in ("dt", "units") if name in entries}
+    if "channel" in entries:
+        metadata["channel"] = str(entries["channel"])
+    if "vertical" in entries:  # a file beside the study file, or any other name
+        sibling = str(tables.file.parent / entries["vertical"])
+        metadata["vertical"] = sibling if path_exists(sibling) else entries["vertical"]
+    motion = load_motion(path, **metadata, several=several)
     for sentence in motion_notes(motion):
         note(f"{path}: {sentence}")
     return motion
 
 
-def _records_of(folder: Path, name: str) -> list[str]:
-    """Return the matching files beside the study file, or a shipped record."""
+def _match_records(folder: Path, name: str) -> list[str]:
+    """Find the files that match a name relative to the study file, or a shipped record."""
     path = str(folder / name)
     if glob.has_magic(name) and not path_exists(path):
         return expand_record_names([str(Path(glob.escape(str(folder))) / name)])

@@ -27,7 +27,7 @@ from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Product, Scales, setup_of
-from rocking.studies.units import OUTCOMES, Key, UnitGrid, Work, decoded, name_of, program, sealed, unsealed
+from rocking.studies.units import OUTCOMES, Key, UnitGrid, UnitInput, decode, format_key, identify_program, seal, unseal
 
 if sys.platform == "win32":
     import msvcrt
@@ -55,128 +55,133 @@ class Store:
     """Outcomes of a product in a folder, in units of a grid; a unit is done if its file exists."""
 
     def __init__(self, path: str | Path) -> None:
-        self.folder = folder_of(path)
-        data = read(self.folder / _INPUTS)
+        self.folder = check_folder(path)
+        data = read_bytes(self.folder / _INPUTS)
         if data is None:
-            raise StudyError("there is no study here: create it first", path=str(path))
-        archive = unsealed(data)
+            raise StudyError("the folder contains no study: create it first", path=str(path))
+        archive = unseal(data)
         if archive is None:
             raise StudyError(
                 f"{_INPUTS} is damaged: restore it, or create the study again elsewhere", path=str(self.folder)
             )
         with np.load(io.BytesIO(archive), allow_pickle=False) as arrays:
             self.inputs: dict[str, NDArray[Any]] = dict(arrays)
-        about = json.loads(str(self.inputs.pop("about")))
-        if about["format"] != _FORMAT:
-            raise StudyError(f"the study is of format {about['format']}, this program reads {_FORMAT}", path=str(path))
-        self.program: str = about["program"]
+        header = json.loads(str(self.inputs.pop("about")))
+        if header["format"] != _FORMAT:
+            raise StudyError(f"the study has format {header['format']}; this program reads {_FORMAT}", path=str(path))
+        self.program: str = header["program"]
         #: Record name of each motion, empty for a pulse; an empty sequence if unknown.
-        self.records: tuple[str, ...] = tuple(about["records"])
-        self.product = _product(self.inputs)
-        self.grid = UnitGrid(self.product.shape, tuple(about["unit"]))
-        self._factors = functools.lru_cache(1)(self._factors_of)  # neighbouring units share their motions
+        self.records: tuple[str, ...] = tuple(header["records"])
+        self.product = _product_from_arrays(self.inputs)
+        self.grid = UnitGrid(self.product.shape, tuple(header["unit"]))
+        self._factors = functools.lru_cache(1)(self._compute_factors)  # neighbouring units share their motions
 
     @staticmethod
     def create(path: str | Path, product: Product, unit: Sequence[int], records: Sequence[str]) -> None:
         """Write a new store into an empty folder."""
-        buffer, about = io.BytesIO(), {"format": _FORMAT, "program": program(), "unit": unit, "records": records}
-        arrays: dict[str, Any] = _arrays(product) | {"about": np.array(json.dumps(about))}
+        buffer, header = (
+            io.BytesIO(),
+            {"format": _FORMAT, "program": identify_program(), "unit": unit, "records": records},
+        )
+        arrays: dict[str, Any] = _product_to_arrays(product) | {"about": np.array(json.dumps(header))}
         np.savez_compressed(buffer, **arrays)
-        put(folder_of(path) / _INPUTS, sealed(buffer.getvalue()))
+        write_atomically(check_folder(path) / _INPUTS, seal(buffer.getvalue()))
 
     def check_program(self) -> None:
         """Raise a StudyError unless this program computes the same bits as the store."""
-        if self.program != program():
+        if self.program != identify_program():
             raise StudyError(
-                f"the study was made by {self.program}, this is {program()}: run it with that version, or create it "
-                "again elsewhere",
+                f"the study was created by {self.program}, this is {identify_program()}: run it with that version, or "
+                "create it again elsewhere",
                 path=str(self.folder),
             )
 
     def check_inputs(self, product: Product) -> None:
         """Check the inputs against the store; a StudyError names the parts that differ."""
-        now, then = _arrays(product), self.inputs
+        new_arrays, stored_arrays = _product_to_arrays(product), self.inputs
         changed = [
             "/".join(name.split("/")[:2])
-            for name in (then | now)
-            if name not in then or name not in now or now[name].tobytes() != then[name].tobytes()
+            for name in (stored_arrays | new_arrays)
+            if name not in stored_arrays
+            or name not in new_arrays
+            or new_arrays[name].tobytes() != stored_arrays[name].tobytes()
         ]
         if changed:
             parts = [*dict.fromkeys(changed)]
-            listed = ", ".join(parts[:3]) + (" and more" if len(parts) > 3 else "")
+            summary = ", ".join(parts[:3]) + (" and more" if len(parts) > 3 else "")
             raise StudyError(
-                f"this holds a study of other inputs ({listed} changed), {len(self.done())} of "
-                f"{format_count(len(self.grid), 'unit')} done: create this one elsewhere, or remove that one",
+                f"the folder contains a study of other inputs ({summary} changed), {len(self.find_done())} of "
+                f"{format_count(len(self.grid), 'unit')} done: create this study elsewhere, or remove the other one",
                 path=str(self.folder),
             )
 
-    def file_of(self, key: Key) -> Path:
+    def unit_path(self, key: Key) -> Path:
         """Return the file of a unit."""
-        return self.folder / _UNITS / name_of(key)
+        return self.folder / _UNITS / format_key(key)
 
-    def done(self) -> set[Key]:
+    def find_done(self) -> set[Key]:
         """Return the keys of the units that are done."""
         with contextlib.suppress(FileNotFoundError), os.scandir(self.folder / _UNITS) as entries:
             names = {entry.name for entry in entries}
-            return {key for key in self.grid if name_of(key) in names}
+            return {key for key in self.grid if format_key(key) in names}
         return set()
 
     def require_complete(self) -> None:
         """Raise a StudyError if units are missing."""
-        missing = len(self.grid) - len(self.done())
+        missing = len(self.grid) - len(self.find_done())
         if missing:
             raise StudyError(
                 f"units are missing, {missing} of {len(self.grid)}: run the study to its end first",
                 path=str(self.folder),
             )
 
-    def outcomes(self, key: Key) -> Mapping[str, Floats] | None:
+    def read_outcomes(self, key: Key) -> Mapping[str, Floats] | None:
         """Return the outcomes of a full unit by name, or None; raise a StudyError if it is damaged."""
-        data = read(self.file_of(key))
+        data = read_bytes(self.unit_path(key))
         if data is None:
             return None
-        values = decoded(data, self.grid.unit)
+        values = decode(data, self.grid.unit)
         if values is None:
-            raise DamagedStudy(f"unit {name_of(key)} is damaged")
+            raise DamagedStudy(f"unit {format_key(key)} is damaged")
         return dict(zip(OUTCOMES, values, strict=True))
 
-    def work(self, key: Key) -> Work:
-        """Return the complete input of a worker for a unit."""
+    def create_input(self, key: Key) -> UnitInput:
+        """Create the complete input of a worker for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
-        return Work(setup_of(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
+        return UnitInput(setup_of(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
 
-    def _factors_of(self, unit: int) -> Floats:
+    def _compute_factors(self, unit: int) -> Floats:
         """Return the factors on the motions of a unit, shape (motions, scales, polarities)."""
         motions = self.product.motions[self.grid.ranges((unit, 0, 0, 0))[0]]
         factors = np.array([self.product.scales.factors(motion) for motion in motions])
         return factors[:, :, None] * np.array(self.product.signs, dtype=np.float64)
 
 
-def folder_of(path: str | Path) -> Path:
-    """Return the folder of a study, which may not exist yet."""
+def check_folder(path: str | Path) -> Path:
+    """Check the path of a study's folder, which may not exist yet."""
     folder = checks.path(path, "the folder of a study", StudyError)
     if "://" in str(path) or folder.is_file():
         kind = "a file" if folder.is_file() else "a URL"
-        raise StudyError(f"this is {kind}, and a study is kept in a folder: name a folder", path=str(path))
+        raise StudyError(f"a study is stored in a folder, but this is {kind}: choose a folder", path=str(path))
     return folder
 
 
-def exists(path: str | Path) -> bool:
-    """Whether a folder contains a study."""
-    return (folder_of(path) / _INPUTS).exists()
+def contains_study(path: str | Path) -> bool:
+    """Return whether a folder contains a study."""
+    return (check_folder(path) / _INPUTS).exists()
 
 
-def require_free(path: str | Path) -> None:
+def require_empty(path: str | Path) -> None:
     """Check that a folder is empty except for remains of a creation."""
-    folder = folder_of(path)
-    others = sorted({each.name for each in folder.glob("[!.]*")} - {"lock"})
-    if others:
-        listed = ", ".join(others[:3]) + (" and more" if len(others) > 3 else "")
-        raise StudyError(f"this holds no study, but {listed}: name a new folder, or an empty one", path=str(folder))
+    folder = check_folder(path)
+    names = sorted({entry.name for entry in folder.glob("[!.]*")} - {"lock"})
+    if names:
+        summary = ", ".join(names[:3]) + (" and more" if len(names) > 3 else "")
+        raise StudyError(f"the folder contains no study, but {summary}: choose a new or empty folder", path=str(folder))
 
 
-def read(file: Path) -> bytes | None:
+def read_bytes(file: Path) -> bytes | None:
     """Read a file; return None if it does not exist."""
     try:
         return file.read_bytes()
@@ -186,9 +191,9 @@ def read(file: Path) -> bytes | None:
         raise StudyError(f"the file cannot be read: {error.strerror or error}", path=str(file)) from error
 
 
-def put(file: Path, data: bytes) -> None:
+def write_atomically(file: Path, data: bytes) -> None:
     """Write a file atomically, and flush its name to the disk."""
-    with _refused("written", file):
+    with _convert_errors("written", file):
         file.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(file, data)
         if os.name != "nt":  # Windows cannot open folders; their file system keeps a journal of names
@@ -200,14 +205,14 @@ def put(file: Path, data: bytes) -> None:
 
 
 @contextlib.contextmanager
-def locked(path: str | Path, *, shared: bool = False) -> Iterator[None]:
+def lock_folder(path: str | Path, *, shared: bool = False) -> Iterator[None]:
     """Lock a folder, exclusively or shared with runs of other parts."""
-    folder = folder_of(path)
-    with _refused("locked", folder / "lock"):
+    folder = check_folder(path)
+    with _convert_errors("locked", folder / "lock"):
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / "lock").open("a+b", buffering=0)
     with file:
-        with _refused("locked", folder / "lock"):
+        with _convert_errors("locked", folder / "lock"):
             try:
                 _lock(file, shared)
             except (BlockingIOError, PermissionError):
@@ -215,32 +220,32 @@ def locked(path: str | Path, *, shared: bool = False) -> Iterator[None]:
                 file.seek(1)
                 holder = file.read().decode(errors="replace") or "another process"
                 raise StudyError(
-                    f"the study is being run by {holder}; wait for it, or end it there and run it again",
+                    f"the study is being run by {holder}; wait until it ends, or stop it there and run it again",
                     path=str(folder),
                 ) from None
             file.truncate(0)
             file.write(f" process {os.getpid()} on {socket.gethostname()}".encode())
-            for left in () if shared else folder.rglob(".*.part*"):  # remains of a killed process
-                left.unlink(missing_ok=True)
+            for remains in () if shared else folder.rglob(".*.part*"):  # remains of a killed process
+                remains.unlink(missing_ok=True)
         yield
 
 
 @contextlib.contextmanager
-def _refused(done: str, file: Path) -> Iterator[None]:
+def _convert_errors(operation: str, file: Path) -> Iterator[None]:
     """Raise an OutputError if the system rejects an operation on a file."""
     try:
         yield
     except OSError as error:
-        raise OutputError(f"the file cannot be {done}: {error.strerror or error}", path=str(file)) from error
+        raise OutputError(f"the file cannot be {operation}: {error.strerror or error}", path=str(file)) from error
 
 
-def _arrays(product: Product) -> dict[str, NDArray[Any]]:
-    """Return all inputs as arrays by part and name."""
+def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
+    """Convert all inputs to arrays by part and name."""
     bodies, scales = product.bodies, product.scales
     arrays = {f"{bodies.kind}/{name}": values for name, (values, _) in bodies.parameters().items()}
     arrays[f"{bodies.kind}/gravity"] = np.array(bodies.gravity)
     for k, motion in enumerate(product.motions):
-        arrays |= _motion_arrays(motion, f"motions/{k}")
+        arrays |= _motion_to_arrays(motion, f"motions/{k}")
     measure = None if scales.measure is None else {"name": scales.measure.name, **scales.measure.options()}
     rules = {
         "scales/measure": measure,
@@ -249,33 +254,33 @@ def _arrays(product: Product) -> dict[str, NDArray[Any]]:
         "rules/chattering": str(product.chattering),
         "rules/duration": product.duration,
     }
-    words = {name: np.array(json.dumps(value)) for name, value in rules.items()}
-    return arrays | {"scales/values": scales.values} | words
+    texts = {name: np.array(json.dumps(value)) for name, value in rules.items()}
+    return arrays | {"scales/values": scales.values} | texts
 
 
-def _product(arrays: Mapping[str, NDArray[Any]]) -> Product:
-    """Return the inputs from their arrays."""
+def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
+    """Create the inputs from their arrays."""
     kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in KINDS), "")
     if not kind:
-        raise StudyError("the bodies of this study are of a kind that is not known here: import its module first")
-    values = {name.partition("/")[2]: each for name, each in arrays.items() if name.startswith(f"{kind}/")}
+        raise StudyError("the study contains an unknown kind of body: import its module first")
+    values = {name.partition("/")[2]: array for name, array in arrays.items() if name.startswith(f"{kind}/")}
     motions = dict.fromkeys(name.split("/")[1] for name in arrays if name.startswith("motions/"))
-    words = {name: json.loads(str(each)) for name, each in arrays.items() if each.dtype.kind == "U"}
-    measure = words["scales/measure"]
+    texts = {name: json.loads(str(array)) for name, array in arrays.items() if array.dtype.kind == "U"}
+    measure = texts["scales/measure"]
     return Product(
         KINDS[kind](**{**values, "gravity": float(values["gravity"])}),
-        tuple(_motion(arrays, f"motions/{k}") for k in motions),
+        tuple(_motion_from_arrays(arrays, f"motions/{k}") for k in motions),
         Scales(None if measure is None else Measure(**measure), arrays["scales/values"]),
-        words["rules/polarity"],
-        words["rules/model"],
-        chattering_scheme(words["rules/chattering"]),
-        words["rules/duration"],
+        texts["rules/polarity"],
+        texts["rules/model"],
+        chattering_scheme(texts["rules/chattering"]),
+        texts["rules/duration"],
     )
 
 
-def _motion_arrays(motion: Motion, place: str) -> dict[str, NDArray[Any]]:
+def _motion_to_arrays(motion: Motion, prefix: str) -> dict[str, NDArray[Any]]:
     description = motion.description
-    words = {
+    texts = {
         "name": motion.name,
         "family": description.family,
         "parameters": dict(description.parameters),
@@ -284,21 +289,21 @@ def _motion_arrays(motion: Motion, place: str) -> dict[str, NDArray[Any]]:
         "error": motion.error,
     }
     arrays: dict[str, NDArray[Any]] = {
-        f"{place}/breakpoints": motion.breakpoints,
-        f"{place}/coefficients": motion.coefficients,
-        f"{place}/words": np.array(json.dumps(words)),
+        f"{prefix}/breakpoints": motion.breakpoints,
+        f"{prefix}/coefficients": motion.coefficients,
+        f"{prefix}/words": np.array(json.dumps(texts)),
     }
-    return arrays if motion.vertical is None else arrays | _motion_arrays(motion.vertical, f"{place}/vertical")
+    return arrays if motion.vertical is None else arrays | _motion_to_arrays(motion.vertical, f"{prefix}/vertical")
 
 
-def _motion(arrays: Mapping[str, NDArray[Any]], place: str) -> Motion:
-    words = json.loads(str(arrays[f"{place}/words"]))
+def _motion_from_arrays(arrays: Mapping[str, NDArray[Any]], prefix: str) -> Motion:
+    texts = json.loads(str(arrays[f"{prefix}/words"]))
     return Motion(
-        arrays[f"{place}/breakpoints"],
-        arrays[f"{place}/coefficients"],
-        name=words["name"],
-        description=Description(words["family"], words["parameters"], words["text"]),
-        history=tuple(words["history"]),
-        error=words["error"],
-        vertical=_motion(arrays, f"{place}/vertical") if f"{place}/vertical/words" in arrays else None,
+        arrays[f"{prefix}/breakpoints"],
+        arrays[f"{prefix}/coefficients"],
+        name=texts["name"],
+        description=Description(texts["family"], texts["parameters"], texts["text"]),
+        history=tuple(texts["history"]),
+        error=texts["error"],
+        vertical=_motion_from_arrays(arrays, f"{prefix}/vertical") if f"{prefix}/vertical/words" in arrays else None,
     )

@@ -50,7 +50,7 @@ from rocking.errors import InvalidOption, StudyError, Unfitted, install
 from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Product, body_coordinates, dataset_of, verticals_of
 from rocking.studies.folder import Store
-from rocking.studies.units import OUTCOMES, name_of
+from rocking.studies.units import OUTCOMES, format_key
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,9 +59,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Maximum number of simulations in memory.
-_HELD: Final = 4_000_000
+_MAX_IN_MEMORY: Final = 4_000_000
 
-_EVERYTHING: Final = slice(None)
+_ALL: Final = slice(None)
 
 #: An integer, a slice or an array of indices along each axis.
 _Selection = tuple[Any, ...]
@@ -69,30 +69,30 @@ _Selection = tuple[Any, ...]
 StudyOutcome = Literal["overturning", "complete_chattering"]
 
 
-def results_of(store: Store) -> xr.Dataset:
+def open_results(store: Store) -> xr.Dataset:
     """Return the outcomes so far, read lazily; if units are missing, variables are floats, with NaN for those units."""
-    done, grid = store.done(), store.grid
+    done, grid = store.find_done(), store.grid
     complete = len(done) == len(grid)
-    outcomes: dict[str, Any] = {name: _lazy_outcome(store, name, complete) for name in OUTCOMES}
+    outcomes: dict[str, Any] = {name: _create_lazy_outcome(store, name, complete) for name in OUTCOMES}
     if not complete:
         outcomes["done"] = np.zeros(grid.shape, dtype=bool)
         for key in done:
             outcomes["done"][grid.ranges(key)] = True
-    return _with_records(store, dataset_of(store.product, outcomes))
+    return _add_records(store, dataset_of(store.product, outcomes))
 
 
-def _with_records(store: Store, data: xr.Dataset) -> xr.Dataset:
+def _add_records(store: Store, data: xr.Dataset) -> xr.Dataset:
     """Add the record to the name of each motion, if the study contains it."""
     return data.assign_coords(record=("motion", list(store.records))) if store.records else data
 
 
-def _lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
+def _create_lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
     import xarray as xr
     from xarray.backends import BackendArray
     from xarray.core import indexing
 
-    def selected(key: _Selection) -> NDArray[Any]:
-        (values,) = _selected(store, [name], complete, key)
+    def read(key: _Selection) -> NDArray[Any]:
+        (values,) = _read_selection(store, [name], complete, key)
         return values.astype(OUTCOME[name]) if complete else values
 
     class Outcome(BackendArray):
@@ -103,52 +103,56 @@ def _lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
 
         def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
             outer = indexing.IndexingSupport.OUTER
-            found: NDArray[Any] = indexing.explicit_indexing_adapter(key, self.shape, outer, selected)
-            return found
+            values: NDArray[Any] = indexing.explicit_indexing_adapter(key, self.shape, outer, read)
+            return values
 
     return xr.Variable(("motion", "scale", "polarity", "block"), indexing.LazilyIndexedArray(Outcome()))
 
 
-def _selected(store: Store, names: Sequence[str], complete: bool, key: _Selection) -> list[Floats]:
+def _read_selection(store: Store, names: Sequence[str], complete: bool, key: _Selection) -> list[Floats]:
     """Read a selection of outcomes, with NaN for missing units."""
     grid = store.grid
     axes = [np.arange(size)[part] for size, part in zip(grid.shape, key, strict=True)]
-    wanted = [np.atleast_1d(axis) for axis in axes]
-    found = np.full([len(names), *map(len, wanted)], np.nan)
-    units = [np.unique(axis // part).tolist() for axis, part in zip(wanted, grid.unit, strict=True)]
+    indices = [np.atleast_1d(axis) for axis in axes]
+    selection = np.full([len(names), *map(len, indices)], np.nan)
+    units = [np.unique(axis // part).tolist() for axis, part in zip(indices, grid.unit, strict=True)]
     for unit in itertools.product(*units):
-        here = [np.flatnonzero(axis // part == k) for axis, part, k in zip(wanted, grid.unit, unit, strict=True)]
-        within = [axis[at] - k * part for axis, at, part, k in zip(wanted, here, grid.unit, unit, strict=True)]
-        outcomes = store.outcomes(unit)
+        targets = [np.flatnonzero(axis // part == k) for axis, part, k in zip(indices, grid.unit, unit, strict=True)]
+        sources = [
+            axis[target] - k * part for axis, target, part, k in zip(indices, targets, grid.unit, unit, strict=True)
+        ]
+        outcomes = store.read_outcomes(unit)
         if outcomes is not None:
-            for values, name in zip(found, names, strict=True):
-                values[np.ix_(*here)] = outcomes[name][np.ix_(*within)]
+            for values, name in zip(selection, names, strict=True):
+                values[np.ix_(*targets)] = outcomes[name][np.ix_(*sources)]
         elif complete:
-            raise StudyError(f"unit {name_of(unit)} is gone since these results were opened: run the study again")
+            raise StudyError(
+                f"unit {format_key(unit)} was removed after these results were opened: run the study again"
+            )
     single = tuple(position for position, axis in enumerate(axes) if axis.ndim == 0)
-    return [values.squeeze(axis=single) for values in found]
+    return [values.squeeze(axis=single) for values in selection]
 
 
 def write_table(kind: str, path: str | Path, dataset: xr.Dataset, step: int) -> None:
     """Write a row for each simulation or change as CSV or Parquet, in chunks of the first dimension."""
-    along = next(iter(dataset.sizes))
-    table, count = _for_tables(dataset), max(1, dataset.sizes[along])
+    dimension = next(iter(dataset.sizes))
+    table, count = _rename_for_tables(dataset), max(1, dataset.sizes[dimension])
     with Progress("writing", count) as bar:
 
         def frames() -> Iterator[pd.DataFrame]:
             for part in split_range(count, step):
-                yield columns_to_frame(dataset_to_columns(table.isel({along: part}).load()))
+                yield columns_to_frame(dataset_to_columns(table.isel({dimension: part}).load()))
                 bar.advance(part.stop - part.start)
 
-        with atomic_file(path) as beside:
-            (_write_csv if kind == "csv" else _write_parquet)(frames(), beside)
+        with atomic_file(path) as temporary:
+            (_write_csv if kind == "csv" else _write_parquet)(frames(), temporary)
 
 
-def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
+def _rename_for_tables(dataset: xr.Dataset) -> xr.Dataset:
     """Name the scales as factors or values of a measure, and the impacts as in other tables."""
     measure = dataset.scale.attrs["measure"] if "scale" in dataset.dims else dataset.attrs.get("measure")
     names = {"scale": measure, "impacts": "impacts_resolved", "low": f"{measure}_low", "high": f"{measure}_high"}
-    return dataset.rename({name: other for name, other in names.items() if name in dataset.variables})
+    return dataset.rename({name: new_name for name, new_name in names.items() if name in dataset.variables})
 
 
 def _write_csv(frames: Iterator[pd.DataFrame], target: Path) -> None:
@@ -162,7 +166,7 @@ def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise InvalidOption(f"Parquet needs pyarrow: {install('parquet')}, or write CSV or NetCDF") from None
+        raise InvalidOption(f"Parquet requires pyarrow: {install('parquet')}, or write CSV or NetCDF") from None
     tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
     first = next(tables)
     with parquet.ParquetWriter(target, first.schema) as file:
@@ -170,19 +174,19 @@ def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
             file.write_table(table)
 
 
-def critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
+def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     """Compute `Study.critical_scales` of a complete study."""
     import xarray as xr
 
     checks.choice(outcome, "outcome", InvalidOption, get_args(StudyOutcome))
     product, levels = store.product, store.product.scales.values
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
-        raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
+        raise InvalidOption("critical scales require at least two scales, in increasing order")
     store.require_complete()
     names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
     holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
     for part in split_range(len(product.motions), store.grid.unit[0]):
-        outcomes = _selected(store, names, True, (part, _EVERYTHING, _EVERYTHING, _EVERYTHING))
+        outcomes = _read_selection(store, names, True, (part, _ALL, _ALL, _ALL))
         unfinished, stopped, overturned, completes, rests, rests_by_rounding = (values != 0.0 for values in outcomes)
         holds[part], known[part] = overturned, ~(unfinished | stopped)
         if outcome == "complete_chattering":
@@ -195,60 +199,60 @@ def critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     changed = (holds[:, 1:] != holds[:, :-1]) & (below[:, :-1] >= 0)
     motion, polarity, block, scale = np.nonzero(changed.transpose(0, 2, 3, 1))
     low = below[motion, scale, polarity, block]
-    whole, about = dataset_of(product, {}), product.scales.about
-    above, meaning = {
+    coordinates, attributes = dataset_of(product, {}), product.scales.about
+    variable_name, meaning = {
         "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
         "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not below"),
     }[outcome]
-    unit = about["units"]
+    unit = attributes["units"]
     return xr.Dataset(
         {
             "low": variable("change", levels[low], "scale below the change", unit),
             "high": variable("change", levels[scale + 1], "scale above the change", unit),
-            above: variable("change", holds[motion, scale + 1, polarity, block], meaning),
+            variable_name: variable("change", holds[motion, scale + 1, polarity, block], meaning),
             "known": variable("change", low == scale, "whether the outcomes of all simulations are known"),
         },
         {
             **{
-                str(name): ("change", one.values[motion])
-                for name, one in _with_records(store, whole).coords.items()
-                if one.dims == ("motion",)
+                str(name): ("change", coordinate.values[motion])
+                for name, coordinate in _add_records(store, coordinates).coords.items()
+                if coordinate.dims == ("motion",)
             },
             "polarity": ("change", np.where(np.array(product.signs)[polarity] > 0, "+", "-")),
             "block": ("change", block),
             **{
-                name: ("change", np.asarray(values)[block], attributes)
-                for name, (_, values, attributes) in body_coordinates(product.bodies).items()
+                name: ("change", np.asarray(values)[block], details)
+                for name, (_, values, details) in body_coordinates(product.bodies).items()
             },
         },
-        whole.attrs | {name: value for name, value in about.items() if name != "units"},
+        coordinates.attrs | {name: value for name, value in attributes.items() if name != "units"},
     )
 
 
-def _peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
+def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     """Yield normalised peak rotations (motions, scales, polarities, blocks) by slices of blocks.
 
     Values are infinite if the block overturned and NaN if the simulation was abandoned.
     """
     store.require_complete()
-    *others, count = store.product.shape
+    *sizes, count = store.product.shape
     polarities = slice(0, 1 if store.product.bodies.is_symmetric else None)
     names = ["peak_rotation", "overturned", "unfinished", "stopped"]
-    for blocks in split_range(count, max(1, _HELD // math.prod(others))):
-        selection = _EVERYTHING, _EVERYTHING, polarities, blocks
-        peak, overturned, unfinished, stopped = _selected(store, names, True, selection)
+    for blocks in split_range(count, max(1, _MAX_IN_MEMORY // math.prod(sizes))):
+        selection = _ALL, _ALL, polarities, blocks
+        peak, overturned, unfinished, stopped = _read_selection(store, names, True, selection)
         if stopped.any():
             raise StudyError(
                 f"{np.count_nonzero(stopped)} of {stopped.size} simulations were stopped by the study's duration, "
-                "while the block moved or the motion went on, so that their outcomes are not known: make the study "
+                "while the block moved or the motion went on, so that their outcomes are unknown: create the study "
                 "without a duration"
             )
         alpha = slenderness_of(store.product.bodies.select(blocks))
         yield blocks, compute_ratios(peak, overturned != 0.0, unfinished != 0.0, alpha)
 
 
-def _repeated(bodies: Bodies, polarities: int) -> Flags:
-    """Whether a polarity repeats the first one by symmetry, shape (polarities, bodies)."""
+def _mark_repeated(bodies: Bodies, polarities: int) -> Flags:
+    """Mark polarities that repeat the first by symmetry, shape (polarities, bodies)."""
     repeated = np.zeros((polarities, len(bodies)), bool)
     if polarities > 1:
         repeated[1] = [bodies.select(slice(k, k + 1)).is_symmetric for k in range(len(bodies))]
@@ -271,48 +275,52 @@ class BlockTable(DatasetResult):
     @property
     def block_parameters(self) -> dict[str, Floats]:
         """Return the parameters of the blocks in the tables, by name, in SI units."""
-        return {str(name): one.values for name, one in self.data.coords.items() if one.dims == ("block",)}
+        return {
+            str(name): coordinate.values
+            for name, coordinate in self.data.coords.items()
+            if coordinate.dims == ("block",)
+        }
 
     def summary(self) -> str:
-        columns = [one for one in self._columns("blocks") if one.name != "fault"]  # too long for a table
+        columns = [column for column in self._columns("blocks") if column.name != "fault"]  # too long for a table
         rows = columns_to_records(columns)
         table = format_some_rows([column.key for column in columns], [[*row.values()] for row in rows])
         return f"{self.data.description}\n\n{table}"
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
-        about = [data.attrs, *(one.attrs for name, one in data.coords.items() if name in data.dims)]
+        attribute_sets = [data.attrs, *(variable.attrs for name, variable in data.coords.items() if name in data.dims)]
         return {
-            **{name: value for attributes in about for name, value in attributes.items() if name != "units"},
-            **{str(name): one.values for name, one in data.coords.items() if one.dims != ("block",)},
+            **{name: value for attributes in attribute_sets for name, value in attributes.items() if name != "units"},
+            **{str(name): variable.values for name, variable in data.coords.items() if variable.dims != ("block",)},
             "blocks": self.block_parameters,
-            **{str(name): one.values for name, one in data.data_vars.items()},
+            **{str(name): variable.values for name, variable in data.data_vars.items()},
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the first variable against p and slenderness, in up to four panels, or one fractile."""
         from rocking.plot.maps import draw_blocks
 
-        drawn, parameters = next(iter(self.data.data_vars.values())), self.block_parameters
-        if "fractile" in drawn.dims:
-            drawn = drawn.isel(fractile=int(np.argmin(np.abs(drawn.fractile.values - 0.5))))
-            measure = _measure_of(drawn.scale.attrs)
+        plotted, parameters = next(iter(self.data.data_vars.values())), self.block_parameters
+        if "fractile" in plotted.dims:
+            plotted = plotted.isel(fractile=int(np.argmin(np.abs(plotted.fractile.values - 0.5))))
+            measure = _parse_measure(plotted.scale.attrs)
             is_factor = measure.name == "factor"
             name, unit = "factor" if is_factor else measure.short_name, measure.shown_in
-            names = [f"{name} {measure.scale * value:.4g} {unit}".rstrip() for value in drawn.scale.values]
-            shown, missing = drawn.values, "overturns"
-            label = f"{100.0 * float(drawn.fractile):g} % fractile of peak rotation over slenderness"
+            names = [f"{name} {measure.scale * value:.4g} {unit}".rstrip() for value in plotted.scale.values]
+            panels, missing = plotted.values, "overturns"
+            label = f"{100.0 * float(plotted.fractile):g} % fractile of peak rotation over slenderness"
         else:
-            measure, names = _measure_of(self.data.attrs), [str(name) for name in drawn.limit_state.values]
-            shown, missing, label = measure.scale * drawn.values, "no curve fits", f"median {measure.label}"
+            measure, names = _parse_measure(self.data.attrs), [str(name) for name in plotted.limit_state.values]
+            panels, missing, label = measure.scale * plotted.values, "no curve fits", f"median {measure.label}"
         p, alpha = (
-            np.mean([parameters[one] for one in (name, f"{name}_plus", f"{name}_minus") if one in parameters], axis=0)
+            np.mean([parameters[key] for key in (name, f"{name}_plus", f"{name}_minus") if key in parameters], axis=0)
             for name in ("p", "alpha")
         )
         return draw_blocks(
             p,
             alpha,
-            panels={names[k]: shown[k] for k in select_evenly(len(names), 4)},
+            panels={names[k]: panels[k] for k in select_evenly(len(names), 4)},
             value_label=label,
             missing_label=missing,
             title=title or escape_dollars(self.data.description),
@@ -321,28 +329,30 @@ class BlockTable(DatasetResult):
         )
 
     def _table(self, name: str) -> xr.Dataset:
-        return _for_tables(self.data)
+        return _rename_for_tables(self.data)
 
 
-def _measure_of(about: Mapping[str, Any]) -> Measure:
-    """Return the measure that attributes describe."""
-    return Measure(about["measure"], **{name: about[name] for name in ("period", "damping") if name in about})
+def _parse_measure(attributes: Mapping[str, Any]) -> Measure:
+    """Create the measure from the attributes of a variable."""
+    return Measure(
+        attributes["measure"], **{name: attributes[name] for name in ("period", "damping") if name in attributes}
+    )
 
 
-def checked_fractiles(fractiles: Sequence[float]) -> Floats:
-    """Return shares between 0 and 1, one or more."""
+def check_fractiles(fractiles: Sequence[float]) -> Floats:
+    """Check that fractiles are between 0 and 1, and return them as an array."""
     shares = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
     if not shares.size:
-        raise InvalidOption("{} must hold a share of the motions or more, as [0.16, 0.5, 0.84]", "fractiles")
+        raise InvalidOption("{} must contain at least one share of the motions, as [0.16, 0.5, 0.84]", "fractiles")
     for value in shares:
         if not 0.0 < value < 1.0:
-            sentence = f"each of {{}} must be a number between 0 and 1, not {value:g}"
+            sentence = f"each of {{}} must be between 0 and 1; got {value:g}"
             raise InvalidOption(sentence, "fractiles", value=value)
     return shares
 
 
-def _checked_states(limit_states: Mapping[str, float] | None, confidence: float) -> Mapping[str, float]:
-    """Return limits by limit state. Check the arguments of curves before outcomes are read."""
+def _check_limit_states(limit_states: Mapping[str, float] | None, confidence: float) -> Mapping[str, float]:
+    """Check the arguments of curves before outcomes are read, and return limits by limit state."""
     checks.fraction(confidence, "confidence", InvalidOption)
     limits = check_limit_states(limit_states)
     for name, limit in limits.items():
@@ -350,39 +360,42 @@ def _checked_states(limit_states: Mapping[str, float] | None, confidence: float)
     return limits
 
 
-def study_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
+def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
     """Compute fractiles of the normalised peak rotation for each scale and block."""
     import xarray as xr
 
-    shares = checked_fractiles(fractiles)
+    shares = check_fractiles(fractiles)
     product, scales, count = store.product, store.product.scales, len(store.product.bodies)
     values = np.empty((len(shares), scales.count, count))
     overturned, missing = np.empty((scales.count, count)), 0
     with Progress("reading", count) as bar:
-        for blocks, ratios in _peak_ratios(store):
-            repeated = _repeated(product.bodies.select(blocks), ratios.shape[2])
+        for blocks, ratios in _iterate_peak_ratios(store):
+            repeated = _mark_repeated(product.bodies.select(blocks), ratios.shape[2])
             missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
-            own = np.where(repeated, np.nan, ratios).swapaxes(1, 2).reshape(-1, scales.count, ratios.shape[3])
-            values[:, :, blocks], overturned[:, blocks] = compute_fractiles(own, shares), compute_overturned_share(own)
+            distinct = np.where(repeated, np.nan, ratios).swapaxes(1, 2).reshape(-1, scales.count, ratios.shape[3])
+            values[:, :, blocks], overturned[:, blocks] = (
+                compute_fractiles(distinct, shares),
+                compute_overturned_share(distinct),
+            )
             bar.advance(blocks.stop - blocks.start)
-    words = "peak rotation over the slenderness, infinite where that share overturns"
-    left_out = missing_text(missing)
-    text = (
+    description = "peak rotation over the slenderness, infinite where that share overturns"
+    missing_note = missing_text(missing)
+    heading = (
         f"fractiles of peak rotation over slenderness, {format_count(len(product.motions), 'motion')}, {product.model} "
     )
     return BlockTable(
         xr.Dataset(
             {
-                "fractile_over_alpha": variable(("fractile", "scale", "block"), values, words, "1"),
+                "fractile_over_alpha": variable(("fractile", "scale", "block"), values, description, "1"),
                 "overturned_share": variable(("scale", "block"), overturned, unit="1"),
             },
             {"fractile": shares, "scale": ("scale", scales.values, scales.about), **body_coordinates(product.bodies)},
-            {"description": f"{text}model" + f"; {left_out}" * bool(left_out), "model": product.model},
+            {"description": f"{heading}model" + f"; {missing_note}" * bool(missing_note), "model": product.model},
         )
     )
 
 
-def pooled_fragility(
+def fit_pooled_fragility(
     store: Store,
     measure: Measure,
     limit_states: Mapping[str, float] | None,
@@ -391,31 +404,38 @@ def pooled_fragility(
     clusters: ArrayLike | None,
 ) -> Fragility:
     """Fit one curve to the outcomes of all blocks, with optional weights."""
-    limits = _checked_states(limit_states, confidence)
+    limits = _check_limit_states(limit_states, confidence)
     product, bodies = store.product, store.product.bodies
-    units, which = np.unique(compute_units(bodies, measure, product.model), return_inverse=True)
+    units, unit_indices = np.unique(compute_units(bodies, measure, product.model), return_inverse=True)
     shares = normalise_positive_weights(weights, len(bodies))
     motions, scales, _, _ = product.shape
     trials, missing = np.zeros((motions, scales, len(units))), 0
     counts = {name: np.zeros_like(trials) for name in limits}
-    for blocks, ratios in _peak_ratios(store):
-        belongs = np.where(which[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
-        known = ~np.isnan(ratios)
-        trials += known.sum(axis=2, dtype=float) @ belongs
-        missing += int(np.count_nonzero(~known))
+    for blocks, ratios in _iterate_peak_ratios(store):
+        membership = np.where(unit_indices[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
+        is_known = ~np.isnan(ratios)
+        trials += is_known.sum(axis=2, dtype=float) @ membership
+        missing += int(np.count_nonzero(~is_known))
         for name, limit in limits.items():
-            counts[name] += exceeds_limit(ratios, limit, name).sum(axis=2) @ belongs
-    found = trials > 0.0
-    together = number_clusters(product.motions, clusters)
+            counts[name] += exceeds_limit(ratios, limit, name).sum(axis=2) @ membership
+    has_trials = trials > 0.0
+    labels = number_clusters(product.motions, clusters)
     x, groups = (
-        _intensities(product, measure)[:, :, None] / units,
-        np.broadcast_to(together[:, None, None], found.shape),
+        _compute_intensities(product, measure)[:, :, None] / units,
+        np.broadcast_to(labels[:, None, None], has_trials.shape),
     )
     curves = [
-        fit_curve(name, (x[found], count[found], trials[found]), groups[found], confidence, measure, limits[name])
+        fit_curve(
+            name,
+            (x[has_trials], count[has_trials], trials[has_trials]),
+            groups[has_trials],
+            confidence,
+            measure,
+            limits[name],
+        )
         for name, count in counts.items()
     ]
-    text = f"{describe_pool(bodies, weights)}, {describe_sample(together, clusters)}, {format_count(scales, 'scale')}"
+    text = f"{describe_pool(bodies, weights)}, {describe_sample(labels, clusters)}, {format_count(scales, 'scale')}"
     return Fragility(
         tuple(curves),
         measure,
@@ -432,7 +452,7 @@ def pooled_fragility(
 
 
 #: Stored results of the curve of each block.
-_KEPT: Final[Mapping[str, str]] = {
+_CURVE_VARIABLES: Final[Mapping[str, str]] = {
     "median": "intensity that half of the outcomes exceed the limit at",
     "median_lower": "lower end of its confidence interval",
     "median_upper": "upper end of its confidence interval",
@@ -444,7 +464,7 @@ _KEPT: Final[Mapping[str, str]] = {
 }
 
 
-def block_fragilities(
+def fit_block_fragilities(
     store: Store,
     measure: Measure,
     limit_states: Mapping[str, float] | None,
@@ -454,55 +474,57 @@ def block_fragilities(
     """Fit a curve to the outcomes of each block."""
     import xarray as xr
 
-    limits = _checked_states(limit_states, confidence)
+    limits = _check_limit_states(limit_states, confidence)
     product, bodies, scales = store.product, store.product.bodies, store.product.scales.count
-    kept = {name: np.full((len(limits), len(bodies)), np.nan) for name in _KEPT}
+    estimates = {name: np.full((len(limits), len(bodies)), np.nan) for name in _CURVE_VARIABLES}
     faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
-    intensities, units = _intensities(product, measure).ravel(), compute_units(bodies, measure, product.model)
-    together = np.repeat(number_clusters(product.motions, clusters), scales)
+    intensities, units = _compute_intensities(product, measure).ravel(), compute_units(bodies, measure, product.model)
+    labels = np.repeat(number_clusters(product.motions, clusters), scales)
     fit = partial(fit_fragility, measure=measure, confidence=confidence)
     with Progress("fitting", len(bodies) * len(limits)) as bar:
-        for blocks, ratios in _peak_ratios(store):
-            repeated = _repeated(bodies.select(blocks), ratios.shape[2])
+        for blocks, ratios in _iterate_peak_ratios(store):
+            repeated = _mark_repeated(bodies.select(blocks), ratios.shape[2])
             missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
-            own = np.where(repeated, np.nan, ratios)
-            all_trials = np.count_nonzero(~np.isnan(own), axis=2).reshape(-1, own.shape[3])
+            distinct = np.where(repeated, np.nan, ratios)
+            all_trials = np.count_nonzero(~np.isnan(distinct), axis=2).reshape(-1, distinct.shape[3])
             for i, (name, limit) in enumerate(limits.items()):
-                all_exceeded = exceeds_limit(own, limit, name).sum(axis=2).reshape(-1, own.shape[3])
+                all_exceeded = exceeds_limit(distinct, limit, name).sum(axis=2).reshape(-1, distinct.shape[3])
                 for j, trials, exceeded in zip(range(len(bodies))[blocks], all_trials.T, all_exceeded.T, strict=True):
-                    some = trials > 0
-                    data = intensities[some] / units[j], {name: exceeded[some]}
+                    has_trials = trials > 0
+                    data = intensities[has_trials] / units[j], {name: exceeded[has_trials]}
                     numbers = [np.nan] * 6
                     try:
-                        if not some.any():
-                            raise Unfitted("every simulation was given up")
-                        curve = fit(*data, trials=trials[some], clusters=together[some]).curves[0]
+                        if not has_trials.any():
+                            raise Unfitted("every simulation was abandoned")
+                        curve = fit(*data, trials=trials[has_trials], clusters=labels[has_trials]).curves[0]
                         numbers = [curve.median, *curve.median_interval, curve.dispersion, *curve.dispersion_interval]
                     except Unfitted as error:  # identical or separated outcomes have no lognormal fit
                         faults[i, j] = str(error)
                     numbers += [exceeded.sum(), trials.sum()]
-                    for values, number in zip(kept.values(), numbers, strict=True):
+                    for values, number in zip(estimates.values(), numbers, strict=True):
                         values[i, j] = number
                     bar.advance()
-    dims, without, left_out = ("limit_state", "block"), np.count_nonzero(faults != ""), missing_text(missing)
+    dims, unfitted_count, missing_note = ("limit_state", "block"), np.count_nonzero(faults != ""), missing_text(missing)
     text = f"fragility of {format_count(len(bodies), 'block')}; intensity: {measure.quantity}"
-    text += f"; {format_count(int(without), 'curve')} cannot be fitted (fault says why)" if without else ""
-    about = {"confidence": confidence, "model": product.model, "measure": measure.name, **measure.options()}
+    text += f"; {format_count(int(unfitted_count), 'curve')} cannot be fitted (see fault)" if unfitted_count else ""
+    attributes = {"confidence": confidence, "model": product.model, "measure": measure.name, **measure.options()}
     return BlockTable(
         xr.Dataset(
             {
-                name: variable(dims, values, _KEPT[name], measure.units if name.startswith("median") else "1")
-                for name, values in kept.items()
+                name: variable(
+                    dims, values, _CURVE_VARIABLES[name], measure.units if name.startswith("median") else "1"
+                )
+                for name, values in estimates.items()
             }
             | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
             {"limit_state": list(limits), **body_coordinates(bodies)},
-            {"description": text + f"; {left_out}" * bool(left_out), **about},
+            {"description": text + f"; {missing_note}" * bool(missing_note), **attributes},
         )
     )
 
 
-def _intensities(product: Product, measure: Measure) -> Floats:
-    """Return the intensity of every motion at every scale, shape (motions, scales)."""
+def _compute_intensities(product: Product, measure: Measure) -> Floats:
+    """Compute the intensity of every motion at every scale, shape (motions, scales)."""
     scales = product.scales
     values = compute_intensities(product.motions, measure)
     if scales.measure == measure.alone:

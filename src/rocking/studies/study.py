@@ -36,18 +36,18 @@ from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions
 from rocking.simulation.ensemble import Polarity, Product, product_of
-from rocking.studies.folder import Store, exists, locked, put, read, require_free
+from rocking.studies.folder import Store, contains_study, lock_folder, read_bytes, require_empty, write_atomically
 from rocking.studies.results import (
     BlockTable,
     StudyOutcome,
-    block_fragilities,
-    critical_scales,
-    pooled_fragility,
-    results_of,
-    study_spectrum,
+    compute_spectrum,
+    find_critical_scales,
+    fit_block_fragilities,
+    fit_pooled_fragility,
+    open_results,
     write_table,
 )
-from rocking.studies.units import Key, Work, compute, name_of, unit_of
+from rocking.studies.units import Key, UnitInput, choose_unit_shape, compute_unit, format_key
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,11 +106,11 @@ class RunReport:
         text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
         if self.failed:
             text += f"; {format_count(len(self.failed), 'unit')} failed, the first: {next(iter(self.failed.values()))}"
-        return text + ("; stopped, go on with another run" if self.stopped else "")
+        return text + ("; stopped, run again to continue" if self.stopped else "")
 
 
 class Study:
-    """Simulations of blocks, motions, scales and polarities, stored in a folder, created by `create_study`.
+    """Simulations of blocks, motions, scales and polarities, stored in a folder; created by `rocking.create_study`.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class Study:
 
     See Also
     --------
-    create_study : Create a study.
+    create_study : Create or open a study.
     simulate_many : Simulate in memory.
 
     Examples
@@ -149,7 +149,7 @@ class Study:
     @property
     def status(self) -> Status:
         """Return the progress; may be called while another process runs the study."""
-        return Status(len(self._store.done()), len(self._store.grid), int(np.prod(self._store.grid.shape)))
+        return Status(len(self._store.find_done()), len(self._store.grid), int(np.prod(self._store.grid.shape)))
 
     def run(self, executor: Executor | Any = None, *, part: str | None = None) -> RunReport:
         """Compute every unit that is not done.
@@ -176,11 +176,11 @@ class Study:
         OutputError
             If a unit cannot be written.
         """
-        first, step = (1, 1) if part is None else _part(part)
+        first, step = (1, 1) if part is None else _parse_part(part)
         self._store.check_program()
-        with locked(self.folder, shared=part is not None):
+        with lock_folder(self.folder, shared=part is not None):
             share = [*itertools.islice(self._store.grid, first - 1, None, step)]
-            return _run(self._store, share, executor)
+            return _run_units(self._store, share, executor)
 
     def results(self) -> xr.Dataset:
         """Return the outcomes so far as `simulate_many` does, read lazily from the folder.
@@ -188,7 +188,7 @@ class Study:
         While units are missing, every variable is of floats with NaN for missing units, and a variable ``done`` marks
         available ones. Reading a damaged unit raises a StudyError that names it.
         """
-        return results_of(self._store)
+        return open_results(self._store)
 
     def verify(self, recompute: int = 0, *, repair: bool = False, seed: int = 0) -> list[str]:
         """Read and check every unit, and recompute some units bit for bit.
@@ -215,21 +215,21 @@ class Study:
         store, faults = self._store, dict[Key, str]()
         if checks.integer(recompute, "recompute", InvalidOption, 0) or repair:
             store.check_program()
-        done = sorted(store.done())
-        drawn = {*np.random.default_rng(seed).permutation(len(done))[:recompute].tolist()}
+        done = sorted(store.find_done())
+        recomputed = {*np.random.default_rng(seed).permutation(len(done))[:recompute].tolist()}
         with Progress("verifying", len(done)) as bar:
             for k, key in enumerate(done):
                 try:
-                    store.outcomes(key)
-                    if k in drawn and compute(store.work(key)) != read(store.file_of(key)):
-                        faults[key] = f"unit {name_of(key)} is not what this program computes"
+                    store.read_outcomes(key)
+                    if k in recomputed and compute_unit(store.create_input(key)) != read_bytes(store.unit_path(key)):
+                        faults[key] = f"unit {format_key(key)} differs from the result of this program"
                 except StudyError as error:
                     faults[key] = error.text()
                 bar.advance()
         if repair and faults:
-            with locked(self.folder):
+            with lock_folder(self.folder):
                 for key in faults:
-                    put(store.file_of(key), compute(store.work(key)))
+                    write_atomically(store.unit_path(key), compute_unit(store.create_input(key)))
         return [*faults.values()]
 
     def critical_scales(self, outcome: StudyOutcome = "overturning") -> xr.Dataset:
@@ -256,7 +256,7 @@ class Study:
         InvalidOption
             If `outcome` is unknown, or the study has fewer than two scales in increasing order.
         """
-        return critical_scales(self._store, outcome)
+        return find_critical_scales(self._store, outcome)
 
     def fragility(
         self,
@@ -271,7 +271,7 @@ class Study:
 
         The intensity is the measure of a motion at a scale. A StudyError is raised if units are missing or damaged.
         """
-        return pooled_fragility(self._store, Measure.parse(measure), limit_states, confidence, weights, clusters)
+        return fit_pooled_fragility(self._store, Measure.parse(measure), limit_states, confidence, weights, clusters)
 
     def block_fragilities(
         self,
@@ -287,7 +287,7 @@ class Study:
         (median_lower, median_upper, ...; SI units), exceeded and outcomes (counts; for a symmetric block of one
         polarity), and fault: the reason why no lognormal fits, or an empty string.
         """
-        return block_fragilities(self._store, Measure.parse(measure), limit_states, confidence, clusters)
+        return fit_block_fragilities(self._store, Measure.parse(measure), limit_states, confidence, clusters)
 
     def spectrum(self, fractiles: Sequence[float] = (0.16, 0.5, 0.84)) -> BlockTable:
         """Compute fractiles of the normalised peak rotation over the motions, for each scale and block.
@@ -310,7 +310,7 @@ class Study:
         InvalidOption
             If a fractile is out of its range.
         """
-        return study_spectrum(self._store, fractiles)
+        return compute_spectrum(self._store, fractiles)
 
     def to_netcdf(self, path: str | Path, *, critical: StudyOutcome | None = None) -> None:
         """Write the `results`, or the critical scales as `to_csv` does, to a NetCDF file."""
@@ -403,28 +403,28 @@ def create_study(
     [[True, False, True, False]]
     """
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
-    return study_of(folder, product, unit_blocks)
+    return open_or_create(folder, product, unit_blocks)
 
 
-def study_of(
+def open_or_create(
     folder: str | Path, product: Product, unit_blocks: int | None = None, records: Sequence[str] = ()
 ) -> Study:
     """Create the study of a product, or open it and check its inputs."""
-    if not exists(folder):
-        require_free(folder)  # before the pilot and the lock file
-        unit = unit_of(product, unit_blocks)
-        with locked(folder):
-            if not exists(folder):  # another process may have created it meanwhile
+    if not contains_study(folder):
+        require_empty(folder)  # before the pilot and the lock file
+        unit = choose_unit_shape(product, unit_blocks)
+        with lock_folder(folder):
+            if not contains_study(folder):  # another process may have created it meanwhile
                 Store.create(folder, product, unit, records)
-    found = Study(folder)
-    found._store.check_inputs(product)
-    width, count = found._store.grid.unit[3], len(product.bodies)
-    if unit_blocks is not None and min(unit_of(product, unit_blocks)[3], count) != min(width, count):
-        raise InvalidOption(f"the study is there already, in units of {width} blocks: leave {{}} out", "unit_blocks")
-    return found
+    opened = Study(folder)
+    opened._store.check_inputs(product)
+    width, count = opened._store.grid.unit[3], len(product.bodies)
+    if unit_blocks is not None and min(choose_unit_shape(product, unit_blocks)[3], count) != min(width, count):
+        raise InvalidOption(f"the study already exists, in units of {width} blocks: omit {{}}", "unit_blocks")
+    return opened
 
 
-def _part(part: str) -> tuple[int, int]:
+def _parse_part(part: str) -> tuple[int, int]:
     """Return the number of a part and the number of parts."""
     number, slash, count = str(part).partition("/")
     if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
@@ -436,25 +436,25 @@ def _part(part: str) -> tuple[int, int]:
     return int(number), int(count)
 
 
-def _run(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
+def _run_units(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
     """Compute the missing units of a share until SIGTERM."""
     start, grid, pending = time.monotonic(), store.grid, dict[Future[bytes], Key]()
     units, simulations, failed = 0, 0, dict[str, str]()
-    done = store.done()
+    done = store.find_done()
     missing = [key for key in share if key not in done]
-    left, total = iter(missing), sum(map(grid.simulations, share))
-    before = total - sum(map(grid.simulations, missing))
+    remaining, total = iter(missing), sum(map(grid.count_simulations, share))
+    done_before = total - sum(map(grid.count_simulations, missing))
     with (
-        Progress("simulations", total, done=before) as bar,
-        _workers(executor) as (submit, count),
-        _terminated() as stop,
+        Progress("simulations", total, done=done_before) as bar,
+        _open_workers(executor) as (submit, count),
+        _catch_sigterm() as stop,
     ):
         try:
             while True:
                 # Each worker has a current unit and a next one.
-                room = 0 if stop.is_set() else max(2 * max(1, count()) - len(pending), 0)
-                for key in itertools.islice(left, room):
-                    pending[submit(store.work(key))] = key
+                capacity = 0 if stop.is_set() else max(2 * max(1, count()) - len(pending), 0)
+                for key in itertools.islice(remaining, capacity):
+                    pending[submit(store.create_input(key))] = key
                 if not pending:
                     break
                 for future in wait(pending, timeout=1.0, return_when=FIRST_COMPLETED).done:
@@ -462,15 +462,17 @@ def _run(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
                     try:
                         data = future.result()
                     except (BrokenExecutor, CancelledError) as error:
-                        raise _gone(error) from error
+                        raise _create_worker_error(error) from error
                     except Exception as error:
-                        why, kind = " ".join(str(error).split()), type(error).__name__
-                        failed[name_of(key)] = why if isinstance(error, RockingError) else f"{kind}: {why}".rstrip(": ")
+                        reason, error_name = " ".join(str(error).split()), type(error).__name__
+                        failed[format_key(key)] = (
+                            reason if isinstance(error, RockingError) else f"{error_name}: {reason}".rstrip(": ")
+                        )
                         bar.note(f"{format_count(len(failed), 'unit')} failed")
                         continue
-                    put(store.file_of(key), data)
-                    units, simulations = units + 1, simulations + grid.simulations(key)
-                    bar.advance(grid.simulations(key))
+                    write_atomically(store.unit_path(key), data)
+                    units, simulations = units + 1, simulations + grid.count_simulations(key)
+                    bar.advance(grid.count_simulations(key))
         finally:
             for future in pending:
                 future.cancel()
@@ -479,54 +481,54 @@ def _run(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
 
 
 @contextlib.contextmanager
-def _terminated() -> Iterator[threading.Event]:
+def _catch_sigterm() -> Iterator[threading.Event]:
     """Yield an event that SIGTERM sets if this is the main thread."""
     stop = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    previous = signal.signal(signal.SIGTERM, lambda *_: stop.set())
     try:
         yield stop
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(signal.SIGTERM, previous)
 
 
 @contextlib.contextmanager
-def _workers(executor: Any) -> Iterator[tuple[Callable[[Work], Future[bytes]], Callable[[], int]]]:
+def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[bytes]], Callable[[], int]]]:
     """Yield functions that submit a unit and count the workers; errors stop the threads."""
     if executor is None:
-        cancelled, pool = threading.Event(), ThreadPoolExecutor(thread_count())
+        cancelled, threads = threading.Event(), ThreadPoolExecutor(thread_count())
         try:
-            yield lambda work: pool.submit(compute, work, cancelled), thread_count
+            yield lambda unit_input: threads.submit(compute_unit, unit_input, cancelled), thread_count
         finally:
             cancelled.set()
-            pool.shutdown(cancel_futures=True)
+            threads.shutdown(cancel_futures=True)
         return
     client: Any = executor if hasattr(executor, "get_executor") else getattr(executor, "_client", None)
-    foreign = executor.get_executor(pure=False) if client is executor else executor
-    if not isinstance(foreign, Executor):
+    pool = executor.get_executor(pure=False) if client is executor else executor
+    if not isinstance(pool, Executor):
         kinds = "a concurrent.futures.Executor or a client of dask.distributed"
         raise InvalidOption(f"{{}} must be {kinds}; got {checks.short_repr(executor)}", "executor", value=executor)
 
-    def submit(work: Work) -> Future[bytes]:
+    def submit(unit_input: UnitInput) -> Future[bytes]:
         try:
-            return foreign.submit(compute, work)
+            return pool.submit(compute_unit, unit_input)
         except RuntimeError as error:  # also BrokenExecutor
-            raise _gone(error) from error
+            raise _create_worker_error(error) from error
 
     def count() -> int:
         if client is None:
-            return getattr(foreign, "_max_workers", None) or count_cores()
+            return getattr(pool, "_max_workers", None) or count_cores()
         if client.status != "running":
-            raise _gone("no connection to the scheduler")
+            raise _create_worker_error("no connection to the scheduler")
         try:
             return sum(client.nthreads().values())
         except Exception as error:  # a client that loses its scheduler raises socket errors
-            raise _gone(error) from error
+            raise _create_worker_error(error) from error
 
     yield submit, count
 
 
-def _gone(why: object) -> StudyError:
-    return StudyError(f"the workers are gone: {why}; what was computed is kept, run the study again")
+def _create_worker_error(reason: object) -> StudyError:
+    return StudyError(f"the workers are gone: {reason}; computed units are stored, run the study again")

@@ -29,29 +29,29 @@ from rocking.simulation.ensemble import VARIABLES, Product
 OUTCOMES: Final = tuple(VARIABLES)
 
 #: Unit sizes are multiples of this number of blocks, which the engine integrates together.
-_GROUP: Final = 512
+_GROUP_SIZE: Final = 512
 
 #: Maximum number of simulations in a unit.
-_LARGEST: Final = 1 << 18
+_MAX_SIMULATIONS: Final = 1 << 18
 
-#: Packing saves three quarters of the bytes, and takes half a microsecond for each simulation.
-_LEVEL: Final = 1
+#: Compression saves three quarters of the bytes and costs half a microsecond per simulation.
+_COMPRESSION_LEVEL: Final = 1
 
 #: Bytes of the hash at the end of a file.
-_HASH: Final = hashlib.sha256().digest_size
+_HASH_SIZE: Final = hashlib.sha256().digest_size
 
 #: Index of a unit along motions, scales, polarities and blocks.
 Key = tuple[int, ...]
 
 
-def sealed(data: bytes) -> bytes:
-    """Return data with their hash."""
+def seal(data: bytes) -> bytes:
+    """Append a hash to data."""
     return data + hashlib.sha256(data).digest()
 
 
-def unsealed(data: bytes) -> bytes | None:
-    """Return the data of `sealed`; None if any bit has changed."""
-    return data[:-_HASH] if sealed(data[:-_HASH]) == data else None
+def unseal(data: bytes) -> bytes | None:
+    """Remove the hash of `seal` from data; return None if any bit has changed."""
+    return data[:-_HASH_SIZE] if seal(data[:-_HASH_SIZE]) == data else None
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class UnitGrid:
 
     @functools.cached_property
     def cells(self) -> tuple[int, ...]:
-        """Return the number of units along each axis."""
+        """Number of units along each axis."""
         return tuple(math.ceil(size / part) for size, part in zip(self.shape, self.unit, strict=True))
 
     def __len__(self) -> int:
@@ -78,75 +78,79 @@ class UnitGrid:
         axes = zip(key, self.unit, self.shape, strict=True)
         return tuple(slice(index * part, min(index * part + part, size)) for index, part, size in axes)
 
-    def simulations(self, key: Key) -> int:
+    def count_simulations(self, key: Key) -> int:
         """Count the simulations of a unit."""
         return math.prod(part.stop - part.start for part in self.ranges(key))
 
 
-def name_of(key: Key) -> str:
+def format_key(key: Key) -> str:
     """Return the file name of a unit."""
     return "unit." + ".".join(map(str, key))
 
 
-def unit_of(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
-    """Return the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
+def choose_unit_shape(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
+    """Choose the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
     if unit_blocks is not None:
-        width = checks.integer(unit_blocks, "unit_blocks", InvalidOption, minimum=_GROUP)
-        if width % _GROUP:
-            raise InvalidOption(f"{{}} must be a multiple of {_GROUP}, not {width}", "unit_blocks", value=unit_blocks)
+        width = checks.integer(unit_blocks, "unit_blocks", InvalidOption, minimum=_GROUP_SIZE)
+        if width % _GROUP_SIZE:
+            raise InvalidOption(
+                f"{{}} must be a multiple of {_GROUP_SIZE}, not {width}", "unit_blocks", value=unit_blocks
+            )
         return 1, 1, 1, width
     motions, scales, polarities, count = product.shape
-    some = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
-    motion = max(product.motions, key=lambda one: len(one.coefficients))
-    setup = Setup(some, product.model, product.chattering, product.duration)
+    sample = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP_SIZE)).astype(np.int64))
+    motion = max(product.motions, key=lambda candidate: len(candidate.coefficients))
+    setup = Setup(sample, product.model, product.chattering, product.duration)
     task = Task(slice(None), motion, float(product.scales.factors(motion).max()))
     simulate_task(setup, task)  # loads the kernels
     start = time.perf_counter()
     simulate_task(setup, task)
-    each = (time.perf_counter() - start) / len(some)
+    seconds = (time.perf_counter() - start) / len(sample)
     # Limits the size from below and above.
-    most = min(5.0 / each, math.prod(product.shape) / 32, _LARGEST)
-    width = min(_GROUP * max(1, int(most) // _GROUP), count)
-    left, held = most / width, []
+    max_simulations = min(5.0 / seconds, math.prod(product.shape) / 32, _MAX_SIMULATIONS)
+    width = min(_GROUP_SIZE * max(1, int(max_simulations) // _GROUP_SIZE), count)
+    remaining, sizes = max_simulations / width, []
     for size in (scales, polarities, motions):
-        held.append(max(1, min(size, int(left))))
-        left /= held[-1]
-    return held[2], held[0], held[1], width
+        sizes.append(max(1, min(size, int(remaining))))
+        remaining /= sizes[-1]
+    return sizes[2], sizes[0], sizes[1], width
 
 
 @functools.cache
-def program() -> str:
-    """Return an identifier shared by programs that compute the same bits."""
+def identify_program() -> str:
+    """Return the identifier of programs that compute the same bits."""
     return f"rocking {VERSION} (kernels {fingerprint()})"
 
 
 @dataclass(frozen=True, eq=False)
-class Work:
+class UnitInput:
     """Complete input of a worker for a unit; factors have the shape (motions, scales, polarities)."""
 
     setup: Setup
     motions: tuple[Motion, ...]
     factors: Floats
     unit: tuple[int, ...]
-    program: str = field(default_factory=program)
+    program: str = field(default_factory=identify_program)
 
 
-def compute(work: Work, cancelled: threading.Event | None = None) -> bytes:
-    """Return the bytes of a unit, unless `cancelled`; raise a StudyError if the program differs."""
-    if work.program != program():
-        raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
+def compute_unit(unit_input: UnitInput, cancelled: threading.Event | None = None) -> bytes:
+    """Compute the bytes of a unit, unless `cancelled`; raise a StudyError if the program differs."""
+    if unit_input.program != identify_program():
+        raise StudyError(
+            f"the worker on {socket.gethostname()} has {identify_program()}, the study requires {unit_input.program}"
+        )
     # NaN where the unit contains fewer simulations than a full one
-    values = np.full((len(OUTCOMES), *work.unit), np.nan)
-    blocks = slice(0, len(work.setup.bodies))
-    for m, s, k in np.ndindex(work.factors.shape):
-        task = Task(blocks, work.motions[m], float(work.factors[m, s, k]))
-        outcomes = simulate_task(work.setup, task, cancelled)
-        for one, name in zip(values[:, m, s, k], OUTCOMES, strict=True):
-            one[blocks] = outcomes[name]
-    return sealed(zlib.compress(np.ascontiguousarray(values, "<f8").data, _LEVEL))
+    values = np.full((len(OUTCOMES), *unit_input.unit), np.nan)
+    blocks = slice(0, len(unit_input.setup.bodies))
+    for m, s, k in np.ndindex(unit_input.factors.shape):
+        task = Task(blocks, unit_input.motions[m], float(unit_input.factors[m, s, k]))
+        outcomes = simulate_task(unit_input.setup, task, cancelled)
+        for cells, name in zip(values[:, m, s, k], OUTCOMES, strict=True):
+            cells[blocks] = outcomes[name]
+    return seal(zlib.compress(np.ascontiguousarray(values, "<f8").data, _COMPRESSION_LEVEL))
 
 
-def decoded(data: bytes, unit: tuple[int, ...]) -> Floats | None:
-    """Return the outcomes of a full unit, shape (outcomes, *unit); None if any bit has changed."""
-    packed = unsealed(data)
+def decode(data: bytes, unit: tuple[int, ...]) -> Floats | None:
+    """Decode the outcomes of a full unit, shape (outcomes, *unit); return None if any bit has changed."""
+    packed = unseal(data)
     return None if packed is None else np.frombuffer(zlib.decompress(packed), "<f8").reshape(len(OUTCOMES), *unit)
