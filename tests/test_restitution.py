@@ -184,12 +184,12 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Restitution(1.2, 0.8, slope=0.1), "largest must be in"),
+        (lambda: Restitution(1.2, 0.8, slope=0.1), "maximum must be in"),
         (lambda: Restitution(0.9, 0.8, slope=-0.1), "slope must be finite and at least 0, in s/rad, not -0.1"),
-        (lambda: Restitution(0.9, 0.95, slope=0.1), "least must be above 0 and at most largest, 0.9"),
-        (lambda: Restitution(0.9, 0.95, seed=1), "least must be above 0 and at most largest"),
-        (lambda: Restitution(1.1, 0.9, seed=1), "largest must be in"),
-        (lambda: Restitution((0.95, 0.4), (0.9, 0.5), seed=1), "least must be above 0 and at most largest, 0.4"),
+        (lambda: Restitution(0.9, 0.95, slope=0.1), "minimum must be above 0 and at most maximum, 0.9"),
+        (lambda: Restitution(0.9, 0.95, seed=1), "minimum must be above 0 and at most maximum"),
+        (lambda: Restitution(1.1, 0.9, seed=1), "maximum must be in"),
+        (lambda: Restitution((0.95, 0.4), (0.9, 0.5), seed=1), "minimum must be above 0 and at most maximum, 0.4"),
         (lambda: Restitution(0.9, 0.5), "a restitution that varies needs a slope or a seed"),
         (lambda: Restitution(0.95, 0.9, seed=1.5), "seed must be a whole number"),
         (lambda: Restitution(0.95, 0.9, slope=0.1, seed=1), "either falls or is drawn: give a slope or a seed"),
@@ -210,7 +210,7 @@ def test_what_cannot_be_is_refused_in_one_sentence(make, says):
 def test_an_error_keeps_the_bound_that_is_wrong(given):
     with pytest.raises(InvalidBlock) as refused:
         Restitution(*given[::-1], seed=1)
-    assert refused.value.value == given[["least", "largest"].index(refused.value.argument)]
+    assert refused.value.value == given[["minimum", "maximum"].index(refused.value.argument)]
 
 
 def test_what_needs_the_same_factor_each_time_refuses_a_law():

@@ -74,7 +74,7 @@ WRONG = {
         "at least 0 rad, in front of the body's stop",
     ),
     # Restitution
-    "a law of percents": (lambda: drawn(80.0, 90.0), "largest", "if it is in per cent, give 0.9"),
+    "a law of percents": (lambda: drawn(80.0, 90.0), "maximum", "if it is in per cent, give 0.9"),
     "three restitutions": (lambda: held(restitution=[0.9] * 3), "restitution", "a pair (side +, side -), not 3 values"),
     "a law by its name": (lambda: held(restitution="housner"), "restitution", "an array of numbers, not 'housner'"),
     "a law of a free block": (

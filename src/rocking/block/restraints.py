@@ -463,9 +463,9 @@ class Restitution:
 
     def _terms(self, side: int) -> dict[str, float]:
         """Return the law on leaving a side as fields of `Terms`, without the largest factor."""
-        least, slope = (checked_pair(getattr(self, name), name)[side] for name in ("least", "slope"))
+        minimum, slope = (checked_pair(getattr(self, name), name)[side] for name in ("minimum", "slope"))
         seed = -1.0 if self.seed is None else float(self.seed)
-        return {"restitution_least": least, "restitution_slope": slope, "restitution_seed": seed}
+        return {"restitution_least": minimum, "restitution_slope": slope, "restitution_seed": seed}
 
     def __str__(self) -> str:
         if self.seed is None:

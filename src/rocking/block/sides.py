@@ -296,7 +296,7 @@ def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, floa
                 "restitution",
             )
         return conserved[0], conserved[1]
-    if hasattr(given, "largest"):  # a Restitution, whose module imports this one
+    if hasattr(given, "maximum"):  # a Restitution, whose module imports this one
         raise InvalidBlock(
             "{} of a Block must be a number or a pair; give a law to RestrainedBlock(block, restitution=...)",
             "restitution",
