@@ -17,7 +17,7 @@ import numpy as np
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import values_of
 from rocking.analysis.survey import Check
-from rocking.block import Block, Blocks, one_block
+from rocking.block import Block, Blocks, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
@@ -139,7 +139,7 @@ def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
     """Combine blocks, or raise an error if they have restraints."""
     many = Blocks.from_bodies(blocks)
     for each in many if many.terms else ():
-        one_block(each)
+        require_block(each)
     return many
 
 

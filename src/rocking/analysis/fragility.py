@@ -49,9 +49,9 @@ from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.progress import spell
 from rocking.core.result import Result
 from rocking.core.tables import Column, escape_dollars, format_count, format_table, write_text
-from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.engine.tasks import Setup, missing_text
+from rocking.engine.tasks import Setup, describe_missing
 from rocking.errors import InvalidOption, Message, Unfitted
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, list_motions
@@ -295,7 +295,7 @@ class Fragility(Result):
             OpenQuake, or the dispersion is too wide. `OutputError` if the file cannot be written.
         """
         if block is not None:
-            bodies_of(block)
+            gather_bodies(block)
         chosen = self.block if block is None else block
         imt = openquake_measure(self.measure, chosen, self.model)
         lifting = None
@@ -394,8 +394,8 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    many, how = bodies_of(blocks), Measure.parse(measure)
-    slenderness = slenderness_of(many)
+    many, how = gather_bodies(blocks), Measure.parse(measure)
+    slenderness = compute_slenderness(many)
     shares = weights_of(weights, len(many))
     mirrored = checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
     checks.fraction(confidence, "confidence", InvalidOption)
@@ -448,7 +448,7 @@ def fragility(
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
         undecided=undecided_text(setup, shaken, factors, table.overturned.values),
-        missing=missing_text(missing),
+        missing=describe_missing(missing),
     )
 
 

@@ -29,9 +29,9 @@ from rocking.core.bisection import bisect
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
 from rocking.core.tables import add_unit, escape_dollars, format_count, format_table
-from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thresholds_of
+from rocking.engine.problem import compute_slenderness, compute_thresholds, gather_bodies, never_rests
 from rocking.engine.schemes import Certified
-from rocking.engine.tasks import Setup, missing_text, simulate_each
+from rocking.engine.tasks import Setup, describe_missing, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
@@ -116,8 +116,8 @@ def incremental_dynamic_analysis(
     >>> incremental_dynamic_analysis(block, pulse, measure="pga_ratio").data.band_start.values.round(4).tolist()
     [2.9855, 7.2759]
     """
-    many, how, shaken = bodies_of(blocks), Measure.parse(measure), list_motions(motions)
-    slenderness = slenderness_of(many)
+    many, how, shaken = gather_bodies(blocks), Measure.parse(measure), list_motions(motions)
+    slenderness = compute_slenderness(many)
     values = values_of(shaken, how)
     if never_rests(many):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
@@ -225,7 +225,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
         notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
         notes.append(f"note: {data.undecided}")
-        notes += [f"note: {text}"] if (text := missing_text(np.isnan(data.peak_over_alpha.values))) else []
+        notes += [f"note: {text}"] if (text := describe_missing(np.isnan(data.peak_over_alpha.values))) else []
         return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])
 
     def to_dict(self) -> dict[str, Any]:
@@ -284,7 +284,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
 
 def _lowest_uplift(blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
     """Return the lowest level at which a motion, scaled with its vertical component, lifts a block."""
-    thresholds, own = thresholds_of(blocks, model)
+    thresholds, own = compute_thresholds(blocks, model)
     factors = np.array([compute_uplift_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
     lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
     if math.isinf(lowest):

@@ -17,14 +17,14 @@ from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.core.tables import format_count
-from rocking.engine.problem import bodies_of
-from rocking.engine.tasks import Setup, Task, missing_text, simulate_tasks
+from rocking.engine.problem import gather_bodies
+from rocking.engine.tasks import Setup, Task, describe_missing, simulate_tasks
 from rocking.errors import InvalidOption, Message
 from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, compose_label
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.response import COUNT, RELATIVE, factors_near, percent
+from rocking.response import COUNT, RELATIVE, format_percent, list_factors
 from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Describe a block by its sizes or parameters, several by their number."""
     only = single_block(blocks)
     if only is None:
-        return format_count(len(bodies_of(blocks)), "block")
+        return format_count(len(gather_bodies(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
         return only.description
     return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
@@ -286,7 +286,7 @@ def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
 
 def note_missing(unfinished: Flags) -> None:
     """Report abandoned simulations, which count as half overturned."""
-    if text := missing_text(unfinished):
+    if text := describe_missing(unfinished):
         note(f"{text}, and each counts as half overturned")
 
 
@@ -298,7 +298,7 @@ def undecided_text(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, 
     drawn = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
     _, motion, block, _ = np.unravel_index(drawn, overturned.shape)
     factor, was = np.broadcast_to(factors, overturned.shape).ravel()[drawn], overturned.ravel()[drawn]
-    near = factors_near(RELATIVE, COUNT)
+    near = list_factors(RELATIVE, COUNT)
     tasks = (
         Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
         for k, (m, b) in enumerate(zip(motion, block, strict=True))
@@ -307,7 +307,7 @@ def undecided_text(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, 
     found = simulate_tasks(setup, tasks)
     changed = {task.key for task, outcomes in found if outcomes["overturned"][0] != was[task.key[0]]}
     sample = format_count(len(drawn), "outcome")
-    return f"undecided within {percent(near[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
+    return f"undecided within {format_percent(near[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
 
 
 @dataclass(frozen=True, eq=False)

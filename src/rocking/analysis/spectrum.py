@@ -12,16 +12,16 @@ from numpy.typing import ArrayLike
 
 from rocking.analysis.levels import curves_of, labels_of, motions_text, normalised_weights, pooled, ratios_of
 from rocking.block import Blocks
-from rocking.block.bodies import rates_of
+from rocking.block.bodies import resolve_p
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import add_unit, escape_dollars
-from rocking.engine.problem import bodies_of
+from rocking.engine.problem import gather_bodies
 from rocking.engine.schemes import ChatteringScheme
-from rocking.engine.tasks import missing_text
+from rocking.engine.tasks import describe_missing
 from rocking.errors import InvalidOption
 from rocking.records.named import Motions, list_motions
 from rocking.simulation.ensemble import simulate_many
@@ -115,7 +115,7 @@ def rocking_spectrum(
     each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
     shares = np.array([checks.fraction(value, "each of fractiles", InvalidOption) for value in each])
     options: dict[str, Any] = {"model": model, "chattering": chattering}
-    gathered, shaken = bodies_of(blocks), list_motions(motions)
+    gathered, shaken = gather_bodies(blocks), list_motions(motions)
     if not isinstance(gathered, Blocks):
         raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {gathered.kind}")
     if (axes := gathered.axes) is not None and p is None and size is None and weights is None:
@@ -132,7 +132,7 @@ def rocking_spectrum(
     median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
     rates = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
-        rates = checks.positive_numbers(rates_of(p, size, gathered.gravity), "p", InvalidOption)
+        rates = checks.positive_numbers(resolve_p(p, size, gathered.gravity), "p", InvalidOption)
     count, n = len(rates), len(gathered)
     checks.grid_size({"motions": len(shaken), "blocks": n, "p": count}, InvalidOption)
     resized = gathered.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(rates / median, n))
@@ -225,7 +225,7 @@ class RockingSpectrum(DatasetResult):
                 for j in range(self.data.sizes["p"])
             ]
             parts.append(f"{title}\n{format_some_rows(header, rows)}")
-        missing = missing_text(np.isnan(self.data.peak_over_alpha.values))
+        missing = describe_missing(np.isnan(self.data.peak_over_alpha.values))
         return "\n\n".join(parts + [f"note: {missing}"] * bool(missing))
 
     def to_dict(self) -> dict[str, Any]:

@@ -28,8 +28,8 @@ from rocking.core.result import Result
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.response import Response, drawing_times
-from rocking.response.sensitivity import changes_along
+from rocking.response import Response, choose_times
+from rocking.response.sensitivity import compute_changes
 from rocking.simulation.simulate import simulate
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ class HistoryCalibration(Result):
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
         end = min(float(self.times[-1]), self.response.duration)
-        between = drawing_times(self.response, float(self.times[0]), end)
+        between = choose_times(self.response, float(self.times[0]), end)
         return measured_figure(
             time=self.times,
             measured=simulated + self.residuals,
@@ -318,7 +318,7 @@ class _Problem:
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
         fallen = times > response.duration
-        changes = changes_along(response._history, times[~fallen], [one.name for one in self.unknowns])
+        changes = compute_changes(response._history, times[~fallen], [one.name for one in self.unknowns])
         found = np.zeros((count, len(logs)))
         found[~fallen] = -np.column_stack([changes[one.name] for one in self.unknowns])
         return found

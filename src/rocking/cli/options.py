@@ -15,7 +15,7 @@ from cyclopts import Group, Parameter, Token
 
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, literal
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, escape_braces
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes, vertical_notes
@@ -134,7 +134,9 @@ class HeldOptions(BlockOptions):
         except InvalidBlock as wrong:
             if not forces or wrong.argument != "offset":
                 raise
-            raise InvalidBlock(literal(str(wrong))) from wrong  # offset of a restraint, not the --offset of the block
+            raise InvalidBlock(
+                escape_braces(str(wrong))
+            ) from wrong  # offset of a restraint, not the --offset of the block
         bodies.note_likely_mistakes([block], [body])
         return body
 
@@ -175,7 +177,7 @@ def _about(option: str) -> Iterator[None]:
     try:
         yield
     except RockingError as wrong:
-        raise InvalidOption(f"{{}}: {literal(str(wrong))}", option) from wrong
+        raise InvalidOption(f"{{}}: {escape_braces(str(wrong))}", option) from wrong
 
 
 def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
@@ -187,7 +189,7 @@ def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
         name = name.replace("-", "_")
         if not equals or name in given:
             sentence = "{} takes NAME=VALUE with commas between, each name once, not "
-            raise InvalidOption(sentence + literal(repr(text)), option, value=text)
+            raise InvalidOption(sentence + escape_braces(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
             raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
         given[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)

@@ -26,7 +26,7 @@ from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
-from rocking.simulation.simulate import response_to
+from rocking.simulation.simulate import compute_response
 
 
 class Law(NamedTuple):
@@ -485,7 +485,7 @@ def simulate(
     body, motion = _one_body(body), check_motion(motion)
     until = _duration(body, motion, duration)
     at = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
-    return in_positions(response_to(body, motion, "linear", chattering, until, (at, initial_velocity)))
+    return in_positions(compute_response(body, motion, "linear", chattering, until, (at, initial_velocity)))
 
 
 def _one_body(body: object) -> LinearBody:

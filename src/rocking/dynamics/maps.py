@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.block.body import Body
-from rocking.block.sides import in_line
+from rocking.block.sides import format_sides
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import MODELS, Model
 from rocking.core.threads import map_in_threads
 from rocking.dynamics.bodies import LinearBody
-from rocking.engine.problem import FASTEST, one_body, set_start
+from rocking.engine.problem import MAX_SPEED, require_body, set_start
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
@@ -47,7 +47,7 @@ class PeriodicForcing:
             raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")
         if given.vertical is not None:
             raise InvalidMotion("maps are made for one component; give a motion without a vertical one")
-        self.body, self.motion = one_body(body), given
+        self.body, self.motion = require_body(body), given
         self.bodies = self.body.alone()
         self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
         if model is not None:
@@ -58,7 +58,9 @@ class PeriodicForcing:
         if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
             raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
         self._ground = repeated(self.motion, self.body.gravity)
-        run = Setup(self.bodies, self.model, self.chattering, self.forcing_period).run(self.motion, ground=self._ground)
+        run = Setup(self.bodies, self.model, self.chattering, self.forcing_period).prepare(
+            self.motion, ground=self._ground
+        )
         self._records, self._settings = run.records, run.settings
         self._settings["stop"], self._settings["no_end_time"] = np.inf, True
         if np.any(self._records["yielding"]):
@@ -204,15 +206,15 @@ def parts_of(count: int, periods: int) -> Sequence[slice]:
 
 def sensible(values: Floats, name: str) -> None:
     """Raise an error for coordinates or velocities that are not finite or absurdly large."""
-    if not values.size or not np.all(np.abs(values) <= FASTEST):
-        raise InvalidOption(f"{{}} must be finite numbers of at most {FASTEST:g} in size", name)
+    if not values.size or not np.all(np.abs(values) <= MAX_SPEED):
+        raise InvalidOption(f"{{}} must be finite numbers of at most {MAX_SPEED:g} in size", name)
 
 
 def described(what: Body | Motion) -> str:
     """Describe a body or a motion with its parameters in one line."""
     if isinstance(what, Motion):
         return ", ".join(part for part in (what.label, what.description.numbers) if part)
-    return f"{what.description}, {in_line(what.sides)}"
+    return f"{what.description}, {format_sides(what.sides)}"
 
 
 class StroboscopicMap(PeriodicForcing):

@@ -22,7 +22,7 @@ from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.simulation.simulate import response_to
+from rocking.simulation.simulate import compute_response
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -208,7 +208,7 @@ def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Respons
         breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
     )
     start = float(state[0]), float(state[1])
-    found = response_to(strobe.body, many, strobe.model, strobe.chattering, duration, start, "initial_position")
+    found = compute_response(strobe.body, many, strobe.model, strobe.chattering, duration, start, "initial_position")
     return in_positions(found) if isinstance(strobe.body, LinearBody) else found
 
 

@@ -26,7 +26,7 @@ from rocking.errors import DamagedStudy, OutputError, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, Scales, setup_of
+from rocking.simulation.ensemble import Product, Scales, build_setup
 from rocking.studies.units import OUTCOMES, Key, UnitGrid, Work, decoded, name_of, program, sealed, unsealed
 
 if sys.platform == "win32":
@@ -144,7 +144,7 @@ class Store:
         """Return the complete input of a worker for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
-        return Work(setup_of(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
+        return Work(build_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
 
     def _factors_of(self, unit: int) -> Floats:
         """Return the factors on the motions of a unit, shape (motions, scales, polarities)."""
