@@ -188,7 +188,7 @@ def test_a_phase_plane_counts_in_radians_where_a_side_has_no_balance(model):
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        (RestrainedBlock(COLUMN, Tendon(2e5, 1e3, strength=3e3)), "a tendon that yields keeps no energy"),
+        (RestrainedBlock(COLUMN, Tendon(2e5, 1e3, strength=3e3)), "not defined for a yielding tendon"),
         (RestrainedBlock(COLUMN, Spring(1e6)), "hold it back at any rotation"),
     ],
 )
@@ -202,5 +202,5 @@ def test_an_energy_that_is_not_known_is_refused_in_one_sentence(body, words):
 def test_a_ball_has_no_energy_that_overturns_it():
     ball = rocking.dynamics.BouncingBall(restitution=0.8)
     response = rocking.dynamics.simulate(ball, None, initial_position=1.0)
-    with pytest.raises(InvalidOption, match="known of blocks alone, not of a BouncingBall"):
+    with pytest.raises(InvalidOption, match="defined for blocks only, not for a BouncingBall"):
         response.potential_energy(0.1)

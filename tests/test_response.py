@@ -146,7 +146,7 @@ def test_bad_options_are_refused_in_one_sentence(block, record, options, word):
 
 def test_a_block_that_never_rests_needs_a_duration(block):
     bouncing = Block.from_parameters(p=1.0, alpha=0.2, restitution=1.0)
-    with pytest.raises(InvalidOption, match="give duration to say when to stop"):
+    with pytest.raises(InvalidOption, match="give duration to limit the simulation"):
         simulate(bouncing, None, initial_rotation=0.1)
     response = simulate(bouncing, None, initial_rotation=0.1, duration=20.0)
     assert response.duration == 20.0

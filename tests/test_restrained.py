@@ -176,7 +176,7 @@ def test_a_tendon_that_has_yielded_leaves_the_block_free():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Tendon(0.0), "a tendon needs stiffness"),
+        (lambda: Tendon(0.0), "a tendon requires stiffness"),
         (lambda: Tendon(1e5, prestress=-3.0), "prestress of a tendon must be at least 0 N, not -3"),
         (lambda: Tendon(1e5, prestress=5e3, strength=4e3), "must be above its prestress"),
         (lambda: Tendon(0.0, prestress=5e3, strength=6e3), "that yields needs a stiffness"),

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _PLACEHOLDER: Final = re.compile(r"\{\{\}\}|\{\}")
 
 #: Message of a command after Ctrl-C.
-INTERRUPTED: Final = "rocking: this was interrupted; every file that it wrote is whole"
+INTERRUPTED: Final = "rocking: Interrupted. All files written are complete."
 
 #: Longest path or word that a message shows completely, in characters.
 _LONGEST_WORD: Final = 400

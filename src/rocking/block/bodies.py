@@ -197,7 +197,9 @@ class Blocks:
                 require_block(body)
         gravities = {body.gravity for body in bodies}
         if len(gravities) != 1:
-            raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same {}", "gravity")
+            raise InvalidBlock(
+                "Blocks.from_bodies requires at least one block, and the same {} for all of them", "gravity"
+            )
         rows = [body._build_rows() for body in bodies]
         if max(len(sides[0]) for sides in rows) > len(_FIELDS):
             rows = [[(*side, *[*_TERMS.values()][len(side) - len(_FIELDS) :]) for side in sides] for sides in rows]
@@ -252,18 +254,18 @@ class Blocks:
         records["variable_restitution"] = (records["seed"] >= 0) | np.any(records["restitution_slope"] > 0.0, axis=1)
         records["prestress"], records["spring"] = p * p * terms["prestress"], p * p * terms["spring"]
         records["damping"] = terms["damping"]
-        moment = terms["sine"] * sine + terms["cosine"] * cosine  # of the moment, and its slope by -u
+        moment = terms["sine"] * sine + terms["cosine"] * cosine  # at u = 0
         slope = terms["sine"] * cosine - terms["cosine"] * sine
         # The moment of a tendon without prestress is zero here apart from rounding.
         moment[np.abs(moment) <= 1e-14 * (np.abs(terms["sine"] * sine) + np.abs(terms["cosine"] * cosine))] = 0.0
-        gain = 1.0 if model == "linear" else cosine  # of the gain over p^2
+        gain = 1.0 if model == "linear" else cosine  # gain divided by p^2
         records["restraint_threshold"] = (moment + terms["prestress"]) / gain
         if model == "linear":
             records["added_weight"], records["added_push"] = slope, moment - self.alpha * slope
         else:
             records["added_weight"], records["added_push"] = terms["sine"], terms["cosine"]
         records["yielding"] = np.any(terms["stiffness"] > 0.0, axis=1)
-        if np.any(records["yielding"]):  # at first such a tendon is elastic
+        if np.any(records["yielding"]):  # a yielding tendon is initially elastic
             for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
                 records[f"base_{name.removeprefix('added_')}"] = records[name]
             records["tendon_stiffness"] = p * p * terms["stiffness"]
@@ -310,7 +312,9 @@ class Blocks:
 
     def __getitem__(self, index: int) -> Block | RestrainedBlock:
         if isinstance(index, (slice, tuple, list, np.ndarray)):
-            raise InvalidBlock("blocks[index] takes one whole number; use blocks.select for slices, indices and masks")
+            raise InvalidBlock(
+                "the index of a block must be a whole number; use blocks.select for slices, indices and masks"
+            )
         p, alpha, e = (tuple(array[index]) for array in (self.p, self.alpha, self.restitution))
         block = Block.from_parameters(p, alpha, e, gravity=self.gravity)
         terms, is_one_sided = [Terms(), Terms()], False
@@ -339,8 +343,8 @@ class Blocks:
             rows = np.array(0)
         if rows.ndim != 1:
             raise InvalidBlock(
-                f"select takes a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} truth "
-                f"values, not {checks.short_repr(index)}; for one block alone blocks[0]"
+                f"select requires a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} values, "
+                f"not {checks.short_repr(index)}; use blocks[0] for a single block"
             )
         arrays = {name: values[rows] for name, values in self._arrays().items()}
         return Blocks.__new__(Blocks)._fill(self.gravity, arrays)
@@ -386,8 +390,8 @@ def _compute_restitutions(p: Floats, alpha: Floats) -> Floats:
     stocky = np.flatnonzero(~(factors > 0.0).all(axis=1))
     if len(stocky):
         raise InvalidBlock(
-            f"conserving angular momentum gives block {stocky[0]} a restitution of {factors[stocky[0]].min():.3g}: it is "
-            "too stocky to rock that way; give {} a value or a pair in (0, 1]",
+            f"conserving angular momentum gives block {stocky[0]} a restitution of {factors[stocky[0]].min():.3g}: it "
+            "is too stocky to rock that way; give {} a value or a pair in (0, 1]",
             "restitution",
         )
     return check_sides(factors, "restitution")

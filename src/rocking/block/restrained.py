@@ -92,7 +92,7 @@ class RestrainedBlock(Rocking):
         restitution: float | Sequence[float] | Restitution | None = None,
     ) -> None:
         if isinstance(block, RestrainedBlock):
-            raise InvalidBlock("this block has restraints already: give all of them at once, after the Block itself")
+            raise InvalidBlock("this block already has restraints; give all of them together, after the Block")
         free_block, is_one_sided = require_block(block), checks.boolean(one_sided, "one_sided", InvalidBlock)
         _check_restraints(restraints, free_block)
         tilt = checks.finite(lean, "lean", InvalidBlock)
@@ -104,7 +104,7 @@ class RestrainedBlock(Rocking):
             factors = one_sided_restitution(free_block.sides[0].alpha)
         elif is_one_sided and law is None and len({*check_pair(restitution, "restitution")}) > 1:
             raise InvalidBlock(
-                "{} of a block that rocks one way is one number, not a pair: it leaves one side alone",
+                "{} of a one-sided block must be a number, not a pair",
                 "restitution",
                 value=restitution,
             )
@@ -116,7 +116,7 @@ class RestrainedBlock(Rocking):
             )
             standing_block = standing_block._with_sides((plus, minus))
         if sum(isinstance(restraint, Tendon) and restraint.strength < math.inf for restraint in restraints) > 1:
-            raise InvalidBlock("one tendon of a block may yield; let the others have no {}", "strength")
+            raise InvalidBlock("only one tendon of a block may yield; omit {} of the others", "strength")
         pivots = _build_pivots(standing_block, tilt, restraints)
         terms = [
             functools.reduce(
@@ -131,8 +131,8 @@ class RestrainedBlock(Rocking):
         self.__dict__.update(description=description)
         if (min_uplift := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
-                f"this block does not stand: it would take a ground acceleration of {min_uplift:.3g} m/s^2 to lift it; "
-                f"a smaller thrust, load or lean lets it{'; forces are in N, masses in kg' * (min_uplift < -self.gravity)}"
+                f"this block does not stand: its uplift acceleration is {min_uplift:.3g} m/s^2; reduce the thrust, "
+                f"load or lean{'; forces are in N, masses in kg' * (min_uplift < -self.gravity)}"
             )
 
     def _build_rows(self) -> list[tuple[float, ...]]:
@@ -206,7 +206,7 @@ class RestrainedBlock(Rocking):
 
 
 def _describe_restraints(restraints: Sequence[object]) -> list[str]:
-    """Describe the restraints: with a spring of ..., a load of ... and a tendon of ..."""
+    """Describe the restraints, for example as "with a spring of ... and a tendon of ..."."""
     if not restraints:
         return []
     *first, last = [f"a {restraint}" for restraint in restraints]
@@ -217,9 +217,11 @@ def _check_restraints(restraints: Sequence[object], block: Block) -> None:
     """Reject invalid restraints, and restraints of a block without a mass."""
     for restraint in restraints:
         if not isinstance(restraint, Restraint):
-            raise InvalidBlock(f"{checks.short_repr(restraint)} is no restraint: give {_RESTRAINT_NAMES}, one by one")
+            raise InvalidBlock(
+                f"{checks.short_repr(restraint)} is not a restraint; give {_RESTRAINT_NAMES} as separate arguments"
+            )
     if restraints and block.mass is None:
-        raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
+        raise InvalidBlock("a block with restraints requires its {}, kg", "mass")
 
 
 def _add_loads(block: Block, loads: Sequence[Load], restitution: float | Sequence[float] | None) -> Block:
@@ -240,8 +242,8 @@ def _add_loads(block: Block, loads: Sequence[Load], restitution: float | Sequenc
     overhang = max(x - distance_plus, -x - distance_minus)
     if overhang >= 0.0:
         raise InvalidBlock(
-            f"with its loads the centre of mass of this block lies {overhang:.3g} m beyond its pivot, so that it falls: "
-            "give a load less mass, or less {}",
+            f"with its loads, the centre of mass of this block lies {overhang:.3g} m beyond its pivot; reduce "
+            "the mass of a load, or its {}",
             "offset",
         )
     return Block.from_pivots(
@@ -261,7 +263,7 @@ def _tilt(block: Block, lean: float) -> Block:
     plus, minus = block.sides
     if not -minus.alpha < lean < plus.alpha:
         raise InvalidBlock(
-            f"a block whose {{}} is {lean:g} rad falls: from {-minus.alpha:.4g} to {plus.alpha:.4g} rad it stands"
+            f"{{}} must be between {-minus.alpha:.4g} and {plus.alpha:.4g} rad for the block to stand, not {lean:g}"
             f"{f'; if it is in degrees, give math.radians({lean:g})' if 0.5 <= abs(lean) < 90.0 else ''}",
             "lean",
             value=lean,
@@ -292,7 +294,7 @@ def _build_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) ->
 def _find_balance(side: Side, terms: Terms) -> float:
     """Return the first rotation without restoring moment or ground motion, rad.
 
-    A yielding tendon yields for the first time.
+    For a yielding tendon, the first yield is considered.
     """
     if terms[:-3] == Terms()[:-3]:
         return side.alpha

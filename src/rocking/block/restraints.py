@@ -84,10 +84,10 @@ class Restraint(ABC):
 
     @abstractmethod
     def _compute_terms(self, pivot: Pivot) -> Terms:
-        """Return the terms while the block leans to one side."""
+        """Compute the terms while the block leans to one side."""
 
     def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
-        """Return the force on the block to side + and up, N, which is zero for springs and dampers.
+        """Compute the force on the block to side + and up, N, which is zero for springs and dampers.
 
         ``side`` is -1 at rest, ``stretch`` the elongation of a yielding tendon beyond its plastic elongation, m.
         """
@@ -136,7 +136,7 @@ class Tendon(Restraint):
     -----
     The moment is x cos(u/2) T with the force T = prestress + stiffness 2 x sin(u/2). Without prestress it is stiffness
     x^2 sin(u). Therefore uplift is unchanged, and the slender block has the stiffness p^2 minus stiffness x^2/I, which
-    may be negative (Makris and Vassiliou 2015; derived in the documentation).
+    may be negative (:cite:t:`makris2015`; derived in the documentation).
 
     Examples
     --------
@@ -156,7 +156,7 @@ class Tendon(Restraint):
             if value < 0.0:
                 raise InvalidBlock(f"{{}} of a tendon must be at least 0 {unit}, not {value:g}", name, value=value)
         if stiffness == prestress == 0.0:
-            raise InvalidBlock("a tendon needs {} (N/m) or {} (N)", "stiffness", "prestress")
+            raise InvalidBlock("a tendon requires {} (N/m) or {} (N)", "stiffness", "prestress")
         object.__setattr__(self, "strength", checks.real(self.strength, "strength", InvalidBlock))
         if not self.strength > prestress:
             raise InvalidBlock(
@@ -165,7 +165,7 @@ class Tendon(Restraint):
                 value=self.strength,
             )
         if stiffness == 0.0 and self.strength < math.inf:
-            raise InvalidBlock("a tendon that yields needs a {}, N/m", "stiffness")
+            raise InvalidBlock("a yielding tendon requires a {}, N/m", "stiffness")
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
         x = self._find_lever(pivot)
@@ -179,7 +179,7 @@ class Tendon(Restraint):
         return Terms(-factor * math.cos(pivot.alpha), factor * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
     def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
-        """Return the force of the tendon, along the chord between its ends."""
+        """Compute the force of the tendon, along the chord between its ends."""
         if self.strength == math.inf:
             x = np.where(side == 1, self._find_lever(pivots[1]), self._find_lever(pivots[0]))
             stretch = 2.0 * x * np.sin(0.5 * np.abs(rotation))
@@ -188,9 +188,9 @@ class Tendon(Restraint):
         return -tension * np.sin(inclination), -tension * np.cos(inclination)
 
     def _compute_extremes(self, pivots: tuple[Pivot, Pivot], ratios: tuple[float, float]) -> tuple[float, float, float]:
-        """Return the largest elongation, m, the largest force, N, and the plastic elongation, m.
+        """Compute the largest elongation, m, the largest force, N, and the plastic elongation, m.
 
-        ``bends``: largest opening of the base on each side divided by the distance from the pivot.
+        ``ratios``: largest opening of the base on each side divided by the distance from the pivot.
         """
         elongation = max(self._find_lever(pivot) * ratio for pivot, ratio in zip(pivots, ratios, strict=True))
         elastic = self.prestress + self.stiffness * elongation
@@ -397,7 +397,8 @@ class Restitution:
     """Law by which the restitution of a `RestrainedBlock` varies between two bounds from impact to impact.
 
     With a slope the restitution decreases linearly with the speed of the impact: max(minimum, maximum - slope speed).
-    With a seed it is drawn at each impact, uniformly between both bounds, by Philox 2x32 with ten rounds.
+    With a seed it is drawn at each impact, uniformly between both bounds, by Philox 2x32 with ten rounds
+    (:cite:t:`salmon2011`).
 
     Parameters
     ----------
@@ -421,10 +422,6 @@ class Restitution:
     --------
     RestrainedBlock : Block that accepts this law.
 
-    References
-    ----------
-    J. K. Salmon, M. A. Moraes, R. O. Dror and D. E. Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11 (2011).
-
     Examples
     --------
     >>> from rocking import Block, RestrainedBlock, simulate
@@ -442,12 +439,12 @@ class Restitution:
     def __post_init__(self) -> None:
         if self.slope is None:
             if self.seed is None:
-                raise InvalidBlock("a restitution that varies needs a {} or a {}", "slope", "seed")
+                raise InvalidBlock("a law of restitution requires a {} or a {}", "slope", "seed")
             object.__setattr__(self, "slope", 0.0)
         slopes = check_pair(self.slope, "slope")
         if invalid := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
             raise InvalidBlock(
-                f"{{}} must be finite and at least 0, in s/rad, not {invalid[0]:g}: a faster impact loses more",
+                f"{{}} must be finite and at least 0, in s/rad, not {invalid[0]:g}",
                 "slope",
                 value=self.slope,
             )
@@ -463,7 +460,7 @@ class Restitution:
         if self.seed is not None:
             checks.integer(self.seed, "seed", InvalidBlock, 0, _LARGEST_SEED)
             if max(slopes) > 0.0:
-                raise InvalidBlock("a restitution either falls or is drawn: give a {} or a {}", "slope", "seed")
+                raise InvalidBlock("a law of restitution has either a {} or a {}, not both", "slope", "seed")
 
     def _compute_terms(self, side: int) -> dict[str, float]:
         """Return the law on leaving a side as fields of `Terms`, without the largest factor."""

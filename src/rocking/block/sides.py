@@ -79,15 +79,15 @@ def check_pair(value: Any, name: str) -> tuple[float, float]:
 
 
 def housner_restitution(alpha: float) -> float:
-    """Compute the restitution of a rectangular block from angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963)."""
+    """Compute the restitution of a rectangle, 1 - 1.5 sin(alpha)^2, from angular momentum (:cite:t:`housner1963`)."""
     return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
 
 
 def one_sided_restitution(alpha: float) -> float:
     """Compute the restitution of a wall that rocks against transverse walls, from angular momentum at three impacts.
 
-    The wall hits the ground with its inner edge, the transverse walls with its top, and the ground again (Sorrentino,
-    AlShawa and Decanini 2011). A measured value is preferable.
+    The wall hits the ground with its inner edge, the transverse walls with its top, and the ground again
+    (:cite:t:`sorrentino2011`). A measured value is preferable.
 
     Parameters
     ----------
@@ -157,15 +157,9 @@ def impact_restitution(
     Notes
     -----
     With A = k^2 + h^2 and pivots at d_i and d_j from the centre of mass, e_i = (A - kappa d_i d_j)/(A + kappa d_j^2)
-    for a contact kappa (after Kalliontzis, Sritharan and Schultz 2016, whose formula is mostly quoted with kappa^2 in
-    place of kappa; square such a value). For several points, e_i is the product of (A + x y)/(A + y^2) over points x
-    and their successors y (after Ther and Kollar 2017). (Derived in the documentation.)
-
-    References
-    ----------
-    D. Kalliontzis, S. Sritharan and A. Schultz, "Improved coefficient of restitution estimation for free rocking
-    members", Journal of Structural Engineering 142 (2016). T. Ther and L. P. Kollar, "Refinement of Housner's model on
-    rocking blocks", Bulletin of Earthquake Engineering 15 (2017).
+    for a contact kappa (after :cite:t:`kalliontzis2016`, whose formula is mostly quoted with kappa^2 in place of
+    kappa; square such a value). For several points, e_i is the product of (A + x y)/(A + y^2) over points x and their
+    successors y (after :cite:t:`ther2017`). (Derived in the documentation.)
 
     Examples
     --------

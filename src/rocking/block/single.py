@@ -96,7 +96,7 @@ class Block(Rocking):
 
     Notes
     -----
-    alpha = atan(b/h), R = hypot(b, h), p = sqrt(3 g/(4 R)) (paper, section 2; Housner 1963).
+    alpha = atan(b/h), R = hypot(b, h), p = sqrt(3 g/(4 R)) (paper, section 2; :cite:t:`housner1963`).
 
     With an offset s the block is the body of `from_pivots` with distances (b - s, b + s), height h and radius of
     gyration k = sqrt((b^2 + h^2)/3 - s^2). Its moment of inertia about the middle is unchanged, as for halves of
@@ -144,8 +144,8 @@ class Block(Rocking):
         s = checks.finite(offset, "offset", InvalidBlock)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
             raise InvalidBlock(
-                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}: of a block with its mass "
-                "farther out the pivots and the radius of gyration must be given",
+                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}; for a block with its mass "
+                "farther out, the pivots and the radius of gyration must be given",
                 "offset",
                 value=offset,
             )
@@ -175,7 +175,7 @@ class Block(Rocking):
         return self
 
     def _build_rows(self) -> list[tuple[float, ...]]:
-        """Return the parameters of both sides as stored in `Blocks`."""
+        """Collect the parameters of both sides as stored in `Blocks`."""
         return [(side.p, side.alpha, side.restitution) for side in self.sides]
 
     def _with_sides(self, sides: tuple[Side, Side]) -> Block:
@@ -352,7 +352,7 @@ class Block(Rocking):
         Notes
         -----
         The block has the slenderness of a column and R' = R (1 + 3 gamma)/(1 + 2 gamma). Therefore a heavier beam
-        increases the stability (Makris and Vassiliou 2013; derived in the documentation).
+        increases the stability (:cite:t:`makris2013`; derived in the documentation).
 
         Examples
         --------
@@ -452,7 +452,7 @@ class Block(Rocking):
         plus, minus = (getattr(side, name) for side in self.sides)
         if plus != minus:
             raise UnequalSides(
-                f"{name} is {plus:g} on side + and {minus:g} on side - of this block: ask block.sides[0].{name} and "
+                f"{name} is {plus:g} on side + and {minus:g} on side - of this block: use block.sides[0].{name} and "
                 f"block.sides[1].{name}"
             )
         value: float = plus
@@ -516,6 +516,6 @@ def _resolve_half_sizes(
     if is_given == [False, False, True, True]:
         return 0.5 * check_length(full[0], "width"), 0.5 * check_length(full[1], "height")
     raise InvalidBlock(
-        "a block takes either {} and {}, or {} and {} (the full sizes), all in m",
+        "a block requires either {} and {}, or {} and {} (the full sizes), all in m",
         "half_width", "half_height", "width", "height",
     )  # fmt: skip

@@ -48,7 +48,7 @@ def prepare_ground(motion: Motion | None, gravity: float, factor: float = 1.0) -
 
 
 def find_common_step(motion: Motion) -> float | None:
-    """Return the length of the pieces of `ground_of` if equally long and linear in all components, else None."""
+    """Return the length of the pieces of `prepare_ground` if equally long and linear in all components, else None."""
     if motion.vertical is None:
         return motion.dt
     steps = [piecewise.find_even_step(pieces) for pieces in _align_components(motion)]
@@ -72,7 +72,7 @@ def compute_slenderness(bodies: Bodies) -> Floats:
     """Return the slenderness of each body as it stands, rad, the smaller of two sides, which normalises rotations."""
     parameter = bodies.parameters().get("alpha")
     if parameter is None:
-        raise InvalidOption(f"this is known of blocks alone, which have a slenderness, not of {bodies.kind}")
+        raise InvalidOption(f"slenderness is defined for blocks only, not for {bodies.kind}")
     return np.asarray(parameter[0].min(axis=1))
 
 
@@ -100,8 +100,8 @@ def set_start(
 ) -> None:
     """Set the states of bodies at rest at time zero to coordinates and their rates.
 
-    There is one body per state, or one for all. By default the coordinate is zero, or the stop if zero is behind it.
-    ``name`` is the coordinate in errors, by default as in "initial_rotation".
+    There is one body for each state, or one for all. By default the coordinate is zero, or the stop if zero is behind
+    it. ``name`` is the coordinate in errors, by default as in "initial_rotation".
 
     Raises
     ------
@@ -132,8 +132,8 @@ def set_start(
         range_text = f"from {low:g} to {high:g} {unit}" if high > low else f"at least {low:g} {unit}"
         value, rate_value = (float(np.broadcast_to(values, u.shape)[k]) for values in (position, speed))
         raise InvalidOption(
-            f"{{}} must be {range_text}, in front of the body's stop, and {{}} must not lead into it: they are {value:g} "
-            f"{unit} and {rate_value:g} {unit}/s",
+            f"{{}} must be {range_text}, in front of the body's stop, and {{}} must not point into it; they are "
+            f"{value:g} {unit} and {rate_value:g} {unit}/s",
             argument,
             "initial_velocity",
             value=value,
@@ -190,7 +190,7 @@ def build_settings(
     if duration is None:
         if never_rests(bodies):
             raise InvalidOption(
-                "a block with {} 1 never comes to rest; give {} to say when to stop", "restitution", "duration"
+                "a block with {} 1 never comes to rest; give {} to limit the simulation", "restitution", "duration"
             )
     else:
         duration = checks.positive(duration, "duration", InvalidOption, "s")

@@ -33,7 +33,7 @@ _SCHEMES: dict[str, type[ChatteringScheme]] = {}
 
 @dataclass(frozen=True)
 class ChatteringScheme(ABC):
-    """ChatteringScheme of chattering: the rule by which a sequence of impacts ends.
+    """Chattering scheme: the rule by which a sequence of impacts ends.
 
     A user-defined subclass is available by its `name` as soon as it is imported. At an impact, one of the measures of
     the kernels (`rocking.kernels.state`) is compared with its thresholds.
@@ -89,11 +89,13 @@ class ChatteringScheme(ABC):
     def from_text(cls, value: str) -> ChatteringScheme:
         """Create the scheme from the text after "NAME=", or raise `InvalidOption`."""
         if not fields(cls):
-            raise InvalidOption(f"the chattering scheme {cls.name} takes no parameter, not {value!r}")
+            raise InvalidOption(f"the chattering scheme {cls.name} has no parameter; got {value!r}")
         try:
             return cls(float(value))  # type: ignore[call-arg]
         except ValueError:
-            raise InvalidOption(f"the chattering scheme {cls.name} takes one number, not {value!r}") from None
+            raise InvalidOption(
+                f"the parameter of the chattering scheme {cls.name} must be a number, not {value!r}"
+            ) from None
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ class AsymptoticTime(ChatteringScheme):
         is_sine = motion is not None and motion.description.family == "sine" and motion.vertical is None
         if not (isinstance(bodies, Blocks) and not bodies.terms and bodies.is_symmetric and motion and is_sine):
             raise InvalidOption(
-                '{} "time" is the scheme for symmetric blocks under sinusoidal motions (rocking.pulses.sine) without a '
+                '{} "time" requires symmetric blocks under sinusoidal motions (rocking.pulses.sine) without a '
                 'vertical component; use "certified"',
                 "chattering",
             )
@@ -253,8 +255,7 @@ class GeometricBypass(VelocityThreshold):
 
     Notes
     -----
-    Source: Nordmark, A. B. and Piiroinen, P. T. (2009). Simulation and stability analysis of impacting systems with
-    complete chattering. Nonlinear Dynamics 58, 85-106; to first order in the speed.
+    The method is the one of :cite:t:`nordmark2009`, to first order in the speed.
     """
 
     name: ClassVar[str] = "bypass"
@@ -335,8 +336,8 @@ def compute_critical_amplitudes(method: str, omega: Floats, eta: Floats) -> Floa
         if outside.any():
             k = int(np.argmax(outside))
             warnings.warn(
-                f"Eq. {method[2:]} was fitted for omega from {min_omega:g} to {max_omega:g} and eta from {min_eta:g} to {max_eta:g}; "
-                f'at omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g} it means nothing: use "exact"',
+                f"Eq. {method[2:]} was fitted for omega from {min_omega:g} to {max_omega:g} and eta from {min_eta:g} "
+                f'to {max_eta:g}, not for omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g}; use "exact"',
                 OutsideFit,
                 stacklevel=2,
             )

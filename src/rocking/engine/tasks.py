@@ -145,11 +145,11 @@ def simulate_each(setup: Setup, motion: Motion, factors: Floats) -> Iterator[tup
 
 
 def require_finished(unfinished: bool) -> None:
-    """Raise an error if a required simulation was abandoned."""
+    """Raise an error if a required simulation was aborted."""
     if unfinished:
         raise Unfinished(
-            f"a simulation was given up after more than {BUDGET:,} steps, so that its outcome is not known; "
-            "simulate it alone to see how far it came, or give a duration"
+            f"a simulation was aborted after more than {BUDGET:,} steps, so its outcome is unknown; "
+            "simulate this case alone for its partial response, or give a duration"
         )
 
 
@@ -267,7 +267,7 @@ def _collect_outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     outcomes["leans"] = states["ending"] == state.Ending.LEANS
     is_early = (states["side"] >= 0) | (states["end_time"] < motion_end)
-    # A body that balances for ever has no outcome either.
+    # A body that remains balanced also has no outcome.
     is_undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))
     outcomes["stopped"] = is_undecided & is_early
     for name, field in (

@@ -27,17 +27,17 @@ Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
 #: Time before a rest, s, up to which impacts are followed. The remainder is of first order, and rounding smaller.
 _REST_MARGIN: Final = 1e-5
 
-_OVERTURNS: Final = "the block overturns: its peak is where it falls, whatever changes a little"
-_AT_STOP: Final = "the body reaches its second stop: its peak is there, whatever changes a little"
-_UNFINISHED: Final = "the simulation was not finished: its derivatives are not known"
-_FROM_REST: Final = "the response starts on the ground: a start to the other side changes it otherwise"
+_OVERTURNS: Final = "the block overturns, so its peak does not depend on small changes"
+_AT_STOP: Final = "the body reaches its second stop, so its peak does not depend on small changes"
+_UNFINISHED: Final = "the simulation was not finished, so its derivatives are unknown"
+_FROM_REST: Final = "the response starts on the ground, where derivatives differ between the two sides"
 _REASONS: Final = {
     AdjointEnd.GRAZES: (
-        "the block touches the ground without speed: with a little less motion it does not, or it hits it"
+        "the block touches the ground without speed, so a slightly weaker motion causes no contact or an impact"
     ),
     AdjointEnd.LEAVES_AT_ONCE: "the block leaves the ground at the instant at which it comes to rest",
     AdjointEnd.TOUCHES_THRESHOLD: (
-        "the motion touches the threshold of uplift: with a little less of it there is no uplift"
+        "the motion touches the uplift threshold, so a slightly weaker motion causes no uplift"
     ),
 }
 
@@ -93,7 +93,7 @@ class Gradient:
             If there is no vertical component, or it is not linear between samples.
         """
         if self.motion is None or self.motion.vertical is None or self.vertical is None:
-            raise InvalidOption("the motion has no vertical component; give it one by `with_vertical`")
+            raise InvalidOption("the motion has no vertical component; add one by `with_vertical`")
         return _convert_to_samples(self.motion.vertical, self.vertical)
 
     def __repr__(self) -> str:
@@ -146,7 +146,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
     >>> response = rocking.simulate(block, record)
-    >>> [f"{each:.5f}" for each in rocking.gradient(response).samples]
+    >>> [f"{value:.5f}" for value in rocking.gradient(response).samples]
     ['-0.00175', '-0.01310', '0.01048', '0.04288', '0.03351']
     """
     if not isinstance(response, Response):
@@ -201,7 +201,7 @@ class _Target:
 
 def _target_peak(response: Response, at: float | None) -> _Target:
     if at is not None:
-        raise InvalidOption('{} is for other quantities: a "peak" is where it is', "at", value=at)
+        raise InvalidOption('{} does not apply to a "peak"', "at", value=at)
     trail, value, instant = response.solution.trail, response.peak_rotation, response.peak_time
     reason = ""
     if response.overturned:
@@ -214,9 +214,9 @@ def _target_peak(response: Response, at: float | None) -> _Target:
 
 
 def _target_state(response: Response, of: Quantity, at: float | None) -> _Target:
-    """Return the target for the rotation or velocity at a time."""
+    """Create the target for the rotation or velocity at a time."""
     if at is None:
-        raise InvalidOption(f"a {of} needs the time, {{}}, at which it is asked for, s", "at")
+        raise InvalidOption(f"a {of} requires the time {{}}, s", "at")
     time = checks.between(at, "at", InvalidOption, 0.0, response.duration, "s")
     trail, history = response.solution.trail, response._history
     motion_state = history.states(time)
@@ -231,10 +231,10 @@ def _target_state(response: Response, of: Quantity, at: float | None) -> _Target
 
 
 def _target_time(response: Response, of: Quantity, at: float | None) -> _Target:
-    """Return the target for the time of an event or impact."""
+    """Create the target for the time of an event or impact."""
     trail, rows = response.solution.trail, response.events if of == "event" else response.impacts
     if not len(rows):
-        raise InvalidOption(f"the response has no {of}; ask for another quantity, {{}}", "of", value=of)
+        raise InvalidOption(f"the response has no {of}; choose another quantity {{}}", "of", value=of)
     k = checks.integer(at, "at", InvalidOption, -len(rows), len(rows) - 1)
     nodes = trail.nodes
     row = int(
@@ -316,7 +316,7 @@ def _split_components(
 
 
 def _sum_over_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
-    """Convert derivatives by finer pieces to the pieces of a motion: the transpose of `refined`."""
+    """Convert derivatives by finer pieces to the pieces of a motion: the transpose of a refinement."""
     within = starts < motion.duration
     starts, values = starts[within], values[within]
     piece = np.searchsorted(motion.breakpoints, starts, side="right") - 1
@@ -332,7 +332,7 @@ def _sum_over_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
 def _convert_to_samples(motion: Motion | None, values: Floats) -> Floats:
     """Convert derivatives by the coefficients of lines to accelerations at their ends."""
     if motion is None or values.shape[1] != 2 or piecewise.has_jumps(motion):
-        raise InvalidOption("the motion is not linear between samples; take the derivatives by its `coefficients`")
+        raise InvalidOption("the motion is not linear between samples; use the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)
     derivatives = np.zeros(len(values) + 1)
     derivatives[:-1] = values[:, 0] - rates

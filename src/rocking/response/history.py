@@ -51,7 +51,7 @@ class Solution(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TimeHistory:
-    """The computed trail as functions of time, from 0 to `end` (s)."""
+    """Computed solution as functions of time, from 0 to `end` (s)."""
 
     trail: Trail
     end: float

@@ -41,7 +41,7 @@ def check_friction(value: object) -> float:
     """Return a coefficient of friction, or raise `InvalidOption` if it is not in (0, 3]."""
     coefficient = checks.positive(value, "friction", InvalidOption)
     if coefficient > _MAX_FRICTION:
-        text = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}; of an angle of friction take the tangent"
+        text = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}; use the tangent of an angle of friction"
         raise InvalidOption(text, "friction", value=value)
     return coefficient
 
@@ -54,7 +54,7 @@ def compute_friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
 
 
 def compute_pull(_: Floats, vertical: Floats) -> Floats:
-    """Return the required tensile force of the ground: the negative normal force."""
+    """Compute the required tensile force of the ground: the negative normal force."""
     return -vertical
 
 
@@ -303,8 +303,8 @@ class Energy:
 def find_linear_balance(body: Block | RestrainedBlock) -> Floats:
     """Return the rotation of the unstable balance on each side in the linear model, rad; infinite if there is none.
 
-    A yielding tendon yields for the first time: with the smaller of elastic force and strength, so at the nearer
-    balance.
+    For a yielding tendon the first yield is considered, with the smaller of elastic force and strength, so the nearer
+    balance is returned.
     """
     (record,) = body.alone().kernel_records("linear", np.zeros((1, 2)))
     elastic = _solve_linear_balance(record, record["added_weight"], record["added_push"], record["prestress"])
@@ -328,12 +328,10 @@ def _solve_linear_balance(record: Record, added_weight: Floats, added_push: Floa
 def build_energy(body: Body, record: Record, *, nonlinear: bool) -> Energy:
     """Return the energy of a block; raise `InvalidOption` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
-        raise InvalidOption(
-            f"the energy that overturns a body is known of blocks alone, not of a {type(body).__name__}"
-        )
+        raise InvalidOption(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")
     if record["yielding"]:
-        raise InvalidOption("a tendon that yields keeps no energy: leave the strength of the tendon out to see it")
+        raise InvalidOption("the energy is not defined for a yielding tendon; omit the strength of the tendon")
     energy = Energy(body, record, nonlinear)
     if not np.any(np.isfinite(energy.balance)):
-        raise InvalidOption("no energy overturns this block: its restraints hold it back at any rotation")
+        raise InvalidOption("this block has no overturning energy, because its restraints hold it at any rotation")
     return energy

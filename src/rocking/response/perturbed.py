@@ -186,7 +186,7 @@ class Perturbed(Result):
 
 
 def check_factors(relative: float, count: int) -> list[float]:
-    """Return the factors of `factors_near`, or raise `InvalidOption` if an argument is out of range."""
+    """Return the factors of `list_factors`, or raise `InvalidOption` if an argument is out of range."""
     step = checks.between(relative, "relative", InvalidOption, 1e-12, 0.1)
     if checks.integer(count, "count", InvalidOption, 3, 1001) % 2 == 0:
         sentence = f"{{}} must be odd, with as many factors below 1 as above; got {count}"

@@ -239,7 +239,7 @@ class Response(Simulated):
         step = checks.positive(dt, "dt", InvalidOption, "s")
         if self.duration > _MAX_POINTS * step:
             problem = f"more than {_MAX_POINTS:,} points of {self.duration:g} s"
-            raise InvalidOption(f"{{}} = {step:g} s makes {problem}; take a longer step", "dt", value=dt)
+            raise InvalidOption(f"{{}} = {step:g} s makes {problem}; use a longer step", "dt", value=dt)
         times = create_times(self.duration, step)
         states = self.states(times)
         columns = [

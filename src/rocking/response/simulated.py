@@ -76,7 +76,7 @@ class Simulated(Result):
     def _contact(self) -> Contact:
         law = self.block.contact
         if law is None:
-            raise InvalidOption(f"the forces of the ground are not known of this body: {self.block.description}")
+            raise InvalidOption(f"the ground forces of this body are unknown: {self.block.description}")
         return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
 
     @cached_property
@@ -129,7 +129,7 @@ class Simulated(Result):
         rows = []
         if isinstance(self.block, RestrainedBlock):
             plus, minus = self._history.find_peaks()
-            if self.overturned:  # the last step ends there
+            if self.overturned:  # the last step ends at the peak
                 side = int(self.solution.trail.nodes["side"][-1])
                 plus, minus = (self.peak_rotation, minus) if side == 0 else (plus, self.peak_rotation)
             rows = self.block.tendons_at((plus, minus), self.model)
@@ -258,7 +258,7 @@ class Simulated(Result):
     def _repeat(self, factor: float) -> Repeat:
         try:
             repeated: Simulated = self if factor == 1.0 else self.solution.repeat(factor)
-        except InvalidOption:  # a state of balance: `simulate` requires a duration
+        except InvalidOption:  # balanced: `simulate` requires a duration
             return Repeat(factor, "balances", math.nan, math.nan, math.nan, math.nan, self.events[:0])
         rests = repeated.events["time"][repeated.events["kind"] == "rest"]
         last_rest = float(rests[-1]) if len(rests) and not repeated.moves_at_end else math.nan

@@ -317,8 +317,8 @@ def _count_decimals(uncertainty: float) -> int:
         return 0
     if uncertainty <= 0.0:
         return _MAX_DECIMALS
-    known = -math.log10(uncertainty)
-    return min(max(math.ceil(known) if uncertainty >= _MIN_RANGE else math.floor(known), 0), _MAX_DECIMALS)
+    digits = -math.log10(uncertainty)
+    return min(max(math.ceil(digits) if uncertainty >= _MIN_RANGE else math.floor(digits), 0), _MAX_DECIMALS)
 
 
 def _format_short_time(time: float, low: float, high: float, max_decimals: int = _SHORT_DECIMALS) -> str:

@@ -92,7 +92,7 @@ class Scales:
         parsed = Measure.parse(measure, among=SCALING_MEASURES)
         if levels is None:
             if parsed.name != "factor":
-                raise InvalidOption("{} says what {} are: give those as well", "measure", "levels")
+                raise InvalidOption("{} requires {}", "measure", "levels")
             return cls()
         return cls(parsed, checks.positive_numbers(levels, "levels", InvalidOption))
 
@@ -179,7 +179,7 @@ class Product:
             If the bodies are not blocks.
         """
         if not isinstance(self.bodies, Blocks) or self.bodies.terms:
-            raise InvalidOption(f"this is known of blocks alone, not of {self.bodies.kind}")
+            raise InvalidOption(f"this result is defined for blocks only, not for {self.bodies.kind}")
         return self.bodies
 
 

@@ -108,7 +108,7 @@ def compute_response(
     name: str | None = None,
     factor: float = 1.0,
 ) -> Response:
-    """Compute a response like `simulate`, with `name` for the initial coordinate in messages."""
+    """Compute a response like `simulate`, with `name` for the initial coordinate in errors."""
     scheme, bodies, motion = chattering_scheme(chattering), require_body(block).alone(), check_motion(motion)
     setup, ground = Setup(bodies, model, scheme, duration, initial), None
     if factor != 1.0:  # repeated simulations leave the cache unchanged
@@ -119,7 +119,7 @@ def compute_response(
     trail, start = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
     ending, table = march_in_slices(trail, start)
     if ending == state.Ending.BALANCED:
-        raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
+        raise InvalidOption("the block remains balanced on its corner; give {} or another initial state", "duration")
     events = table["event"][: start["events"]]
     overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
     return Response(
@@ -152,7 +152,7 @@ def compute_response(
 def _scale_start(
     initial: tuple[float, float], factor: float, records: state.Records, stops: Floats
 ) -> tuple[float, float]:
-    """Scale the distance of an initial coordinate from its stop, short of the fallen body, and its rate."""
+    """Scale the distance of an initial coordinate from its stop, below overturning, and its rate."""
     coordinate, rate = initial
     if coordinate in stops:
         return coordinate, factor * rate
