@@ -189,7 +189,7 @@ def test_a_phase_plane_counts_in_radians_where_a_side_has_no_balance(model):
     ("body", "words"),
     [
         (RestrainedBlock(COLUMN, Tendon(2e5, 1e3, strength=3e3)), "not defined for a yielding tendon"),
-        (RestrainedBlock(COLUMN, Spring(1e6)), "hold it back at any rotation"),
+        (RestrainedBlock(COLUMN, Spring(1e6)), "hold it at any rotation"),
     ],
 )
 def test_an_energy_that_is_not_known_is_refused_in_one_sentence(body, words):

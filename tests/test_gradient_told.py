@@ -361,7 +361,7 @@ def test_the_time_of_overturning_has_derivatives_though_the_peak_has_none() -> N
     [
         ("height", None, "of must be one of"),
         ("peak", 1.0, 'does not apply to a "peak"'),
-        ("rotation", None, "needs the time, at"),
+        ("rotation", None, "requires at, the time"),
         ("impact", 10_000, "at must be a whole number"),
         ("event", 0.5, "at must be a whole number"),
     ],

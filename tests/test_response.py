@@ -136,7 +136,7 @@ def test_a_stop_cuts_the_response_short(block, record, shaken):
         ({"duration": 0.0}, "duration"),
         ({"initial_rotation": 2.0}, "pi/2"),
         ({"chattering": AsymptoticTime()}, "sinusoidal"),
-        ({"model": "linear", "initial_rotation": 0.2, "motion": None}, "balances"),
+        ({"model": "linear", "initial_rotation": 0.2, "motion": None}, "balanced"),
     ],
 )
 def test_bad_options_are_refused_in_one_sentence(block, record, options, word):

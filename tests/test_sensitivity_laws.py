@@ -28,7 +28,7 @@ BODIES = {
 BY_SIDE = tuple(f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus"))
 
 #: What is proportional to p^2 where every moment over the moment of inertia is.
-WITH_P = ("stiffness", "threshold_slope", "prestress", "base_prestress", "spring", "damping", "tendon")
+WITH_P = ("stiffness", "threshold_slope", "prestress", "base_prestress", "spring", "damping", "tendon_stiffness")
 
 
 def change(made, name, nonlinear, strength):

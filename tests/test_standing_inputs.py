@@ -47,8 +47,8 @@ WRONG = {
     "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
     # Restraints
     "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is not a restraint; give Tendon, Spring"),
-    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them at once"),
-    "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "kg, beside its sizes"),
+    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them together"),
+    "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "requires its mass, kg"),
     "sizes of a wall without names": (
         lambda: Block.one_sided(0.4, 4.0), "width", "a block requires either half_width and half_height, or"
     ),
@@ -86,7 +86,7 @@ WRONG = {
     "two gravities": (
         lambda: rocking.simulate_many([held(), RestrainedBlock(Block(width=0.5, height=4.0, gravity=1.6))], PULSE),
         "gravity",
-        "all of them under the same gravity",
+        "the same gravity for all of them",
     ),
 }  # fmt: skip
 

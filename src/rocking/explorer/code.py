@@ -55,7 +55,7 @@ _QUANTITIES: Final = {
     return rests[0] - uplifts[0] if len(rests) else np.nan""",
     "peak": """\
     # Peak rotation over the slenderness, the smaller one of two; infinite where the block overturns.
-    slenderness = min(side.alpha for side in one_block(response.block).sides)
+    slenderness = min(side.alpha for side in response.block.sides)
     return np.inf if response.overturned else response.peak_rotation / slenderness""",
     "mode": """\
     # -4: overturns after a rest; -3: no uplift; -2: rests before the motion is over; -1: rocks; else overturns, and

@@ -216,7 +216,7 @@ def _target_peak(response: Response, at: float | None) -> _Target:
 def _target_state(response: Response, of: Quantity, at: float | None) -> _Target:
     """Create the target for the rotation or velocity at a time."""
     if at is None:
-        raise InvalidOption(f"a {of} requires the time {{}}, s", "at")
+        raise InvalidOption(f"a {of} requires {{}}, the time in s", "at")
     time = checks.between(at, "at", InvalidOption, 0.0, response.duration, "s")
     trail, history = response.solution.trail, response._history
     motion_state = history.states(time)
