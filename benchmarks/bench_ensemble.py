@@ -19,7 +19,7 @@ import numpy as np
 
 import rocking
 from rocking.core.constants import Model
-from rocking.engine.problem import ground_of, settings_of
+from rocking.engine.problem import build_settings, prepare_ground
 from rocking.engine.schemes import Certified
 from rocking.kernels import lanes, state
 
@@ -92,11 +92,11 @@ def vertical_times(model: Model, motion: rocking.Motion, blocks: rocking.Blocks)
 def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> None:
     """March every block to its end, as where lanes cannot be taken."""
     how = Certified()
-    ground = ground_of(motion, blocks.gravity)
+    ground = prepare_ground(motion, blocks.gravity)
     bodies = blocks.kernel_records(model, how.bounds(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
     whole = lanes.build_pool(bodies, states, len(ground.pieces) - 1, 1.0, 0)
-    lanes.march_blocks(ground, settings_of(blocks, model, how, None, record=False), state.new_scratch(), whole)
+    lanes.march_blocks(ground, build_settings(blocks, model, how, None, record=False), state.new_scratch(), whole)
 
 
 def shortest(work: Callable[[], object]) -> float:

@@ -227,7 +227,7 @@ def few_steps() -> Callable[[int], AbstractContextManager[None]]:
     @contextmanager
     def limited(steps: int) -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr("rocking.simulation.simulate.slices", lambda ground: 1)
+            patched.setattr("rocking.simulation.simulate.count_slices", lambda ground: 1)
             patched.setattr("rocking.simulation.simulate.SLICE", steps)
             yield
 

@@ -51,7 +51,7 @@ def test_a_block_whose_sides_differ_has_no_one_value_of_them():
     block = Block.from_pivots((0.2, 0.15), 0.6, 0.4, mass=100.0)
     for name in ("alpha", "p", "radius", "restitution"):
         plus, minus = (getattr(side, name) for side in block.sides)
-        with pytest.raises(InvalidBlock, match=rf"{name} is {plus:g} on side .* ask block.sides\[0\].{name}"):
+        with pytest.raises(InvalidBlock, match=rf"{name} is {plus:g} on side .* use block.sides\[0\].{name}"):
             getattr(block, name)
         assert plus != minus
         assert not hasattr(block, name)  # what looks at all attributes of an object passes these over

@@ -61,7 +61,7 @@ def test_the_response_of_a_ball_is_told_in_its_own_words():
     assert list(found.to_dataframe(dt=0.01).columns) == ["position_m", "velocity_m_s", "ground_acceleration_m_s2"]
     assert found.to_xarray()["position"].attrs["units"] == "m"
     assert [axes.get_ylabel() for axes in found.plot().axes] == ["position (m)", "ground\nacceleration\n(g)"]
-    with pytest.raises(InvalidOption, match="forces of the ground are not known of this body: bouncing ball"):
+    with pytest.raises(InvalidOption, match="ground forces of this body are unknown: bouncing ball"):
         found.normal_force(0.1)
     assert found.block == BALL
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking import Block, Motion, Response, simulate
-from rocking.response.mechanics import friction_demand
+from rocking.response.mechanics import compute_friction_demand
 
 GRAVITY = 9.80665
 COUNT, PARTS = 100, 5
@@ -205,7 +205,7 @@ def test_friction_is_sought_in_every_step_where_the_ground_hardly_presses() -> N
     assert not len(response.impacts)
     lowest = (np.arange(150) + 0.75 - 3.6 / (2.0 * np.pi)) / 4.0
     near = (lowest[lowest > 0.1, None] + np.linspace(-0.01, 0.01, 4001)).ravel()
-    seen = friction_demand(motion.acceleration(near) / GRAVITY, 1.0 + lift.acceleration(near) / GRAVITY).max()
+    seen = compute_friction_demand(motion.acceleration(near) / GRAVITY, 1.0 + lift.acceleration(near) / GRAVITY).max()
     assert seen * (1.0 - 1e-9) <= response.required_friction <= seen * (1.0 + 1e-5)
     assert np.isnan(response.sliding_time(response.required_friction))
     assert response.sliding_time(response.required_friction * (1.0 - 1e-6)) > 0.0

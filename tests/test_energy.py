@@ -10,7 +10,7 @@ from scipy.integrate import quad
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, simulate
 from rocking.errors import InvalidOption
-from rocking.response.figure import boundary_of, course_of
+from rocking.response.figure import compute_boundary, compute_course
 
 COLUMN = Block(width=0.4, height=2.0, mass=2000.0)
 BODIES = {
@@ -117,7 +117,7 @@ def test_the_boundary_is_where_the_energy_just_overturns(name, model):
     body = BODIES[name]
     response = simulate(body, None, model=model, initial_rotation=0.01, duration=1.0)
     energy, judged = response._energy, 0
-    x, y = boundary_of(response)
+    x, y = compute_boundary(response)
     for sign, side in ((1.0, 0), (-1.0, 1)):
         here = (sign * x > 0.0) & (sign * x < 1.0)
         if not here.any():
@@ -125,10 +125,10 @@ def test_the_boundary_is_where_the_energy_just_overturns(name, model):
         balance, p = energy.balance[side], energy.p[side]
         sides = np.full(here.sum(), side)
         found = energy.kinetic(y[here] * p * balance, sides) + energy.potential(x[here] * balance, sides)
-        np.testing.assert_allclose(found, energy.needed[side], rtol=1e-12)
+        np.testing.assert_allclose(found, energy.overturning_energy[side], rtol=1e-12)
         judged += here.sum()
     assert judged > 200
-    assert min(energy.needed) == 1.0
+    assert min(energy.overturning_energy) == 1.0
     # Released a little within it, a block comes back; a little beyond it, it falls.
     for factor, falls in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
         found = simulate(
@@ -139,7 +139,7 @@ def test_the_boundary_is_where_the_energy_just_overturns(name, model):
 
 
 def _outward(energy):
-    u, speed = energy.boundary(0)
+    u, speed = energy.compute_boundary(0)
     within = u <= 1.0
     return u[within] * energy.balance[0], speed[within] * energy.p[0] * energy.balance[0]
 
@@ -147,20 +147,22 @@ def _outward(energy):
 def test_a_course_jumps_at_impacts_and_nowhere_else():
     record = rocking.records.load("ridgecrest-clc-090")
     response = simulate(BODIES["two sides"], record.scaled_to(4.0, "pga"))
-    course = course_of(response, 230.0, 236.0)
+    course = compute_course(response, 230.0, 236.0)
     impacts = response.impacts[(response.impacts["time"] >= 230.0) & (response.impacts["time"] <= 236.0)]
-    assert len(course.before) == len(impacts) > 30
-    np.testing.assert_array_equal(course.time[course.before], impacts["time"])
-    np.testing.assert_array_equal(course.time[course.before + 1], impacts["time"])
-    drops = (course.kinetic + course.potential)[course.before] - (course.kinetic + course.potential)[course.before + 1]
+    assert len(course.impact_rows) == len(impacts) > 30
+    np.testing.assert_array_equal(course.time[course.impact_rows], impacts["time"])
+    np.testing.assert_array_equal(course.time[course.impact_rows + 1], impacts["time"])
+    drops = (course.kinetic + course.potential)[course.impact_rows] - (course.kinetic + course.potential)[
+        course.impact_rows + 1
+    ]
     inside = np.isin(response.impacts["time"], impacts["time"])
     np.testing.assert_allclose(drops, response.impact_losses[inside], rtol=1e-12)
-    assert (course.rotation[course.before] == 0.0).all()
-    smooth = np.delete(np.arange(len(course.time)), np.union1d(course.before, course.before + 1))
+    assert (course.rotation[course.impact_rows] == 0.0).all()
+    smooth = np.delete(np.arange(len(course.time)), np.union1d(course.impact_rows, course.impact_rows + 1))
     theta = response.rotation(course.time[smooth])
     alpha = np.where(theta >= 0.0, *[side.alpha for side in response.block.sides])
     np.testing.assert_array_equal(course.rotation[smooth], theta / alpha)
-    assert np.isnan(course.parted(course.velocity)[course.before + 1 + np.arange(len(impacts))]).all()
+    assert np.isnan(course.insert_gaps(course.velocity)[course.impact_rows + 1 + np.arange(len(impacts))]).all()
 
 
 @pytest.mark.parametrize("model", ["nonlinear", "linear"])
@@ -169,14 +171,14 @@ def test_a_phase_plane_counts_in_radians_where_a_side_has_no_balance(model):
     response = simulate(body, rocking.pulses.one_sine(4.5, 1.0), model=model)
     balance = response.balance[0]
     assert math.isfinite(balance) and response.balance[1] == math.inf
-    course = course_of(response, 0.0, response.duration)
-    smooth = np.delete(np.arange(len(course.time)), np.union1d(course.before, course.before + 1))
+    course = compute_course(response, 0.0, response.duration)
+    smooth = np.delete(np.arange(len(course.time)), np.union1d(course.impact_rows, course.impact_rows + 1))
     times = course.time[smooth]
     np.testing.assert_array_equal(course.rotation[smooth], response.rotation(times))
     sides = [side.p for side in body.sides]
     assert course.rotation.min() < -0.04
     np.testing.assert_allclose(course.velocity[smooth] * sides[0], response.angular_velocity(times), rtol=1e-12)
-    x, y = boundary_of(response)
+    x, y = compute_boundary(response)
     crossing = np.flatnonzero(np.abs(x - balance) < 1e-12)
     assert crossing.size == 2 and np.max(np.abs(y[crossing])) < 1e-7
     axes = response.plot_phase_plane().axes[0]
@@ -186,8 +188,8 @@ def test_a_phase_plane_counts_in_radians_where_a_side_has_no_balance(model):
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        (RestrainedBlock(COLUMN, Tendon(2e5, 1e3, strength=3e3)), "a tendon that yields keeps no energy"),
-        (RestrainedBlock(COLUMN, Spring(1e6)), "hold it back at any rotation"),
+        (RestrainedBlock(COLUMN, Tendon(2e5, 1e3, strength=3e3)), "not defined for a yielding tendon"),
+        (RestrainedBlock(COLUMN, Spring(1e6)), "hold it at any rotation"),
     ],
 )
 def test_an_energy_that_is_not_known_is_refused_in_one_sentence(body, words):
@@ -200,5 +202,5 @@ def test_an_energy_that_is_not_known_is_refused_in_one_sentence(body, words):
 def test_a_ball_has_no_energy_that_overturns_it():
     ball = rocking.dynamics.BouncingBall(restitution=0.8)
     response = rocking.dynamics.simulate(ball, None, initial_position=1.0)
-    with pytest.raises(InvalidOption, match="known of blocks alone, not of a BouncingBall"):
+    with pytest.raises(InvalidOption, match="defined for blocks only, not for a BouncingBall"):
         response.potential_energy(0.1)

@@ -122,7 +122,7 @@ def test_nothing_to_simulate_is_refused(records):
         simulate_many(Block(half_width=0.2, half_height=1.0), [])
     with pytest.raises(InvalidBlock, match="at least one"):
         simulate_many([], records[0])
-    with pytest.raises(InvalidOption, match="give duration to say when to stop"):
+    with pytest.raises(InvalidOption, match="give duration to limit the simulation"):
         simulate_many(Blocks(p=[1.0, 2.0], alpha=0.1, restitution=[0.9, 1.0]), records[0])
 
 

@@ -8,7 +8,7 @@ from oracles.problem import Problem
 
 import rocking
 from rocking import Blocks, Motion, simulate, simulate_many
-from rocking.engine.problem import ground_of
+from rocking.engine.problem import prepare_ground
 from rocking.kernels.ground import component_coefficients
 from rocking.simulation import ensemble
 from rocking.simulation.ensemble import Scales
@@ -70,7 +70,7 @@ def test_a_motion_times_a_factor_is_laid_out_as_the_scaled_motion(
         for ends, degree, error in zip((along, up), (2, 1), errors or (3e-3, 0.0), strict=True)
     )
     motion = horizontal if errors is None else horizontal.with_vertical(vertical)
-    found, expected = ground_of(motion, GRAVITY, factor), ground_of(motion.scaled(factor), GRAVITY)
+    found, expected = prepare_ground(motion, GRAVITY, factor), prepare_ground(motion.scaled(factor), GRAVITY)
     assert found.error == pytest.approx(max(errors or (3e-3,)) * abs(factor) / GRAVITY, rel=1e-15)
     assert found.error == pytest.approx(expected.error, rel=1e-15)
     assert (found.columns, found.first) == (expected.columns, expected.first)
@@ -78,7 +78,7 @@ def test_a_motion_times_a_factor_is_laid_out_as_the_scaled_motion(
     assert_allclose(found.stretches, expected.stretches, rtol=1e-13, atol=1e-14)
     if errors is not None:
         (_, lifts), (_, as_it_is) = (
-            component_coefficients(each, np.arange(30)) for each in (found, ground_of(motion, GRAVITY))
+            component_coefficients(each, np.arange(30)) for each in (found, prepare_ground(motion, GRAVITY))
         )
         assert np.abs(as_it_is).max() > 0.1
         assert_allclose(lifts, abs(factor) * as_it_is, rtol=1e-14)

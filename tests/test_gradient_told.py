@@ -360,8 +360,8 @@ def test_the_time_of_overturning_has_derivatives_though_the_peak_has_none() -> N
     ("of", "at", "match"),
     [
         ("height", None, "of must be one of"),
-        ("peak", 1.0, '"peak" is where it is'),
-        ("rotation", None, "needs the time, at"),
+        ("peak", 1.0, 'does not apply to a "peak"'),
+        ("rotation", None, "requires at, the time"),
         ("impact", 10_000, "at must be a whole number"),
         ("event", 0.5, "at must be a whole number"),
     ],

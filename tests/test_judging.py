@@ -201,7 +201,7 @@ def test_what_is_no_outcome_is_no_test(given, sentence):
         ({"weights": [1.0, 2.0]}, "weights must be 1 numbers of 0 or more"),
         ({"outlier_probability": 0.7}, "outlier_probability must be a number from 0 to 0.5"),
         ({"simulations": 3}, "simulations must be a whole number of at least 100"),
-        ({"blocks": rocking.dynamics.BouncingBall(0.9)}, "this is known of blocks alone"),
+        ({"blocks": rocking.dynamics.BouncingBall(0.9)}, "slenderness is defined for blocks only"),
     ],
 )
 def test_what_cannot_be_judged_is_refused_in_a_sentence(change, sentence):

@@ -11,7 +11,7 @@ import pytest
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, dynamics, simulate
 from rocking.errors import InvalidOption
-from rocking.response import factors_near, steps_within
+from rocking.response import choose_steps, list_factors
 
 FREE = Block(width=0.24, height=1.1)
 LEANING = Block.from_parameters(p=(2.0, 2.5), alpha=(0.15, 0.25), restitution=(0.9, 0.8))
@@ -55,7 +55,7 @@ def test_each_repeat_is_the_simulation_of_the_scaled_motion_and_initial_state(bo
     found = response.perturbed(1e-4, 7)
     assert (
         found.factors.tolist()
-        == factors_near(1e-4, 7)
+        == list_factors(1e-4, 7)
         == [1 - 5e-4, 1 - 3e-4, 1 - 1e-4, 1, 1 + 1e-4, 1 + 3e-4, 1 + 5e-4]
     )
     for repeat in found.repeats:
@@ -115,7 +115,7 @@ def test_a_robust_ensemble_counts_every_body_motion_level_and_polarity(polarity)
     blocks, motions = rocking.Blocks.from_bodies([FREE, LEANING]), {"a": RECORD, "b": SHAKEN}
     options = {"levels": [1.0, 1.4], "polarity": polarity}
     found = rocking.simulate_many(blocks, motions, robust=True, **options)
-    near = [rocking.simulate_many(blocks, motions, **options | {"levels": [f, 1.4 * f]}) for f in factors_near(1e-6, 5)]
+    near = [rocking.simulate_many(blocks, motions, **options | {"levels": [f, 1.4 * f]}) for f in list_factors(1e-6, 5)]
     shares = np.mean([each.overturned.values for each in near], axis=0)
     assert found.overturned_share.dims == found.overturned.dims and np.array_equal(
         found.overturned_share.values, shares
@@ -127,7 +127,7 @@ def test_a_summary_counts_outcomes_in_both_ranges_and_takes_the_precision_that_i
     response = simulate(FREE, UNDECIDED.scaled(0.9))
     assert re.search(r"^outcome +(undecided: )?\w+ in \d of 5 motions within 3e-6", response.summary(), re.MULTILINE)
     for precision, text in ((1e-3, "0.1 %"), (0.05, "5 %"), (2e-6, "2e-6")):
-        found = response.perturbed(*steps_within(precision))
+        found = response.perturbed(*choose_steps(precision))
         assert found.within == pytest.approx(precision, rel=1e-12)
         last = response.summary(precision=precision).splitlines()[-1]
         assert last == f"{'':20}{found.share()}" and last.endswith(f" of 11 motions within {text}")

@@ -136,7 +136,7 @@ def test_a_stop_cuts_the_response_short(block, record, shaken):
         ({"duration": 0.0}, "duration"),
         ({"initial_rotation": 2.0}, "pi/2"),
         ({"chattering": AsymptoticTime()}, "sinusoidal"),
-        ({"model": "linear", "initial_rotation": 0.2, "motion": None}, "balances"),
+        ({"model": "linear", "initial_rotation": 0.2, "motion": None}, "balanced"),
     ],
 )
 def test_bad_options_are_refused_in_one_sentence(block, record, options, word):
@@ -146,7 +146,7 @@ def test_bad_options_are_refused_in_one_sentence(block, record, options, word):
 
 def test_a_block_that_never_rests_needs_a_duration(block):
     bouncing = Block.from_parameters(p=1.0, alpha=0.2, restitution=1.0)
-    with pytest.raises(InvalidOption, match="give duration to say when to stop"):
+    with pytest.raises(InvalidOption, match="give duration to limit the simulation"):
         simulate(bouncing, None, initial_rotation=0.1)
     response = simulate(bouncing, None, initial_rotation=0.1, duration=20.0)
     assert response.duration == 20.0

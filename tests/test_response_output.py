@@ -15,7 +15,7 @@ from rocking.analysis.survey import survey
 from rocking.core.tables import add_unit
 from rocking.errors import InvalidOption, OutputError
 from rocking.explorer.simulated import describe_outcome
-from rocking.response.summary import known_ratio, time_text
+from rocking.response.summary import format_time, round_ratio
 from rocking.rules import Check
 
 TABLES = {
@@ -67,7 +67,7 @@ def test_a_summary_is_its_rows(shaken):
 )
 def test_a_time_has_the_digits_that_repeated_simulations_leave(below, above, text):
     time = 230.7262443771
-    assert time_text(time, time - below, time + above) == text
+    assert format_time(time, time - below, time + above) == text
 
 
 def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():
@@ -263,10 +263,10 @@ def test_one_case_has_one_peak_in_every_output(pga):
         assert low == shown
     else:  # fewer than three digits are known
         assert len(shown) <= 4 and float(low) - 0.05 <= float(shown) <= float(high) + 0.05
-    assert known_ratio(response) == pytest.approx(float(shown), abs=5.1e-5)
+    assert round_ratio(response) == pytest.approx(float(shown), abs=5.1e-5)
     told = describe_outcome(response, block.uplift_thresholds())
     if response.perturbed().is_decided:
-        assert told["values"]["share"]["values"]["value"] == 100.0 * known_ratio(response)
+        assert told["values"]["share"]["values"]["value"] == 100.0 * round_ratio(response)
     else:
         assert told["phrase"] == "verdict.undecided"
     checked = Check(block, ("x",), (response,), ({},), (0.5,)).summary()

@@ -192,7 +192,7 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
         (lambda: Restitution((0.95, 0.4), (0.9, 0.5), seed=1), "minimum must be above 0 and at most maximum, 0.4"),
         (lambda: Restitution(0.9, 0.5), "a restitution that varies needs a slope or a seed"),
         (lambda: Restitution(0.95, 0.9, seed=1.5), "seed must be a whole number"),
-        (lambda: Restitution(0.95, 0.9, slope=0.1, seed=1), "either falls or is drawn: give a slope or a seed"),
+        (lambda: Restitution(0.95, 0.9, slope=0.1, seed=1), "has either a slope or a seed"),
         (lambda: impact_restitution(), "either alpha of a rectangular block, or"),
         (lambda: impact_restitution(0.2, height=1.0), "either alpha of a rectangular block, or"),
         (lambda: impact_restitution(0.2, contact=1.5), "contact must be"),

@@ -176,10 +176,10 @@ def test_a_tendon_that_has_yielded_leaves_the_block_free():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Tendon(0.0), "a tendon needs stiffness"),
+        (lambda: Tendon(0.0), "a tendon requires stiffness"),
         (lambda: Tendon(1e5, prestress=-3.0), "prestress of a tendon must be at least 0 N, not -3"),
         (lambda: Tendon(1e5, prestress=5e3, strength=4e3), "must be above its prestress"),
-        (lambda: Tendon(0.0, prestress=5e3, strength=6e3), "that yields needs a stiffness"),
+        (lambda: Tendon(0.0, prestress=5e3, strength=6e3), "a yielding tendon requires a stiffness"),
         (lambda: Thrust(0.0, 2.0), "must not be zero"),
         (lambda: RestrainedBlock(0.4), "a free Block is needed"),
         # Its moment about the pivot is that of the weight: the quotient is zero to the last bit.
@@ -205,7 +205,7 @@ def test_a_wall_too_stocky_for_angular_momentum_rocks_one_way_with_a_restitution
     wall = Block.one_sided(width=3.0, height=2.0, restitution=restitution)
     assert wall.is_one_sided and wall.sides[0].restitution == 0.4 and wall.balance[1] == math.inf
     assert wall.sides[0].alpha == pytest.approx(math.atan(1.5), rel=1e-15)
-    for wrong, says in ((1.2, "restitution must be in"), ((0.4, 0.5), "is one number, not a pair")):
+    for wrong, says in ((1.2, "restitution must be in"), ((0.4, 0.5), "must be a number, not a pair")):
         with pytest.raises(InvalidBlock, match=says):
             Block.one_sided(width=3.0, height=2.0, restitution=wrong)
 

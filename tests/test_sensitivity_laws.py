@@ -95,7 +95,7 @@ def test_rotations_impacts_and_uplifts_change_with_everything_as_differences_say
         names = [each for each in BY_SIDE if name != "yielding tendon" or not each.startswith("alpha")]
         names = ("motion", *names)
         changes = found.sensitivity.rotation(times, of=names)
-        _, by_impact, by_event = found.sensitivity._along(names)
+        _, by_impact, by_event = found.sensitivity._compute_changes(names)
         uplifts = np.flatnonzero(found.events["kind"] == "uplift")[:2]
         for k, of in enumerate(names):
             more, less = (simulated(strength, of) for strength in (h, -h))

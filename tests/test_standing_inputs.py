@@ -46,27 +46,27 @@ WRONG = {
     ),
     "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
     # Restraints
-    "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is no restraint: give Tendon, Spring"),
-    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them at once"),
-    "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "kg, beside its sizes"),
+    "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is not a restraint; give Tendon, Spring"),
+    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them together"),
+    "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "requires its mass, kg"),
     "sizes of a wall without names": (
-        lambda: Block.one_sided(0.4, 4.0), "width", "a block takes either half_width and half_height, or"
+        lambda: Block.one_sided(0.4, 4.0), "width", "a block requires either half_width and half_height, or"
     ),
     "a tendon beyond": (
         lambda: held(Tendon(1e5, offset=2.0)), "offset", "beyond the pivot, which is 0.25 m from the centre of mass"
     ),
     "a thrust below the ground": (lambda: Thrust(9.0, -1.0), "height", "positive number, in m, not -1"),
     "a thrust in kN for N": (
-        lambda: held(Thrust(2e6, 3.0)), "", "a smaller thrust, load or lean lets it; forces are in N, masses in kg"
+        lambda: held(Thrust(2e6, 3.0)), "", "reduce the thrust, load or lean; forces are in N, masses in kg"
     ),
     "a load outside": (
-        lambda: held(Load(1e5, 4.0, offset=1.0)), "offset", "0.702 m beyond its pivot, so that it falls: give"
+        lambda: held(Load(1e5, 4.0, offset=1.0)), "offset", "0.702 m beyond its pivot; reduce"
     ),
     "a pair for one side": (
-        lambda: held(one_sided=True, restitution=(0.4, 0.5)), "restitution", "rocks one way is one number, not a pair"
+        lambda: held(one_sided=True, restitution=(0.4, 0.5)), "restitution", "must be a number, not a pair"
     ),
     "a lean in degrees": (
-        lambda: held(lean=2.0), "lean", "0.1244 rad it stands; if it is in degrees, give math.radians(2)"
+        lambda: held(lean=2.0), "lean", "for the block to stand, not 2; if it is in degrees, give math.radians(2)"
     ),
     "a start behind a wall": (
         lambda: rocking.simulate(held(one_sided=True), None, initial_rotation=-0.1),
@@ -86,7 +86,7 @@ WRONG = {
     "two gravities": (
         lambda: rocking.simulate_many([held(), RestrainedBlock(Block(width=0.5, height=4.0, gravity=1.6))], PULSE),
         "gravity",
-        "all of them under the same gravity",
+        "the same gravity for all of them",
     ),
 }  # fmt: skip
 

@@ -156,8 +156,8 @@ records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 |
 [motions] -> [motions]\nskip_unreadable = "no" | 7 | must be true or false
 [motions] -> [motions]\nvertical = "9" | 8 | no file or shipped record '9' for the vertical motion
 [blocks] -> [[blocks]] | 1 | must be one table, [blocks], once
-mass = 5000\n ->  | 1 | needs its mass, kg
-width = [0.5, 0.6]\nheight = 4.0\nmass = 5000\n -> p = 2\nalpha = 0.1\n | 1 | needs its mass
+mass = 5000\n ->  | 1 | requires its mass, kg
+width = [0.5, 0.6]\nheight = 4.0\nmass = 5000\n -> p = 2\nalpha = 0.1\n | 1 | requires its mass
 one_sided = true -> one_sided = 1 | 5 | one_sided must be true or false
 [[blocks.thrusts]] -> [[blocks.thrust]] | 10 | no thrust; did you mean thrusts
 [[blocks.thrusts]] -> [blocks.thrusts] | 10 | thrusts must be tables, [[blocks.thrusts]]

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Placeholder of an argument's name in a template, or an escaped "{}" from `literal`.
-_PLACE: Final = re.compile(r"\{\{\}\}|\{\}")
+_PLACEHOLDER: Final = re.compile(r"\{\{\}\}|\{\}")
 
 #: Message of a command after Ctrl-C.
-INTERRUPTED: Final = "rocking: this was interrupted; every file that it wrote is whole"
+INTERRUPTED: Final = "rocking: Interrupted. All files written are complete."
 
 #: Longest path or word that a message shows completely, in characters.
 _LONGEST_WORD: Final = 400
@@ -27,23 +27,23 @@ _LONGEST_WORD: Final = 400
 Spelling = Callable[[str], str]
 
 
-def as_argument(name: str) -> str:
+def spell_argument(name: str) -> str:
     """Return the name of an argument as in Python."""
     return name
 
 
-def _shortened(text: str) -> str:
+def _shorten(text: str) -> str:
     """Shorten a long word to its ends."""
     half = _LONGEST_WORD // 2
     return text if len(text) <= _LONGEST_WORD else f"{text[:half]}...{text[-half:]}"
 
 
-def literal(text: str) -> str:
+def escape_braces(text: str) -> str:
     """Escape each "{}" in a text for use in a template."""
     return text.replace("{}", "{{}}")
 
 
-def install(part: str) -> str:
+def describe_install(part: str) -> str:
     """Return instructions to install the optional packages of a part."""
     return f"run pip install '.[{part}]' in the source folder of rocking"
 
@@ -63,11 +63,11 @@ class Message:
     template: str
     arguments: tuple[str, ...] = ()
 
-    def text(self, spelling: Spelling = as_argument) -> str:
+    def text(self, spelling: Spelling = spell_argument) -> str:
         """Return the sentence in one line, with names as written by ``spelling``."""
         names = map(spelling, self.arguments)
-        sentence = _PLACE.sub(lambda place: "{}" if place[0] == "{{}}" else next(names, "{}"), self.template)
-        return " ".join(map(_shortened, sentence.split()))
+        sentence = _PLACEHOLDER.sub(lambda match: "{}" if match[0] == "{{}}" else next(names, "{}"), self.template)
+        return " ".join(map(_shorten, sentence.split()))
 
     def __str__(self) -> str:
         return self.text()
@@ -113,13 +113,13 @@ class RockingError(Exception):
         """Name of the invalid argument, if the message contains one."""
         return self.message.arguments[0] if self.message.arguments else None
 
-    def text(self, spelling: Spelling = as_argument) -> str:
+    def text(self, spelling: Spelling = spell_argument) -> str:
         """Return file, line and sentence in one line, with names as written by ``spelling``."""
         if self.path is None:
             return self.message.text(spelling)
-        path = _shortened(self.path)
-        where = path if self.line is None else f"{path}, line {self.line}"
-        return f"{where}: {self.message.text(spelling)}"
+        path = _shorten(self.path)
+        location = path if self.line is None else f"{path}, line {self.line}"
+        return f"{location}: {self.message.text(spelling)}"
 
     def __str__(self) -> str:
         return self.text()

@@ -17,7 +17,7 @@ import numpy as np
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import compute_intensities
 from rocking.analysis.survey import Check
-from rocking.block import Block, Blocks, one_block
+from rocking.block import Block, Blocks, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
@@ -139,7 +139,7 @@ def _combine_free_blocks(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
     """Combine blocks, or raise an error if they have restraints."""
     combined = Blocks.from_bodies(blocks)
     for block in combined if combined.terms else ():
-        one_block(block)
+        require_block(block)
     return combined
 
 

@@ -18,7 +18,7 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.schemes import ChatteringScheme
-from rocking.engine.tasks import missing_text
+from rocking.engine.tasks import describe_missing
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
@@ -146,7 +146,7 @@ def response_rose(
             {
                 "pair": [*named_pairs],
                 "level": variable(
-                    "level", scales.values, "of the geometric mean of both components", scales.about["units"]
+                    "level", scales.values, "of the geometric mean of both components", scales.attributes["units"]
                 ),
                 "azimuth": variable("azimuth", angles, "clockwise from north", "deg"),
             },
@@ -201,7 +201,7 @@ class ResponseRose(DatasetResult):
             )
             rows.append([name, shares.min(), shares.max(), azimuth_text, float(data.anywhere[k])])
         table = format_table(["level", "least share", "largest share", "at", "at any azimuth"], rows)
-        missing = missing_text(np.isnan(data.peak_over_slenderness.values))
+        missing = describe_missing(np.isnan(data.peak_over_slenderness.values))
         return f"{self._headline()}\n\n{table}" + f"\nnote: {missing}" * bool(missing)
 
     def to_dict(self) -> dict[str, Any]:

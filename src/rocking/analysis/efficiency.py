@@ -27,7 +27,7 @@ from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import escape_dollars, format_count, format_table
-from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.records.named import Motions, list_motions
@@ -104,8 +104,8 @@ def compare_measures(
     >>> [f"{name} {beta:.2f}" for name, beta in zip(comparison.data.measure.values, comparison.data.dispersion.values)]
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
     """
-    bodies, motions = bodies_of(blocks), list_motions(motions)
-    slenderness_of(bodies)  # raise errors before the simulations
+    bodies, motions = gather_bodies(blocks), list_motions(motions)
+    compute_slenderness(bodies)  # raise errors before the simulations
     block_weights = normalise_weights(weights, len(bodies))
     if len(motions) < 2:
         raise InvalidOption("{} must contain two motions or more for a comparison of measures; got one", "motions")

@@ -49,9 +49,9 @@ from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.progress import spell
 from rocking.core.result import Result
 from rocking.core.tables import Column, escape_dollars, format_count, format_table, write_text
-from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.engine.tasks import Setup, missing_text
+from rocking.engine.tasks import Setup, describe_missing
 from rocking.errors import InvalidOption, Message, Unfitted
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, list_motions
@@ -300,7 +300,7 @@ class Fragility(Result):
             OpenQuake, or the dispersion is too wide. `OutputError` if the file cannot be written.
         """
         if block is not None:
-            bodies_of(block)
+            gather_bodies(block)
         unit_block = self.block if block is None else block
         imt = find_openquake_measure(self.measure, unit_block, self.model)
         no_damage = None
@@ -399,8 +399,8 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    bodies, measure = bodies_of(blocks), Measure.parse(measure)
-    slenderness = slenderness_of(bodies)
+    bodies, measure = gather_bodies(blocks), Measure.parse(measure)
+    slenderness = compute_slenderness(bodies)
     block_weights = normalise_positive_weights(weights, len(bodies))
     mirrored = checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and bodies.is_symmetric
     checks.fraction(confidence, "confidence", InvalidOption)
@@ -460,7 +460,7 @@ def fragility(
         several_blocks=bool(np.count_nonzero(block_weights) > 1),
         source="motion" if clusters is None else "cluster",
         undecided=describe_undecided(setup, motions, factors, table.overturned.values),
-        missing=missing_text(missing),
+        missing=describe_missing(missing),
     )
 
 

@@ -29,9 +29,9 @@ from rocking.core.bisection import bisect
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
 from rocking.core.tables import add_unit, escape_dollars, format_count, format_table
-from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thresholds_of
+from rocking.engine.problem import compute_slenderness, compute_thresholds, gather_bodies, never_rests
 from rocking.engine.schemes import Certified
-from rocking.engine.tasks import Setup, missing_text, simulate_each
+from rocking.engine.tasks import Setup, describe_missing, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
@@ -116,8 +116,8 @@ def incremental_dynamic_analysis(
     >>> incremental_dynamic_analysis(block, pulse, measure="pga_ratio").data.band_start.values.round(4).tolist()
     [2.9855, 7.2759]
     """
-    bodies, measure, motion_list = bodies_of(blocks), Measure.parse(measure), list_motions(motions)
-    slenderness = slenderness_of(bodies)
+    bodies, measure, motion_list = gather_bodies(blocks), Measure.parse(measure), list_motions(motions)
+    slenderness = compute_slenderness(bodies)
     values = compute_intensities(motion_list, measure)
     if never_rests(bodies):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
@@ -231,7 +231,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         headline = f"{blocks}, {data.model} model; {data.level.label} that overturns"
         notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
         notes.append(f"note: {data.undecided}")
-        notes += [f"note: {text}"] if (text := missing_text(np.isnan(data.peak_over_alpha.values))) else []
+        notes += [f"note: {text}"] if (text := describe_missing(np.isnan(data.peak_over_alpha.values))) else []
         return "\n".join([headline, level_description.summary(data.lowest_uplift), "", table, *notes])
 
     def to_dict(self) -> dict[str, Any]:
@@ -292,7 +292,7 @@ def _find_lowest_uplift(
     blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model
 ) -> float:
     """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""
-    thresholds, weight_thresholds = thresholds_of(blocks, model)
+    thresholds, weight_thresholds = compute_thresholds(blocks, model)
     factors = np.array(
         [compute_uplift_factors(motion, thresholds, blocks.gravity, weight_thresholds) for motion in motions]
     )

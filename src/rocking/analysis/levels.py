@@ -17,14 +17,14 @@ from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.core.tables import format_count
-from rocking.engine.problem import bodies_of
-from rocking.engine.tasks import Setup, Task, missing_text, simulate_tasks
+from rocking.engine.problem import gather_bodies
+from rocking.engine.tasks import Setup, Task, describe_missing, simulate_tasks
 from rocking.errors import InvalidOption, Message
 from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, compose_label
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.response import COUNT, RELATIVE, factors_near, percent
+from rocking.response import COUNT, RELATIVE, format_percent, list_factors
 from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def describe_blocks(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Describe a block by its sizes or parameters, several by their number."""
     block = find_single_block(blocks)
     if block is None:
-        return format_count(len(bodies_of(blocks)), "block")
+        return format_count(len(gather_bodies(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
         return block.description
     return f"block with p = {_format_sides(blocks.p[0])} rad/s, alpha = {_format_sides(blocks.alpha[0])} rad"
@@ -288,7 +288,7 @@ def describe_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
 
 def note_missing(unfinished: Flags) -> None:
     """Report abandoned simulations, which count as half overturned."""
-    if text := missing_text(unfinished):
+    if text := describe_missing(unfinished):
         note(f"{text}, and each counts as half overturned")
 
 
@@ -300,7 +300,7 @@ def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLi
     indices = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
     _, motion, block, _ = np.unravel_index(indices, overturned.shape)
     factor, original = np.broadcast_to(factors, overturned.shape).ravel()[indices], overturned.ravel()[indices]
-    scales = factors_near(RELATIVE, COUNT)
+    scales = list_factors(RELATIVE, COUNT)
     tasks = (
         Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
         for k, (m, b) in enumerate(zip(motion, block, strict=True))
@@ -309,7 +309,7 @@ def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLi
     results = simulate_tasks(setup, tasks)
     changed = {task.key for task, outcomes in results if outcomes["overturned"][0] != original[task.key[0]]}
     sample = format_count(len(indices), "outcome")
-    return f"undecided within {percent(scales[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
+    return f"undecided within {format_percent(scales[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
 
 
 @dataclass(frozen=True, eq=False)

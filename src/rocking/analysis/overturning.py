@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.analysis.levels import Boundaries, find_boundaries
-from rocking.block import Block, Blocks, one_block
+from rocking.block import Block, Blocks, require_block
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import VERSION, Model
@@ -21,7 +21,7 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import add_unit, columns_to_records, escape_dollars, format_cell, format_table
 from rocking.engine.schemes import Certified
-from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
+from rocking.engine.tasks import OUTCOME, Setup, describe_missing, simulate_each
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.inputs.pulses import find_family
 from rocking.motion.motion import Motion
@@ -154,7 +154,7 @@ def overturning_map(
     ratios = checks.increasing_numbers(frequencies, "frequencies", InvalidOption)
     checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
     relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
-    one_block(block)
+    require_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption(
             "a block with {} 1 never comes to rest; an overturning map needs one below 1", "restitution"
@@ -299,7 +299,7 @@ class OverturningMap(DatasetResult):
                 format_some_rows(["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"], rows),
                 *(
                     [f"note: {missing}"]
-                    if (missing := missing_text(self.data.mode.values == OverturningMode.UNFINISHED))
+                    if (missing := describe_missing(self.data.mode.values == OverturningMode.UNFINISHED))
                     else []
                 ),
             ]

@@ -19,16 +19,16 @@ from rocking.analysis.levels import (
     split_curves,
 )
 from rocking.block import Blocks
-from rocking.block.bodies import rates_of
+from rocking.block.bodies import resolve_p
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import add_unit, escape_dollars
-from rocking.engine.problem import bodies_of
+from rocking.engine.problem import gather_bodies
 from rocking.engine.schemes import ChatteringScheme
-from rocking.engine.tasks import missing_text
+from rocking.engine.tasks import describe_missing
 from rocking.errors import InvalidOption
 from rocking.records.named import Motions, list_motions
 from rocking.simulation.ensemble import simulate_many
@@ -122,7 +122,7 @@ def rocking_spectrum(
     values = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
     shares = np.array([checks.fraction(value, "each of fractiles", InvalidOption) for value in values])
     options: dict[str, Any] = {"model": model, "chattering": chattering}
-    bodies, motions = bodies_of(blocks), list_motions(motions)
+    bodies, motions = gather_bodies(blocks), list_motions(motions)
     if not isinstance(bodies, Blocks):
         raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {bodies.kind}")
     if (axes := bodies.axes) is not None and p is None and size is None and weights is None:
@@ -141,7 +141,7 @@ def rocking_spectrum(
     median = float(compute_weighted_fractiles(bodies.p.mean(axis=1), weight, _MEDIAN_SHARE)[0])
     p_values = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
-        p_values = checks.positive_numbers(rates_of(p, size, bodies.gravity), "p", InvalidOption)
+        p_values = checks.positive_numbers(resolve_p(p, size, bodies.gravity), "p", InvalidOption)
     count, n = len(p_values), len(bodies)
     checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, InvalidOption)
     resized = bodies.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(p_values / median, n))
@@ -238,7 +238,7 @@ class RockingSpectrum(DatasetResult):
                 for j in range(self.data.sizes["p"])
             ]
             parts.append(f"{title}\n{format_some_rows(header, rows)}")
-        missing = missing_text(np.isnan(self.data.peak_over_alpha.values))
+        missing = describe_missing(np.isnan(self.data.peak_over_alpha.values))
         return "\n\n".join(parts + [f"note: {missing}"] * bool(missing))
 
     def to_dict(self) -> dict[str, Any]:

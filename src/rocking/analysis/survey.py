@@ -15,13 +15,13 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.progress import Progress
 from rocking.core.result import Result
 from rocking.core.tables import Column, add_unit, format_count, format_table, records_to_columns, round_decimal
-from rocking.engine.problem import one_body
+from rocking.engine.problem import require_body
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
-from rocking.response import PRECISION, Response, in_brief, known_ratio, ratio_text, steps_within
-from rocking.response.mechanics import friction_coefficient
-from rocking.simulation.ensemble import body_coordinates, verticals_of
+from rocking.response import PRECISION, Response, choose_steps, format_brief_outcome, format_ratio, round_ratio
+from rocking.response.mechanics import check_friction
+from rocking.simulation.ensemble import body_coordinates, collect_verticals
 from rocking.simulation.simulate import simulate
 
 #: Columns of the printed table. Files contain all columns.
@@ -101,7 +101,7 @@ class Survey(BlockUnderRecords):
 
     def summary(self) -> str:
         limit = self.block.coordinate.limit
-        ratio_columns = [{f"peak_over_{limit}": float(ratio_text(response))} for response in self.responses]
+        ratio_columns = [{f"peak_over_{limit}": float(format_ratio(response))} for response in self.responses]
         rows = [row | ratio_column for row, ratio_column in zip(self.rows(), ratio_columns, strict=True)]
         titles = {name.format(limit): title.format(limit) for name, title in _TABLE_COLUMNS.items()}
         if self.friction is not None:
@@ -169,7 +169,7 @@ class Check(BlockUnderRecords):
                 "peak_over_slenderness": response.peak_over_slenderness,
                 "overturned": response.overturned,
                 "falls_under_less": overturns_under_less,
-                "verdict": in_brief(response, PRECISION)
+                "verdict": format_brief_outcome(response, PRECISION)
                 + (f"; overturns at x {_format_factor(1.0 / margin)}" if overturns_under_less else ""),
             }
             for label, response, ratios, margin, overturns_under_less in zip(
@@ -182,7 +182,7 @@ class Check(BlockUnderRecords):
         titles = {"record": "record", add_unit("pga", "g"): "PGA, g", add_unit("pgv", "m/s"): "PGV, m/s"}
         titles |= {rule: format_rule_name(rule) for rule in rules}
         titles |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
-        ratio_columns = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
+        ratio_columns = [{"peak_over_slenderness": round_ratio(response)} for response in self.responses]
         rows = [row | ratio_column for row, ratio_column in zip(self.rows(), ratio_columns, strict=True)]
         # Rules of thumb are accurate to three digits at most.
         cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in titles] for row in rows]
@@ -287,10 +287,10 @@ def survey(
     1
     """
     named_motions = index_motions(motions)
-    if not one_body(block).coordinate.limit:
+    if not require_body(block).coordinate.limit:
         raise InvalidOption(f"a survey is of a block, which has a balance, not of a {type(block).__name__}")
     if friction is not None:
-        friction_coefficient(friction)
+        check_friction(friction)
     responses = []
     with Progress("simulating", total=len(named_motions)) as bar:
         for motion in named_motions.values():
@@ -315,7 +315,7 @@ def create_folder_names(records: Sequence[str]) -> list[str]:
 
 def create_record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
     """Create columns with the requested name of each record, and the name of its motion as in other analyses."""
-    names, verticals = list_motion_names(motions), verticals_of(motions)
+    names, verticals = list_motion_names(motions), collect_verticals(motions)
     return [
         {"record": record, "motion": names[k], **{name: column[1][k] for name, column in verticals.items()}}
         for k, record in enumerate(records)
@@ -330,13 +330,13 @@ def require_motion(response: Response) -> Motion:
 
 def _create_row(response: Response, precision: float) -> dict[str, Any]:
     motion = require_motion(response)
-    nearby, within_precision = response.perturbed(), response.perturbed(*steps_within(precision))
+    nearby, within_precision = response.perturbed(), response.perturbed(*choose_steps(precision))
     return {
         add_unit("duration", "s"): motion.duration,
         add_unit("pga", "g"): round_decimal(motion.pga / STANDARD_GRAVITY),
         add_unit("pgv", "m/s"): motion.pgv,
         "processing": "; ".join(motion.history),
-        "verdict": in_brief(response, precision),
+        "verdict": format_brief_outcome(response, precision),
         "overturned": response.overturned,
         "decided": nearby.is_decided,
         "overturned_share": float(nearby.overturned.mean()),

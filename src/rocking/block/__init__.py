@@ -4,7 +4,7 @@ from rocking.block.bodies import Blocks
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Damper, Load, Restitution, Restraint, Spring, Tendon, Thrust
 from rocking.block.sides import Side, housner_restitution, impact_restitution, one_sided_restitution
-from rocking.block.single import Block, one_block
+from rocking.block.single import Block, require_block
 
 #: The same class, because restraints are arrays of terms.
 RestrainedBlocks = Blocks
@@ -24,6 +24,6 @@ __all__ = [
     "Thrust",
     "housner_restitution",
     "impact_restitution",
-    "one_block",
     "one_sided_restitution",
+    "require_block",
 ]

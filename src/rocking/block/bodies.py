@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.block.body import KINDS
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Terms
-from rocking.block.sides import checked_gravity, checked_sides, no_body, rigid_bodies
-from rocking.block.single import Block, one_block
+from rocking.block.sides import check_gravity, check_sides, describe_missing_body, find_rigid_bodies
+from rocking.block.single import Block, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
@@ -22,7 +22,7 @@ from rocking.core.tables import format_range
 from rocking.errors import InvalidBlock
 from rocking.kernels import state
 
-_NAMES: Final = ("p", "alpha", "restitution")
+_FIELDS: Final = ("p", "alpha", "restitution")
 
 #: Terms of restraints on each side with their default values, and `one_sided`.
 _TERMS: Final = {**Terms()._asdict(), "one_sided": 0.0}
@@ -32,7 +32,7 @@ _UNITS: Final = {
 }  # fmt: skip
 
 #: Exponents of the factor on p in the terms of a resized block; other terms do not change.
-_POWERS: Final = {
+_EXPONENTS: Final = {
     "damping": 1, "stiffness": 2, "opening": -2, "yields": -2, "slack": -2, "restitution_slope": -1,
 }  # fmt: skip
 
@@ -96,34 +96,34 @@ class Blocks:
         gravity: float = STANDARD_GRAVITY,
         **terms: ArrayLike,
     ) -> None:
-        given: dict[str, ArrayLike] = {"p": p, "alpha": alpha}
+        arguments: dict[str, ArrayLike] = {"p": p, "alpha": alpha}
         if restitution is not None:
-            given["restitution"] = restitution
+            arguments["restitution"] = restitution
         if terms:
-            given |= {**_TERMS, **terms}
-            if wrong := [*terms.keys() - _TERMS.keys()]:
-                raise InvalidBlock(f"blocks have no {{}}; terms of restraints are {', '.join(_TERMS)}", wrong[0])
+            arguments |= {**_TERMS, **terms}
+            if unknown := [*terms.keys() - _TERMS.keys()]:
+                raise InvalidBlock(f"blocks have no {{}}; terms of restraints are {', '.join(_TERMS)}", unknown[0])
         try:
-            columns = [_columns(checks.numbers(values, name, InvalidBlock)) for name, values in given.items()]
-            arrays = dict(zip(given, np.broadcast_arrays(*columns), strict=True))
+            columns = [_expand_sides(checks.numbers(values, name, InvalidBlock)) for name, values in arguments.items()]
+            arrays = dict(zip(arguments, np.broadcast_arrays(*columns), strict=True))
         except ValueError:
             raise InvalidBlock(
                 "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with one n",
                 "p", "alpha", "restitution",
             ) from None  # fmt: skip
-        g = checked_gravity(gravity)
-        for name in _NAMES if restitution is not None else _NAMES[:2]:
-            checked_sides(arrays[name], name)
+        g = check_gravity(gravity)
+        for name in _FIELDS if restitution is not None else _FIELDS[:2]:
+            check_sides(arrays[name], name)
         if restitution is None:
-            arrays["restitution"] = _conserved(arrays["p"], arrays["alpha"])
+            arrays["restitution"] = _compute_restitutions(arrays["p"], arrays["alpha"])
         self._fill(g, {name: np.array(values) for name, values in arrays.items()})
 
     def _fill(self, gravity: float, arrays: Mapping[str, Floats], axes: dict[str, Floats] | None = None) -> Blocks:
         """Set all attributes from valid arrays of shape (n, 2), which become read-only."""
-        held = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
-        for values in held.values():
+        columns = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
+        for values in columns.values():
             values.flags.writeable = False
-        self.__dict__.update({name: held.pop(name) for name in _NAMES}, gravity=gravity, terms=held, axes=axes)
+        self.__dict__.update({name: columns.pop(name) for name in _FIELDS}, gravity=gravity, terms=columns, axes=axes)
         return self
 
     @classmethod
@@ -156,10 +156,10 @@ class Blocks:
         Blocks
             Blocks with `axes`.
         """
-        given = {"p": rates_of(p, size, gravity), "alpha": alpha}
+        arguments = {"p": resolve_p(p, size, gravity), "alpha": alpha}
         if restitution is not None:
-            given["restitution"] = restitution
-        axes = {name: np.atleast_1d(checks.numbers(axis, name, InvalidBlock)) for name, axis in given.items()}
+            arguments["restitution"] = restitution
+        axes = {name: np.atleast_1d(checks.numbers(axis, name, InvalidBlock)) for name, axis in arguments.items()}
         if any(axis.ndim != 1 or axis.size == 0 for axis in axes.values()):
             raise InvalidBlock("each parameter of a grid must be a number or a sequence of at least one number")
         checks.grid_size({name: axis.size for name, axis in axes.items()}, InvalidBlock)
@@ -190,19 +190,21 @@ class Blocks:
         """
         if isinstance(blocks, Blocks):
             return blocks
-        several = not isinstance(blocks, (Block, RestrainedBlock, str)) and isinstance(blocks, Iterable)
-        gathered: list[Any] = [*cast("Iterable[Block]", blocks)] if several else [blocks]
-        for each in gathered:
-            if not isinstance(each, (Block, RestrainedBlock)):
-                one_block(each)
-        gravities = {each.gravity for each in gathered}
+        is_iterable = not isinstance(blocks, (Block, RestrainedBlock, str)) and isinstance(blocks, Iterable)
+        bodies: list[Any] = [*cast("Iterable[Block]", blocks)] if is_iterable else [blocks]
+        for body in bodies:
+            if not isinstance(body, (Block, RestrainedBlock)):
+                require_block(body)
+        gravities = {body.gravity for body in bodies}
         if len(gravities) != 1:
-            raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same {}", "gravity")
-        rows = [each._rows() for each in gathered]
-        if max(len(sides[0]) for sides in rows) > len(_NAMES):
-            rows = [[(*side, *[*_TERMS.values()][len(side) - len(_NAMES) :]) for side in sides] for sides in rows]
+            raise InvalidBlock(
+                "Blocks.from_bodies requires at least one block, and the same {} for all of them", "gravity"
+            )
+        rows = [body._build_rows() for body in bodies]
+        if max(len(sides[0]) for sides in rows) > len(_FIELDS):
+            rows = [[(*side, *[*_TERMS.values()][len(side) - len(_FIELDS) :]) for side in sides] for sides in rows]
         table = np.array(rows).transpose(2, 0, 1)
-        names = (*_NAMES, *_TERMS)[: len(table)]
+        names = (*_FIELDS, *_TERMS)[: len(table)]
         return cls.__new__(cls)._fill(gravities.pop(), dict(zip(names, table, strict=True)))
 
     @property
@@ -224,55 +226,58 @@ class Blocks:
     def kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
         """Return records for kernels (`kernels.state.BLOCK`), shape (n,)."""
         p, alpha = self.p, self.alpha
-        made = state.new_records(len(self), state.BLOCK)
+        records = state.new_records(len(self), state.BLOCK)
         stiffness, cosine = p * p, np.cos(alpha)
-        made["stiffness"], made["slenderness"] = stiffness, alpha
-        made["sine"], made["cosine"] = np.sin(alpha), cosine
-        made["threshold"] = alpha if model == "linear" else np.tan(alpha)
-        made["threshold_slope"] = stiffness if model == "linear" else stiffness * cosine
-        made["restitution"] = self.restitution
-        made["rest_limit"] = thresholds
-        made["next_side"] = (1, 0)
-        made["overturn_angle"] = 0.5 * math.pi
+        records["stiffness"], records["slenderness"] = stiffness, alpha
+        records["sine"], records["cosine"] = np.sin(alpha), cosine
+        records["threshold"] = alpha if model == "linear" else np.tan(alpha)
+        records["threshold_slope"] = stiffness if model == "linear" else stiffness * cosine
+        records["restitution"] = self.restitution
+        records["rest_limit"] = thresholds
+        records["next_side"] = (1, 0)
+        records["overturn_angle"] = 0.5 * math.pi
         if self.terms:
-            self._add_terms(made, model)
-        return made
+            self._add_terms(records, model)
+        return records
 
-    def _add_terms(self, made: state.Records, model: Model) -> None:
+    def _add_terms(self, records: state.Records, model: Model) -> None:
         """Add terms of restraints to records."""
-        term, p, sine, cosine = self.terms, self.p, made["sine"], made["cosine"]
-        one_way = term["one_sided"] > 0.0
-        made["next_side"][one_way] = 0
-        made["threshold"][:, 1] = np.where(one_way[:, 1], math.inf, made["threshold"][:, 1])
-        made["min_restitution"], made["restitution_slope"] = term["restitution_least"], term["restitution_slope"]
-        made["seed"] = term["restitution_seed"][:, 0]
-        made["variable_restitution"] = (made["seed"] >= 0) | np.any(made["restitution_slope"] > 0.0, axis=1)
-        made["prestress"], made["spring"] = p * p * term["prestress"], p * p * term["spring"]
-        made["damping"] = term["damping"]
-        at_zero = term["sine"] * sine + term["cosine"] * cosine  # of the moment, and its slope by -u
-        slope = term["sine"] * cosine - term["cosine"] * sine
+        terms, p, sine, cosine = self.terms, self.p, records["sine"], records["cosine"]
+        is_one_sided = terms["one_sided"] > 0.0
+        records["next_side"][is_one_sided] = 0
+        records["threshold"][:, 1] = np.where(is_one_sided[:, 1], math.inf, records["threshold"][:, 1])
+        records["min_restitution"], records["restitution_slope"] = (
+            terms["restitution_least"],
+            terms["restitution_slope"],
+        )
+        records["seed"] = terms["restitution_seed"][:, 0]
+        records["variable_restitution"] = (records["seed"] >= 0) | np.any(records["restitution_slope"] > 0.0, axis=1)
+        records["prestress"], records["spring"] = p * p * terms["prestress"], p * p * terms["spring"]
+        records["damping"] = terms["damping"]
+        moment = terms["sine"] * sine + terms["cosine"] * cosine  # at u = 0
+        slope = terms["sine"] * cosine - terms["cosine"] * sine
         # The moment of a tendon without prestress is zero here apart from rounding.
-        at_zero[np.abs(at_zero) <= 1e-14 * (np.abs(term["sine"] * sine) + np.abs(term["cosine"] * cosine))] = 0.0
-        across = 1.0 if model == "linear" else cosine  # of the gain over p^2
-        made["restraint_threshold"] = (at_zero + term["prestress"]) / across
+        moment[np.abs(moment) <= 1e-14 * (np.abs(terms["sine"] * sine) + np.abs(terms["cosine"] * cosine))] = 0.0
+        gain = 1.0 if model == "linear" else cosine  # gain divided by p^2
+        records["restraint_threshold"] = (moment + terms["prestress"]) / gain
         if model == "linear":
-            made["added_weight"], made["added_push"] = slope, at_zero - self.alpha * slope
+            records["added_weight"], records["added_push"] = slope, moment - self.alpha * slope
         else:
-            made["added_weight"], made["added_push"] = term["sine"], term["cosine"]
-        made["yielding"] = np.any(term["stiffness"] > 0.0, axis=1)
-        if np.any(made["yielding"]):  # at first such a tendon is elastic
+            records["added_weight"], records["added_push"] = terms["sine"], terms["cosine"]
+        records["yielding"] = np.any(terms["stiffness"] > 0.0, axis=1)
+        if np.any(records["yielding"]):  # a yielding tendon is initially elastic
             for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
-                made[f"base_{name.removeprefix('added_')}"] = made[name]
-            made["tendon_stiffness"] = p * p * term["stiffness"]
-            made["lever_arm"] = term["opening"]
-            made["yield_elongation"], made["slack_elongation"] = term["yields"][:, 0], term["slack"][:, 0]
-            stiff, at_rest = term["stiffness"] * term["opening"], -term["stiffness"] * term["slack"]
-            made["tendon_weight"] = -stiff * (1.0 if model == "linear" else cosine)
-            made["tendon_push"] = stiff * (self.alpha if model == "linear" else sine)
-            made["added_weight"] += made["tendon_weight"]
-            made["added_push"] += made["tendon_push"]
-            made["prestress"] += p * p * at_rest
-            made["restraint_threshold"] += at_rest / across
+                records[f"base_{name.removeprefix('added_')}"] = records[name]
+            records["tendon_stiffness"] = p * p * terms["stiffness"]
+            records["lever_arm"] = terms["opening"]
+            records["yield_elongation"], records["slack_elongation"] = terms["yields"][:, 0], terms["slack"][:, 0]
+            tendon_moment, slack_moment = terms["stiffness"] * terms["opening"], -terms["stiffness"] * terms["slack"]
+            records["tendon_weight"] = -tendon_moment * (1.0 if model == "linear" else cosine)
+            records["tendon_push"] = tendon_moment * (self.alpha if model == "linear" else sine)
+            records["added_weight"] += records["tendon_weight"]
+            records["added_push"] += records["tendon_push"]
+            records["prestress"] += p * p * slack_moment
+            records["restraint_threshold"] += slack_moment / gain
         names = (
             "restraint_threshold",
             "added_weight",
@@ -282,7 +287,7 @@ class Blocks:
             "damping",
             "tendon_stiffness",
         )
-        made["restrained"] = np.any([np.any(made[name] != 0.0, axis=1) for name in names], axis=0)
+        records["restrained"] = np.any([np.any(records[name] != 0.0, axis=1) for name in names], axis=0)
 
     @property
     def stops(self) -> Floats:
@@ -292,55 +297,57 @@ class Blocks:
     @property
     def is_symmetric(self) -> bool:
         """Whether all blocks have two equal sides."""
-        even = all(np.array_equal(values[:, 0], values[:, 1]) for values in self._arrays().values())
-        return even and not np.any(self.terms.get("one_sided", 0.0))
+        has_equal_sides = all(np.array_equal(values[:, 0], values[:, 1]) for values in self._arrays().values())
+        return has_equal_sides and not np.any(self.terms.get("one_sided", 0.0))
 
     def __repr__(self) -> str:
         if not len(self):
             return "<Blocks: none>"
         p, alpha, e = (format_range(values) for values in (self.p, self.alpha, self.restitution))
-        held = ", restrained" if self.terms else ""
-        return f"<Blocks: {len(self)}; p {p} rad/s, alpha {alpha} rad, restitution {e}{held}>"
+        suffix = ", restrained" if self.terms else ""
+        return f"<Blocks: {len(self)}; p {p} rad/s, alpha {alpha} rad, restitution {e}{suffix}>"
 
     def __len__(self) -> int:
         return len(self.p)
 
     def __getitem__(self, index: int) -> Block | RestrainedBlock:
         if isinstance(index, (slice, tuple, list, np.ndarray)):
-            raise InvalidBlock("blocks[index] takes one whole number; use blocks.select for slices, indices and masks")
+            raise InvalidBlock(
+                "the index of a block must be a whole number; use blocks.select for slices, indices and masks"
+            )
         p, alpha, e = (tuple(array[index]) for array in (self.p, self.alpha, self.restitution))
         block = Block.from_parameters(p, alpha, e, gravity=self.gravity)
-        terms, one_way = [Terms(), Terms()], False
+        terms, is_one_sided = [Terms(), Terms()], False
         if self.terms:
             terms = [Terms(*(float(self.terms[name][index, side]) for name in Terms._fields)) for side in range(2)]
-            one_way = bool(self.terms["one_sided"][index, 0])
-        if not one_way and terms == [Terms(), Terms()]:
+            is_one_sided = bool(self.terms["one_sided"][index, 0])
+        if not is_one_sided and terms == [Terms(), Terms()]:
             return block
-        text = "block with restraints" + ", rocking one way" * one_way
-        made = RestrainedBlock.__new__(RestrainedBlock)
-        made.__dict__.update(block=block, _terms=tuple(terms), is_one_sided=one_way, restraints=None, lean=0.0)
-        made.__dict__.update(description=text)
-        return made
+        text = "block with restraints" + ", rocking one way" * is_one_sided
+        body = RestrainedBlock.__new__(RestrainedBlock)
+        body.__dict__.update(block=block, _terms=tuple(terms), is_one_sided=is_one_sided, restraints=None, lean=0.0)
+        body.__dict__.update(description=text)
+        return body
 
     def __iter__(self) -> Iterator[Block | RestrainedBlock]:
         return (self[index] for index in range(len(self)))
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
         """Return some of the blocks, by a slice, indices, or a mask."""
-        given = index if isinstance(index, slice) else np.asarray(index)
-        if not isinstance(given, slice) and not given.size:
-            given = given.astype(np.int64)
+        selection = index if isinstance(index, slice) else np.asarray(index)
+        if not isinstance(selection, slice) and not selection.size:
+            selection = selection.astype(np.int64)
         try:
-            rows = np.arange(len(self))[given]
+            rows = np.arange(len(self))[selection]
         except IndexError:
             rows = np.array(0)
         if rows.ndim != 1:
             raise InvalidBlock(
-                f"select takes a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} truth "
-                f"values, not {checks.short_repr(index)}; for one block alone blocks[0]"
+                f"select requires a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} values, "
+                f"not {checks.short_repr(index)}; use blocks[0] for a single block"
             )
-        chosen = {name: values[rows] for name, values in self._arrays().items()}
-        return Blocks.__new__(Blocks)._fill(self.gravity, chosen)
+        arrays = {name: values[rows] for name, values in self._arrays().items()}
+        return Blocks.__new__(Blocks)._fill(self.gravity, arrays)
 
     def with_p_scaled(self, factors: Floats) -> Blocks:
         """Return blocks of the same shapes with p multiplied by these factors.
@@ -348,23 +355,23 @@ class Blocks:
         Lengths are divided by the square of the factor. Forces of restraints keep their ratio to the weight: for a
         tendon prestress, strength, and stiffness times length, so its yield strain is unchanged.
         """
-        by = factors[:, None]
-        terms = {name: values * by ** _POWERS.get(name, 0) for name, values in self.terms.items()}
-        return Blocks(self.p * by, self.alpha, self.restitution, gravity=self.gravity, **terms)
+        scale = factors[:, None]
+        terms = {name: values * scale ** _EXPONENTS.get(name, 0) for name, values in self.terms.items()}
+        return Blocks(self.p * scale, self.alpha, self.restitution, gravity=self.gravity, **terms)
 
 
-def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:
+def resolve_p(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:
     """Return frequency parameters, rad/s, from either argument."""
     if p is not None and size is None:
         return p
     if size is not None and p is None:
         g = checks.positive(gravity, "gravity", InvalidBlock, "m/s^2")
         return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidBlock))
-    which = "one of" if p is None else "not both of"
-    raise InvalidBlock(f"give {which} {{}} (rad/s) and {{}} (half diagonals, m)", "p", "size")
+    phrase = "one of" if p is None else "not both of"
+    raise InvalidBlock(f"give {phrase} {{}} (rad/s) and {{}} (half diagonals, m)", "p", "size")
 
 
-def _columns(array: Floats) -> Floats:
+def _expand_sides(array: Floats) -> Floats:
     if array.ndim == 2 and array.shape[1] == 2:
         return array
     if array.ndim > 1:
@@ -372,22 +379,22 @@ def _columns(array: Floats) -> Floats:
     return np.repeat(np.atleast_1d(array)[:, None], 2, axis=1)
 
 
-def _conserved(p: Floats, alpha: Floats) -> Floats:
+def _compute_restitutions(p: Floats, alpha: Floats) -> Floats:
     """Compute the restitutions by angular momentum of rigid bodies with these p and alpha."""
-    kept: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
-    sided = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
-    kept[sided], _ = rigid_bodies(p[sided], alpha[sided])
-    if (unknown := np.isnan(kept).any(axis=1)).any():
-        first = int(np.argmax(unknown))
-        raise InvalidBlock(f"{no_body(p[first], alpha[first])} (block {first})", "restitution")
-    stocky = np.flatnonzero(~(kept > 0.0).all(axis=1))
+    factors: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
+    asymmetric = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
+    factors[asymmetric], _ = find_rigid_bodies(p[asymmetric], alpha[asymmetric])
+    if (undetermined := np.isnan(factors).any(axis=1)).any():
+        first = int(np.argmax(undetermined))
+        raise InvalidBlock(f"{describe_missing_body(p[first], alpha[first])} (block {first})", "restitution")
+    stocky = np.flatnonzero(~(factors > 0.0).all(axis=1))
     if len(stocky):
         raise InvalidBlock(
-            f"conserving angular momentum gives block {stocky[0]} a restitution of {kept[stocky[0]].min():.3g}: it is "
-            "too stocky to rock that way; give {} a value or a pair in (0, 1]",
+            f"conserving angular momentum gives block {stocky[0]} a restitution of {factors[stocky[0]].min():.3g}: it "
+            "is too stocky to rock that way; give {} a value or a pair in (0, 1]",
             "restitution",
         )
-    return checked_sides(kept, "restitution")
+    return check_sides(factors, "restitution")
 
 
 KINDS["blocks"] = KINDS["restrained-blocks"] = Blocks

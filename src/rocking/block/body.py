@@ -127,10 +127,10 @@ class Bodies(Protocol):
         """Return records for kernels (`kernels.state.BLOCK`), with thresholds of a chattering scheme, shape (n, 2)."""
 
 
-class Kind(Protocol):
+class BodiesFactory(Protocol):
     """Class that creates bodies of one kind."""
 
-    def __call__(self, *nothing: Any, **parameters: Any) -> Bodies:
+    def __call__(self, *unnamed: Any, **parameters: Any) -> Bodies:
         """Create bodies from their `parameters`, by name, and gravity."""
 
     def from_bodies(self, bodies: Any, /) -> Bodies:
@@ -138,7 +138,7 @@ class Kind(Protocol):
 
 
 #: Registry of classes of many bodies, which avoids circular imports.
-KINDS: Final[dict[str, Kind]] = {}
+KINDS: Final[dict[str, BodiesFactory]] = {}
 
 #: Registry of classes of single bodies.
 SINGLE: Final[dict[str, Callable[..., Any]]] = {}

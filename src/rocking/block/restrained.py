@@ -12,8 +12,8 @@ import numpy as np
 
 from rocking.block.body import SINGLE, ContactLaw, Coordinate
 from rocking.block.restraints import Load, Pivot, Restitution, Restraint, Tendon, Terms
-from rocking.block.sides import Side, checked_pair, checked_parameter, one_sided_restitution
-from rocking.block.single import Block, Rocking, one_block
+from rocking.block.sides import Side, check_pair, check_parameter, one_sided_restitution
+from rocking.block.single import Block, Rocking, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.bisection import bisect
@@ -21,9 +21,9 @@ from rocking.core.constants import MODELS, Model
 from rocking.errors import InvalidBlock, InvalidOption
 
 #: Number of rotations in the search for the balance on each side.
-_LOOKS: Final = 512
+_N_SAMPLES: Final = 512
 
-_SOME: Final = "Tendon, Spring, Damper, Thrust or Load"
+_RESTRAINT_NAMES: Final = "Tendon, Spring, Damper, Thrust or Load"
 _ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
 
 
@@ -92,52 +92,48 @@ class RestrainedBlock(Rocking):
         restitution: float | Sequence[float] | Restitution | None = None,
     ) -> None:
         if isinstance(block, RestrainedBlock):
-            raise InvalidBlock("this block has restraints already: give all of them at once, after the Block itself")
-        own, one_way = one_block(block), checks.boolean(one_sided, "one_sided", InvalidBlock)
-        _check(restraints, own)
+            raise InvalidBlock("this block already has restraints; give all of them together, after the Block")
+        free_block, is_one_sided = require_block(block), checks.boolean(one_sided, "one_sided", InvalidBlock)
+        _check_restraints(restraints, free_block)
         tilt = checks.finite(lean, "lean", InvalidBlock)
         law = restitution if isinstance(restitution, Restitution) else None
         factors = restitution.maximum if isinstance(restitution, Restitution) else restitution
-        rest = [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_way
-        rest += [str(law)] * (law is not None)
-        if one_way and restitution is None:
-            factors = one_sided_restitution(own.sides[0].alpha)
-        elif one_way and law is None and len({*checked_pair(restitution, "restitution")}) > 1:
-            raise InvalidBlock(
-                "{} of a block that rocks one way is one number, not a pair: it leaves one side alone",
-                "restitution",
-                value=restitution,
-            )
-        standing = _tilted(_with_loads(own, _following(restraints), factors), tilt)
+        details = [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * is_one_sided
+        details += [str(law)] * (law is not None)
+        if is_one_sided and restitution is None:
+            factors = one_sided_restitution(free_block.sides[0].alpha)
+        elif is_one_sided and law is None and len({*check_pair(restitution, "restitution")}) > 1:
+            raise InvalidBlock("{} of a one-sided block must be a number, not a pair", "restitution", value=restitution)
+        standing_block = _tilt(_add_loads(free_block, _find_following_loads(restraints), factors), tilt)
         if factors is not None:
             plus, minus = (
-                replace(side, restitution=checked_parameter(factor, "restitution"))
-                for side, factor in zip(standing.sides, checked_pair(factors, "restitution"), strict=True)
+                replace(side, restitution=check_parameter(factor, "restitution"))
+                for side, factor in zip(standing_block.sides, check_pair(factors, "restitution"), strict=True)
             )
-            standing = standing._with_sides((plus, minus))
-        if sum(isinstance(each, Tendon) and each.strength < math.inf for each in restraints) > 1:
-            raise InvalidBlock("one tendon of a block may yield; let the others have no {}", "strength")
-        pivots = _pivots_of(standing, tilt, restraints)
+            standing_block = standing_block._with_sides((plus, minus))
+        if sum(isinstance(restraint, Tendon) and restraint.strength < math.inf for restraint in restraints) > 1:
+            raise InvalidBlock("only one tendon of a block may yield; omit {} of the others", "strength")
+        pivots = _build_pivots(standing_block, tilt, restraints)
         terms = [
-            functools.reduce(Terms.plus, (each._terms(pivot) for each in restraints), Terms())._replace(
-                **(law._terms(side) if law else {})
-            )
+            functools.reduce(
+                Terms.add, (restraint._compute_terms(pivot) for restraint in restraints), Terms()
+            )._replace(**(law._compute_terms(side) if law else {}))
             for side, pivot in enumerate(pivots)
         ]
-        text = ", ".join([own.description, *_listed(restraints), *rest])
+        description = ", ".join([free_block.description, *_describe_restraints(restraints), *details])
         self.__dict__.update(
-            block=standing, _terms=tuple(terms), is_one_sided=one_way, restraints=restraints, lean=tilt
+            block=standing_block, _terms=tuple(terms), is_one_sided=is_one_sided, restraints=restraints, lean=tilt
         )
-        self.__dict__.update(description=text)
-        if (least := min(self.uplift_thresholds())) <= 0.0:
+        self.__dict__.update(description=description)
+        if (min_uplift := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
-                f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
-                f"a smaller thrust, load or lean lets it{'; forces are in N, masses in kg' * (least < -self.gravity)}"
+                f"this block does not stand: its uplift acceleration is {min_uplift:.3g} m/s^2; reduce the thrust, "
+                f"load or lean{'; forces are in N, masses in kg' * (min_uplift < -self.gravity)}"
             )
 
-    def _rows(self) -> list[tuple[float, ...]]:
+    def _build_rows(self) -> list[tuple[float, ...]]:
         """Return parameters and, unless free, terms of both sides as stored in `Blocks`."""
-        rows = self.block._rows()
+        rows = self.block._build_rows()
         if not self.is_one_sided and self._terms == (Terms(), Terms()):
             return rows
         rows = [(*row, *terms, float(self.is_one_sided)) for row, terms in zip(rows, self._terms, strict=True)]
@@ -156,14 +152,14 @@ class RestrainedBlock(Rocking):
     @property
     def balance(self) -> tuple[float, float]:
         """Rotation of the unstable balance on each side, rad; infinite if restraints hold it at any rotation."""
-        plus, minus = map(_balance_of, self.block.sides, self._terms)
+        plus, minus = map(_find_balance, self.block.sides, self._terms)
         return plus, math.inf if self.is_one_sided else minus
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
         checks.choice(model, "model", InvalidOption, MODELS)
-        made = self.alone().kernel_records(model, np.zeros((1, 2)))
-        plus, minus = (self.gravity * (made["threshold"] + made["restraint_threshold"])[0]).tolist()
+        records = self.alone().kernel_records(model, np.zeros((1, 2)))
+        plus, minus = (self.gravity * (records["threshold"] + records["restraint_threshold"])[0]).tolist()
         return plus, minus
 
     @property
@@ -185,10 +181,10 @@ class RestrainedBlock(Rocking):
     ) -> tuple[Floats, Floats]:
         horizontal, vertical = self.block.contact(motion, ground_over_g, side, stretch)
         if self.restraints and self.block.mass is not None:
-            pivots, weight = _pivots_of(self.block, self.lean, self.restraints), self.block.mass * self.gravity
-            for each in self.restraints:
-                across, up = each._acting(pivots, motion[0], side, stretch)
-                horizontal, vertical = horizontal - across / weight, vertical - up / weight
+            pivots, weight = _build_pivots(self.block, self.lean, self.restraints), self.block.mass * self.gravity
+            for restraint in self.restraints:
+                force_x, force_z = restraint._compute_force(pivots, motion[0], side, stretch)
+                horizontal, vertical = horizontal - force_x / weight, vertical - force_z / weight
         if self.is_one_sided:
             horizontal = np.where(side < 0, np.minimum(horizontal, 0.0), horizontal)
         return horizontal, vertical
@@ -200,52 +196,54 @@ class RestrainedBlock(Rocking):
         available.
         """
         plus, minus = largest if model == "linear" else (2.0 * math.sin(0.5 * u) for u in largest)
-        pivots = _pivots_of(self.block, self.lean, self.restraints or ())
-        tendons = [each for each in self.restraints or () if isinstance(each, Tendon)]
-        return [each._stretched(pivots, (plus, minus)) for each in tendons]
+        pivots = _build_pivots(self.block, self.lean, self.restraints or ())
+        tendons = [tendon for tendon in self.restraints or () if isinstance(tendon, Tendon)]
+        return [tendon._compute_extremes(pivots, (plus, minus)) for tendon in tendons]
 
 
-def _listed(restraints: Sequence[object]) -> list[str]:
-    """Describe the restraints: with a spring of ..., a load of ... and a tendon of ..."""
+def _describe_restraints(restraints: Sequence[object]) -> list[str]:
+    """Describe the restraints, for example as "with a spring of ... and a tendon of ..."."""
     if not restraints:
         return []
-    *first, last = [f"a {each}" for each in restraints]
+    *first, last = [f"a {restraint}" for restraint in restraints]
     return [f"with {', '.join(first)} and {last}" if first else f"with {last}"]
 
 
-def _check(restraints: Sequence[object], block: Block) -> None:
+def _check_restraints(restraints: Sequence[object], block: Block) -> None:
     """Reject invalid restraints, and restraints of a block without a mass."""
-    for each in restraints:
-        if not isinstance(each, Restraint):
-            raise InvalidBlock(f"{checks.short_repr(each)} is no restraint: give {_SOME}, one by one")
+    for restraint in restraints:
+        if not isinstance(restraint, Restraint):
+            raise InvalidBlock(
+                f"{checks.short_repr(restraint)} is not a restraint; give {_RESTRAINT_NAMES} as separate arguments"
+            )
     if restraints and block.mass is None:
-        raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
+        raise InvalidBlock("a block with restraints requires its {}, kg", "mass")
 
 
-def _with_loads(block: Block, loads: Sequence[Load], restitution: float | Sequence[float] | None) -> Block:
+def _add_loads(block: Block, loads: Sequence[Load], restitution: float | Sequence[float] | None) -> Block:
     """Return a block combined with the loads that follow it, by default conserving angular momentum."""
     if not loads:
         return block
     assert block.mass is not None
     plus = block.sides[0]
     height = plus.radius * math.cos(plus.alpha)
-    right, left = (side.radius * math.sin(side.alpha) for side in block.sides)
+    distance_plus, distance_minus = (side.radius * math.sin(side.alpha) for side in block.sides)
     masses = np.array([block.mass, *(load.mass for load in loads)])
-    across = np.array([0.0, *(load.offset for load in loads)])
-    up = np.array([height, *(load.height for load in loads)])
-    share = masses / masses.sum()
-    x, z = float(share @ across), float(share @ up)
-    own = block.gravity * plus.radius / plus.p**2 - plus.radius**2
-    gyration = float(share[0] * own + share @ ((across - x) ** 2 + (up - z) ** 2))
-    beyond = max(x - right, -x - left)
-    if beyond >= 0.0:
+    offsets = np.array([0.0, *(load.offset for load in loads)])
+    heights = np.array([height, *(load.height for load in loads)])
+    mass_shares = masses / masses.sum()
+    x, z = float(mass_shares @ offsets), float(mass_shares @ heights)
+    gyration_squared = block.gravity * plus.radius / plus.p**2 - plus.radius**2
+    gyration = float(mass_shares[0] * gyration_squared + mass_shares @ ((offsets - x) ** 2 + (heights - z) ** 2))
+    overhang = max(x - distance_plus, -x - distance_minus)
+    if overhang >= 0.0:
         raise InvalidBlock(
-            f"with its loads the centre of mass of this block lies {beyond:.3g} m beyond its pivot, so that it falls: "
-            "give a load less mass, or less {}",
+            f"with its loads, the centre of mass of this block lies {overhang:.3g} m beyond its pivot; reduce "
+            "the mass of a load, or its {}",
             "offset",
         )
     return Block.from_pivots(
-        (right - x, left + x),
+        (distance_plus - x, distance_minus + x),
         z,
         math.sqrt(gyration),
         restitution=restitution,
@@ -254,14 +252,14 @@ def _with_loads(block: Block, loads: Sequence[Load], restitution: float | Sequen
     )
 
 
-def _tilted(block: Block, lean: float) -> Block:
+def _tilt(block: Block, lean: float) -> Block:
     """Return a block that leans to side + by an angle."""
     if lean == 0.0:
         return block
     plus, minus = block.sides
     if not -minus.alpha < lean < plus.alpha:
         raise InvalidBlock(
-            f"a block whose {{}} is {lean:g} rad falls: from {-minus.alpha:.4g} to {plus.alpha:.4g} rad it stands"
+            f"{{}} must be between {-minus.alpha:.4g} and {plus.alpha:.4g} rad for the block to stand, not {lean:g}"
             f"{f'; if it is in degrees, give math.radians({lean:g})' if 0.5 <= abs(lean) < 90.0 else ''}",
             "lean",
             value=lean,
@@ -270,15 +268,15 @@ def _tilted(block: Block, lean: float) -> Block:
     return block._with_sides(sides)
 
 
-def _following(restraints: Sequence[Restraint]) -> list[Load]:
+def _find_following_loads(restraints: Sequence[Restraint]) -> list[Load]:
     """Return the loads that follow the block."""
-    return [each for each in restraints if isinstance(each, Load) and each.follows]
+    return [restraint for restraint in restraints if isinstance(restraint, Load) and restraint.follows]
 
 
-def _pivots_of(block: Block, lean: float, restraints: Sequence[Restraint]) -> tuple[Pivot, Pivot]:
+def _build_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) -> tuple[Pivot, Pivot]:
     """Return both pivots of a leaning block with the loads that follow it."""
     mass = math.nan if block.mass is None else block.mass
-    shift = sum(load.mass * load.offset for load in _following(restraints)) / mass
+    shift = sum(load.mass * load.offset for load in _find_following_loads(restraints)) / mass
     plus, minus = (
         Pivot(
             sign, side.alpha, sign * lean, side.radius * math.sin(side.alpha + sign * lean) + sign * shift, side.p,
@@ -289,26 +287,26 @@ def _pivots_of(block: Block, lean: float, restraints: Sequence[Restraint]) -> tu
     return plus, minus
 
 
-def _balance_of(side: Side, terms: Terms) -> float:
+def _find_balance(side: Side, terms: Terms) -> float:
     """Return the first rotation without restoring moment or ground motion, rad.
 
-    A yielding tendon yields for the first time.
+    For a yielding tendon, the first yield is considered.
     """
     if terms[:-3] == Terms()[:-3]:
         return side.alpha
 
     def moment(u: float) -> float:
-        own = (1.0 + terms.sine) * math.sin(side.alpha - u) + terms.cosine * math.cos(side.alpha - u)
+        weight_moment = (1.0 + terms.sine) * math.sin(side.alpha - u) + terms.cosine * math.cos(side.alpha - u)
         stretch = min(2.0 * terms.opening * math.sin(0.5 * u), terms.yields) - terms.slack
-        return own + (terms.prestress + terms.stiffness * stretch) * math.cos(0.5 * u) + terms.spring * u
+        return weight_moment + (terms.prestress + terms.stiffness * stretch) * math.cos(0.5 * u) + terms.spring * u
 
-    looks = np.linspace(0.0, 0.5 * math.pi, _LOOKS)
-    values = np.array([moment(u) for u in looks.tolist()])
+    rotations = np.linspace(0.0, 0.5 * math.pi, _N_SAMPLES)
+    values = np.array([moment(u) for u in rotations.tolist()])
     negative = np.flatnonzero(values[1:] <= 0.0)
     if not len(negative):
         return math.inf
     k = int(negative[0])
-    return bisect(float(looks[k]), float(looks[k + 1]), lambda u: moment(u) <= 0.0)[1]
+    return bisect(float(rotations[k]), float(rotations[k + 1]), lambda u: moment(u) <= 0.0)[1]
 
 
 SINGLE["restrained"] = RestrainedBlock

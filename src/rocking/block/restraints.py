@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from rocking.block.sides import checked_pair
+from rocking.block.sides import check_pair
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.errors import InvalidBlock
@@ -45,7 +45,7 @@ class Terms(NamedTuple):
     restitution_slope: float = 0.0  # decrease per angular speed of the impact, s/rad
     restitution_seed: float = -1.0  # seed of a random restitution; -1 if not random
 
-    def plus(self, other: Terms) -> Terms:
+    def add(self, other: Terms) -> Terms:
         """Return the sum, of which one operand may have a yielding tendon, and only `self` a law of restitution."""
         tendon = self if other.yields == math.inf else other
         sums = (a + b for a, b in zip(self[:5], other[:5], strict=True))
@@ -63,7 +63,7 @@ class Pivot(NamedTuple):
     moment: float  # weight times R, N m
     gravity: float  # m/s^2
 
-    def arms(self, height: float, offset: float) -> tuple[float, float]:
+    def find_arms(self, height: float, offset: float) -> tuple[float, float]:
         """Return the inward distance from the pivot and the height above it, m, of a point of the standing block.
 
         The height is above the base, the offset from the centre of mass without loads to side +, both along the axes
@@ -73,7 +73,7 @@ class Pivot(NamedTuple):
         c, s = math.cos(self.lean), math.sin(self.lean)
         return inwards * c - height * s, height * c + inwards * s
 
-    def turned(self, inwards: float, upwards: float) -> tuple[float, float]:
+    def rotate(self, inwards: float, upwards: float) -> tuple[float, float]:
         """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line to the centre of mass, m."""
         c, s = math.cos(self.alpha), math.sin(self.alpha)
         return inwards * c - upwards * s, upwards * c + inwards * s
@@ -83,22 +83,22 @@ class Restraint(ABC):
     """Force or moment on a block, as terms for each side."""
 
     @abstractmethod
-    def _terms(self, pivot: Pivot) -> Terms:
-        """Return the terms while the block leans to one side."""
+    def _compute_terms(self, pivot: Pivot) -> Terms:
+        """Compute the terms while the block leans to one side."""
 
-    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
-        """Return the force on the block to side + and up, N, which is zero for springs and dampers.
+    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+        """Compute the force on the block to side + and up, N, which is zero for springs and dampers.
 
         ``side`` is -1 at rest, ``stretch`` the elongation of a yielding tendon beyond its plastic elongation, m.
         """
         return 0.0, 0.0
 
-    def _finite(self, *names: str) -> None:
+    def _set_finite(self, *names: str) -> None:
         """Check that attributes are finite and convert them to floats."""
         for name in names:
             object.__setattr__(self, name, checks.finite(getattr(self, name), name, InvalidBlock))
 
-    def _positive(self, name: str, unit: str) -> None:
+    def _set_positive(self, name: str, unit: str) -> None:
         """Check that an attribute is positive and convert it to a float."""
         object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, unit))
 
@@ -136,7 +136,7 @@ class Tendon(Restraint):
     -----
     The moment is x cos(u/2) T with the force T = prestress + stiffness 2 x sin(u/2). Without prestress it is stiffness
     x^2 sin(u). Therefore uplift is unchanged, and the slender block has the stiffness p^2 minus stiffness x^2/I, which
-    may be negative (Makris and Vassiliou 2015; derived in the documentation).
+    may be negative (:cite:t:`makris2015`; derived in the documentation).
 
     Examples
     --------
@@ -150,13 +150,13 @@ class Tendon(Restraint):
     strength: float = math.inf
 
     def __post_init__(self) -> None:
-        self._finite("stiffness", "prestress", "offset")
+        self._set_finite("stiffness", "prestress", "offset")
         stiffness, prestress = self.stiffness, self.prestress
         for name, value, unit in (("stiffness", stiffness, "N/m"), ("prestress", prestress, "N")):
             if value < 0.0:
                 raise InvalidBlock(f"{{}} of a tendon must be at least 0 {unit}, not {value:g}", name, value=value)
         if stiffness == prestress == 0.0:
-            raise InvalidBlock("a tendon needs {} (N/m) or {} (N)", "stiffness", "prestress")
+            raise InvalidBlock("a tendon requires {} (N/m) or {} (N)", "stiffness", "prestress")
         object.__setattr__(self, "strength", checks.real(self.strength, "strength", InvalidBlock))
         if not self.strength > prestress:
             raise InvalidBlock(
@@ -165,34 +165,34 @@ class Tendon(Restraint):
                 value=self.strength,
             )
         if stiffness == 0.0 and self.strength < math.inf:
-            raise InvalidBlock("a tendon that yields needs a {}, N/m", "stiffness")
+            raise InvalidBlock("a yielding tendon requires a {}, N/m", "stiffness")
 
-    def _terms(self, pivot: Pivot) -> Terms:
-        x = self._opening(pivot)
+    def _compute_terms(self, pivot: Pivot) -> Terms:
+        x = self._find_lever(pivot)
         if self.strength < math.inf:
             yields = (self.strength - self.prestress) / self.stiffness
             return Terms(
                 opening=x, stiffness=self.stiffness * x / pivot.moment, yields=yields,
                 slack=-self.prestress / self.stiffness,
             )  # fmt: skip
-        stiff = self.stiffness * x * x / pivot.moment
-        return Terms(-stiff * math.cos(pivot.alpha), stiff * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
+        factor = self.stiffness * x * x / pivot.moment
+        return Terms(-factor * math.cos(pivot.alpha), factor * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
-    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
-        """Return the force of the tendon, along the chord between its ends."""
+    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+        """Compute the force of the tendon, along the chord between its ends."""
         if self.strength == math.inf:
-            x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
+            x = np.where(side == 1, self._find_lever(pivots[1]), self._find_lever(pivots[0]))
             stretch = 2.0 * x * np.sin(0.5 * np.abs(rotation))
-        pull = np.clip(self.prestress + self.stiffness * stretch, 0.0, self.strength)
-        along = 0.5 * rotation + pivots[0].lean
-        return -pull * np.sin(along), -pull * np.cos(along)
+        tension = np.clip(self.prestress + self.stiffness * stretch, 0.0, self.strength)
+        inclination = 0.5 * rotation + pivots[0].lean
+        return -tension * np.sin(inclination), -tension * np.cos(inclination)
 
-    def _stretched(self, pivots: tuple[Pivot, Pivot], bends: tuple[float, float]) -> tuple[float, float, float]:
-        """Return the largest elongation, m, the largest force, N, and the plastic elongation, m.
+    def _compute_extremes(self, pivots: tuple[Pivot, Pivot], ratios: tuple[float, float]) -> tuple[float, float, float]:
+        """Compute the largest elongation, m, the largest force, N, and the plastic elongation, m.
 
-        ``bends``: largest opening of the base on each side divided by the distance from the pivot.
+        ``ratios``: largest opening of the base on each side divided by the distance from the pivot.
         """
-        elongation = max(self._opening(pivot) * bend for pivot, bend in zip(pivots, bends, strict=True))
+        elongation = max(self._find_lever(pivot) * ratio for pivot, ratio in zip(pivots, ratios, strict=True))
         elastic = self.prestress + self.stiffness * elongation
         if elastic <= self.strength:
             return elongation, elastic, 0.0
@@ -200,13 +200,13 @@ class Tendon(Restraint):
 
     def __str__(self) -> str:
         parts = [
-            _thousands(self.stiffness, "N/m") if self.stiffness else "constant force",
-            f"prestress {_thousands(self.prestress, 'N')}" if self.prestress else "no prestress",
-            f"yielding at {_thousands(self.strength, 'N')}" if self.strength < math.inf else "",
+            _format_si(self.stiffness, "N/m") if self.stiffness else "constant force",
+            f"prestress {_format_si(self.prestress, 'N')}" if self.prestress else "no prestress",
+            f"yielding at {_format_si(self.strength, 'N')}" if self.strength < math.inf else "",
         ]
-        return f"tendon of {', '.join(filter(None, parts))}{_at(self.offset) or ' at the centre of mass'}"
+        return f"tendon of {', '.join(filter(None, parts))}{_describe_offset(self.offset) or ' at the centre of mass'}"
 
-    def _opening(self, pivot: Pivot) -> float:
+    def _find_lever(self, pivot: Pivot) -> float:
         """Return the distance of the duct from the pivot, m."""
         x = pivot.distance - pivot.sign * self.offset
         if x < -1e-12 * pivot.distance:
@@ -242,13 +242,13 @@ class Spring(Restraint):
     stiffness: float
 
     def __post_init__(self) -> None:
-        self._positive("stiffness", "N m/rad")
+        self._set_positive("stiffness", "N m/rad")
 
-    def _terms(self, pivot: Pivot) -> Terms:
+    def _compute_terms(self, pivot: Pivot) -> Terms:
         return Terms(spring=self.stiffness / pivot.moment)
 
     def __str__(self) -> str:
-        return f"spring of {_thousands(self.stiffness, 'N m/rad')}"
+        return f"spring of {_format_si(self.stiffness, 'N m/rad')}"
 
 
 @dataclass(frozen=True)
@@ -273,13 +273,13 @@ class Damper(Restraint):
     coefficient: float
 
     def __post_init__(self) -> None:
-        self._positive("coefficient", "N m s/rad")
+        self._set_positive("coefficient", "N m s/rad")
 
-    def _terms(self, pivot: Pivot) -> Terms:
+    def _compute_terms(self, pivot: Pivot) -> Terms:
         return Terms(damping=self.coefficient * pivot.p**2 / pivot.moment)
 
     def __str__(self) -> str:
-        return f"damper of {_thousands(self.coefficient, 'N m s/rad')}"
+        return f"damper of {_format_si(self.coefficient, 'N m s/rad')}"
 
 
 @dataclass(frozen=True)
@@ -314,21 +314,23 @@ class Thrust(Restraint):
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        self._finite("force", "offset")
+        self._set_finite("force", "offset")
         if self.force == 0.0:
             raise InvalidBlock("{} of a thrust must not be zero", "force", value=self.force)
-        self._positive("height", "m")
+        self._set_positive("height", "m")
 
-    def _terms(self, pivot: Pivot) -> Terms:
-        across, along = pivot.turned(*pivot.arms(self.height, self.offset))
+    def _compute_terms(self, pivot: Pivot) -> Terms:
+        rho_sin, rho_cos = pivot.rotate(*pivot.find_arms(self.height, self.offset))
         force = pivot.sign * self.force / pivot.moment
-        return Terms(force * across, -force * along)
+        return Terms(force * rho_sin, -force * rho_cos)
 
-    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
         return self.force, 0.0
 
     def __str__(self) -> str:
-        return f"thrust of {_thousands(self.force, 'N')} at a height of {self.height:.5g} m{_at(self.offset)}"
+        return (
+            f"thrust of {_format_si(self.force, 'N')} at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
+        )
 
 
 @dataclass(frozen=True)
@@ -368,24 +370,26 @@ class Load(Restraint):
     follows: bool = True
 
     def __post_init__(self) -> None:
-        self._positive("mass", "kg")
-        self._positive("height", "m")
-        self._finite("offset")
+        self._set_positive("mass", "kg")
+        self._set_positive("height", "m")
+        self._set_finite("offset")
         object.__setattr__(self, "follows", checks.boolean(self.follows, "follows", InvalidBlock))
 
-    def _terms(self, pivot: Pivot) -> Terms:
+    def _compute_terms(self, pivot: Pivot) -> Terms:
         if self.follows:  # part of the block
             return Terms()
-        across, along = pivot.turned(*pivot.arms(self.height, self.offset))
+        rho_sin, rho_cos = pivot.rotate(*pivot.find_arms(self.height, self.offset))
         weight = self.mass * pivot.gravity / pivot.moment
-        return Terms(weight * along, weight * across)
+        return Terms(weight * rho_cos, weight * rho_sin)
 
-    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
         return 0.0, 0.0 if self.follows else -self.mass * pivots[0].gravity
 
     def __str__(self) -> str:
-        follows = "that follows" if self.follows else "that only presses"
-        return f"load of {self.mass:.5g} kg {follows} at a height of {self.height:.5g} m{_at(self.offset)}"
+        behaviour = "that follows" if self.follows else "that only presses"
+        return (
+            f"load of {self.mass:.5g} kg {behaviour} at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
+        )
 
 
 @dataclass(frozen=True)
@@ -393,7 +397,8 @@ class Restitution:
     """Law by which the restitution of a `RestrainedBlock` varies between two bounds from impact to impact.
 
     With a slope the restitution decreases linearly with the speed of the impact: max(minimum, maximum - slope speed).
-    With a seed it is drawn at each impact, uniformly between both bounds, by Philox 2x32 with ten rounds.
+    With a seed it is drawn at each impact, uniformly between both bounds, by Philox 2x32 with ten rounds
+    (:cite:t:`salmon2011`).
 
     Parameters
     ----------
@@ -417,10 +422,6 @@ class Restitution:
     --------
     RestrainedBlock : Block that accepts this law.
 
-    References
-    ----------
-    J. K. Salmon, M. A. Moraes, R. O. Dror and D. E. Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11 (2011).
-
     Examples
     --------
     >>> from rocking import Block, RestrainedBlock, simulate
@@ -438,16 +439,14 @@ class Restitution:
     def __post_init__(self) -> None:
         if self.slope is None:
             if self.seed is None:
-                raise InvalidBlock("a restitution that varies needs a {} or a {}", "slope", "seed")
+                raise InvalidBlock("a law of restitution requires a {} or a {}", "slope", "seed")
             object.__setattr__(self, "slope", 0.0)
-        slopes = checked_pair(self.slope, "slope")
-        if wrong := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
+        slopes = check_pair(self.slope, "slope")
+        if invalid := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
             raise InvalidBlock(
-                f"{{}} must be finite and at least 0, in s/rad, not {wrong[0]:g}: a faster impact loses more",
-                "slope",
-                value=self.slope,
+                f"{{}} must be finite and at least 0, in s/rad, not {invalid[0]:g}", "slope", value=self.slope
             )
-        for low, high in zip(checked_pair(self.minimum, "minimum"), checked_pair(self.maximum, "maximum"), strict=True):
+        for low, high in zip(check_pair(self.minimum, "minimum"), check_pair(self.maximum, "maximum"), strict=True):
             if not 0.0 < high <= 1.0:
                 hint = checks.hint_at_percent(high)
                 raise InvalidBlock(f"{{}} must be in (0, 1], not {high:g}{hint}", "maximum", value=self.maximum)
@@ -459,11 +458,11 @@ class Restitution:
         if self.seed is not None:
             checks.integer(self.seed, "seed", InvalidBlock, 0, _LARGEST_SEED)
             if max(slopes) > 0.0:
-                raise InvalidBlock("a restitution either falls or is drawn: give a {} or a {}", "slope", "seed")
+                raise InvalidBlock("a law of restitution has either a {} or a {}, not both", "slope", "seed")
 
-    def _terms(self, side: int) -> dict[str, float]:
-        """Return the law on leaving a side as fields of `Terms`, without the maximum."""
-        minimum, slope = (checked_pair(getattr(self, name), name)[side] for name in ("minimum", "slope"))
+    def _compute_terms(self, side: int) -> dict[str, float]:
+        """Return the law on leaving a side as fields of `Terms`, without the largest factor."""
+        minimum, slope = (check_pair(getattr(self, name), name)[side] for name in ("minimum", "slope"))
         seed = -1.0 if self.seed is None else float(self.seed)
         return {"restitution_least": minimum, "restitution_slope": slope, "restitution_seed": seed}
 
@@ -473,12 +472,12 @@ class Restitution:
         return f"restitution drawn from {self.minimum} to {self.maximum}, seed {self.seed}"
 
 
-def _at(offset: float) -> str:
+def _describe_offset(offset: float) -> str:
     """Describe a position off the centre of mass."""
     return f" {abs(offset):.5g} m to side {'+' if offset > 0.0 else '-'}" if offset else ""
 
 
-def _thousands(value: float, unit: str) -> str:
+def _format_si(value: float, unit: str) -> str:
     """Format a number with its unit, if large with kilo, mega or giga."""
     for size, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if abs(value) >= size:

@@ -21,51 +21,51 @@ Number = TypeVar("Number", float, Floats)
 _GRAVITY: Final = (1e-6, 1e6)
 _LENGTH: Final = (1e-20, 1e20)
 _MASS: Final = (1e-30, 1e30)
-_LIMITS: Final = {
+_BOUNDS: Final = {
     "p": (1e-6, 1e6, "positive, from 1e-06 to 1e+06 rad/s"),
     "alpha": (1e-9, math.nextafter(0.5 * math.pi, 0.0), "from 1e-09 to below pi/2 rad"),
     "restitution": (1e-9, 1.0, "in (0, 1], at least 1e-09"),
 }
 
 #: Largest number of contact points. Far beyond it, the loss is below rounding error.
-_MOST_POINTS: Final = 1_000_000
+_MAX_POINTS: Final = 1_000_000
 
 
-def checked_parameter(value: float, name: str, *, origin: str = "", which: str = "") -> float:
+def check_parameter(value: float, name: str, *, origin: str = "", label: str = "") -> float:
     """Return p, alpha or restitution of a side, or raise InvalidBlock that names its origin and its block."""
-    low, high, rule = _LIMITS[name]
+    low, high, range_text = _BOUNDS[name]
     if not low <= value <= high:
         hint = checks.hint_at_degrees(value) if name == "alpha" else ""
         hint = checks.hint_at_percent(value) if name == "restitution" else hint
-        raise InvalidBlock(f"{{}}{origin} must be {rule}, not {value:g}{which}{hint}", name, value=value)
+        raise InvalidBlock(f"{{}}{origin} must be {range_text}, not {value:g}{label}{hint}", name, value=value)
     return value
 
 
-def checked_sides(values: Floats, name: str) -> Floats:
+def check_sides(values: Floats, name: str) -> Floats:
     """Return p, alpha or restitution, shape (n, 2), or raise InvalidBlock for the first one out of range."""
-    low, high, _ = _LIMITS[name]
-    bad = np.argwhere(~((values >= low) & (values <= high)))
-    if len(bad):
-        checked_parameter(float(values[tuple(bad[0])]), name, which=f" (block {bad[0][0]})")
+    low, high, _ = _BOUNDS[name]
+    invalid = np.argwhere(~((values >= low) & (values <= high)))
+    if len(invalid):
+        check_parameter(float(values[tuple(invalid[0])]), name, label=f" (block {invalid[0][0]})")
     return values
 
 
-def checked_gravity(gravity: object) -> float:
+def check_gravity(gravity: object) -> float:
     """Return an acceleration of gravity, m/s^2, or raise InvalidBlock."""
     return checks.positive(gravity, "gravity", InvalidBlock, "m/s^2", _GRAVITY)
 
 
-def checked_mass(mass: object) -> float:
+def check_mass(mass: object) -> float:
     """Return a mass, kg, or raise InvalidBlock."""
     return checks.positive(mass, "mass", InvalidBlock, "kg", _MASS)
 
 
-def checked_length(value: object, name: str) -> float:
+def check_length(value: object, name: str) -> float:
     """Return a length, m, or raise InvalidBlock."""
     return checks.positive(value, name, InvalidBlock, "m", _LENGTH)
 
 
-def checked_pair(value: Any, name: str) -> tuple[float, float]:
+def check_pair(value: Any, name: str) -> tuple[float, float]:
     """Return a number, or a pair (side +, side -), as two numbers."""
     if type(value) is float:
         return value, value
@@ -79,15 +79,15 @@ def checked_pair(value: Any, name: str) -> tuple[float, float]:
 
 
 def housner_restitution(alpha: float) -> float:
-    """Compute the restitution of a rectangular block from angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963)."""
+    """Compute the restitution of a rectangle, 1 - 1.5 sin(alpha)^2, from angular momentum (:cite:t:`housner1963`)."""
     return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
 
 
 def one_sided_restitution(alpha: float) -> float:
     """Compute the restitution of a wall that rocks against transverse walls, from angular momentum at three impacts.
 
-    The wall hits the ground with its inner edge, the transverse walls with its top, and the ground again (Sorrentino,
-    AlShawa and Decanini 2011). A measured value is preferable.
+    The wall hits the ground with its inner edge, the transverse walls with its top, and the ground again
+    (:cite:t:`sorrentino2011`). A measured value is preferable.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def one_sided_restitution(alpha: float) -> float:
     >>> round(one_sided_restitution(0.1), 4)
     0.4707
     """
-    angle = checked_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
+    angle = check_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
     sine, cosine = math.sin(angle), math.cos(angle)
     return abs((1.0 - 1.5 * sine * sine) ** 2 * (1.0 - 1.5 * cosine * cosine))
 
@@ -157,15 +157,9 @@ def impact_restitution(
     Notes
     -----
     With A = k^2 + h^2 and pivots at d_i and d_j from the centre of mass, e_i = (A - kappa d_i d_j)/(A + kappa d_j^2)
-    for a contact kappa (after Kalliontzis, Sritharan and Schultz 2016, whose formula is mostly quoted with kappa^2 in
-    place of kappa; square such a value). For several points, e_i is the product of (A + x y)/(A + y^2) over points x
-    and their successors y (after Ther and Kollar 2017). (Derived in the documentation.)
-
-    References
-    ----------
-    D. Kalliontzis, S. Sritharan and A. Schultz, "Improved coefficient of restitution estimation for free rocking
-    members", Journal of Structural Engineering 142 (2016). T. Ther and L. P. Kollar, "Refinement of Housner's model on
-    rocking blocks", Bulletin of Earthquake Engineering 15 (2017).
+    for a contact kappa (after :cite:t:`kalliontzis2016`, whose formula is mostly quoted with kappa^2 in place of
+    kappa; square such a value). For several points, e_i is the product of (A + x y)/(A + y^2) over points x and their
+    successors y (after :cite:t:`ther2017`). (Derived in the documentation.)
 
     Examples
     --------
@@ -173,43 +167,43 @@ def impact_restitution(
     [0.869, 0.8938, 0.9323]
     """
     if alpha is not None and distances is None and height is None and radius_of_gyration is None:
-        angle = checked_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
-        away, h, k = (math.sin(angle),) * 2, math.cos(angle), math.sqrt(1.0 / 3.0)
+        angle = check_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
+        arms, h, k = (math.sin(angle),) * 2, math.cos(angle), math.sqrt(1.0 / 3.0)
     elif alpha is None and not (distances is None or height is None or radius_of_gyration is None):
-        plus, minus = checked_pair(distances, "distances")
-        away = checked_length(plus, "distances"), checked_length(minus, "distances")
-        h, k = checked_length(height, "height"), checked_length(radius_of_gyration, "radius_of_gyration")
+        plus, minus = check_pair(distances, "distances")
+        arms = check_length(plus, "distances"), check_length(minus, "distances")
+        h, k = check_length(height, "height"), check_length(radius_of_gyration, "radius_of_gyration")
     else:
         raise InvalidBlock(
             "give either {} of a rectangular block, or {}, {} and {} of a body",
             "alpha", "distances", "height", "radius_of_gyration",
         )  # fmt: skip
-    share = checks.fraction(contact, "contact", InvalidBlock, below=math.nextafter(1.0, 2.0))
-    count = checks.integer(points, "points", InvalidBlock, 2, _MOST_POINTS)
-    if share < 1.0 and count > 2:
+    kappa = checks.fraction(contact, "contact", InvalidBlock, below=math.nextafter(1.0, 2.0))
+    count = checks.integer(points, "points", InvalidBlock, 2, _MAX_POINTS)
+    if kappa < 1.0 and count > 2:
         raise InvalidBlock("give either a {} or {}, not both", "contact", "points")
     inertia = k * k + h * h
-    kept = _on_leaving(away, inertia, share, count), _on_leaving(away[::-1], inertia, share, count)
-    if min(kept) <= 0.0:
+    factors = (_compute_factor(arms, inertia, kappa, count), _compute_factor(arms[::-1], inertia, kappa, count))
+    if min(factors) <= 0.0:
         raise InvalidBlock(
-            f"angular momentum leaves this body a restitution of {min(kept):.3g}: it is too stocky to rock that way"
+            f"angular momentum leaves this body a restitution of {min(factors):.3g}: it is too stocky to rock that way"
         )
-    near, far = sorted(away)
-    ratio = math.sqrt((inertia + far * far) / (inertia + near * near))  # ratio of the speeds without energy loss
-    least = inertia * (ratio - 1.0) / (far * (far + ratio * near))
-    if share < least:
-        raise InvalidBlock(f"{{}} must be at least {least:.4g} for this body, which would gain energy", "contact")
-    return kept
+    short, long = sorted(arms)
+    ratio = math.sqrt((inertia + long * long) / (inertia + short * short))  # ratio of the speeds without energy loss
+    min_kappa = inertia * (ratio - 1.0) / (long * (long + ratio * short))
+    if kappa < min_kappa:
+        raise InvalidBlock(f"{{}} must be at least {min_kappa:.4g} for this body, which would gain energy", "contact")
+    return factors
 
 
-def _on_leaving(away: Sequence[float], inertia: float, share: float, points: int) -> float:
+def _compute_factor(distances: Sequence[float], inertia: float, kappa: float, points: int) -> float:
     """Compute the factor on leaving the first of two pivots, from their distances and k^2 + h^2."""
     if points == 2:
-        return (inertia - share * away[0] * away[1]) / (inertia + share * away[1] ** 2)
-    step = (away[0] + away[1]) / (points - 1)
+        return (inertia - kappa * distances[0] * distances[1]) / (inertia + kappa * distances[1] ** 2)
+    step = (distances[0] + distances[1]) / (points - 1)
     loss = 0.0
     for n in range(1, points):
-        x = away[0] - n * step
+        x = distances[0] - n * step
         change = step * x / (inertia + x * x)
         if change <= -1.0:
             return 1.0 + change
@@ -250,31 +244,31 @@ class Side:
         return f"<Side: {self}, R = {self.radius:.5g} m>"
 
 
-def in_line(sides: Sequence[object]) -> str:
+def format_sides(sides: Sequence[object]) -> str:
     """Return the parameters in one line, by side if they differ."""
     if len(sides) == 1 or sides[0] == sides[1]:
         return str(sides[0])
     return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
 
 
-def even_sides(
+def build_even_sides(
     gravity: float, radius: float, alpha: float, restitution: object, conserved: float, arm: float | None = None
 ) -> tuple[Side, Side]:
     """Return both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
-    plus, minus = restitutions(restitution, (conserved, conserved))
+    plus, minus = choose_restitutions(restitution, (conserved, conserved))
     p = math.sqrt(0.75 * gravity / radius)
     return Side(p, alpha, plus, radius, arm), Side(p, alpha, minus, radius, arm)
 
 
-def sides_on_pivots(
-    distances: tuple[float, float], height: float, gyration_squared: float, gravity: float, restitution: object
+def build_sides(
+    distances: tuple[float, float], height: float, gyration_sq: float, gravity: float, restitution: object
 ) -> tuple[Side, Side]:
     """Return the sides of a body, from its pivot distances, the height of its centre of mass, m, and k^2, m^2."""
     plus, minus = distances
     radii = math.hypot(plus, height), math.hypot(minus, height)
-    inertias = [gyration_squared + radius * radius for radius in radii]
-    kept = gyration_squared + height * height - plus * minus
-    e = restitutions(restitution, (kept / inertias[1], kept / inertias[0]))
+    inertias = [gyration_sq + radius * radius for radius in radii]
+    numerator = gyration_sq + height * height - plus * minus
+    e = choose_restitutions(restitution, (numerator / inertias[1], numerator / inertias[0]))
     first, second = (
         Side(math.sqrt(gravity * radius / inertia), math.atan2(distance, height), factor, radius)
         for distance, radius, inertia, factor in zip(distances, radii, inertias, e, strict=True)
@@ -282,9 +276,9 @@ def sides_on_pivots(
     return first, second
 
 
-def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, float]:
+def choose_restitutions(restitution: object, conserved: Sequence[float]) -> tuple[float, float]:
     """Return the given restitutions, by default the ones that conserve angular momentum."""
-    if given is None:
+    if restitution is None:
         if min(conserved) <= 0.0:
             raise InvalidBlock(
                 f"conserving angular momentum gives this block a restitution of {min(conserved):.3g}: it is too stocky "
@@ -292,12 +286,12 @@ def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, floa
                 "restitution",
             )
         return conserved[0], conserved[1]
-    if hasattr(given, "maximum"):  # a Restitution, whose module imports this one
+    if hasattr(restitution, "maximum"):  # a Restitution, whose module imports this one
         raise InvalidBlock(
             "{} of a Block must be a number or a pair; give a law to RestrainedBlock(block, restitution=...)",
             "restitution",
         )
-    plus, minus = (checked_parameter(value, "restitution") for value in checked_pair(given, "restitution"))
+    plus, minus = (check_parameter(value, "restitution") for value in check_pair(restitution, "restitution"))
     return plus, minus
 
 
@@ -305,7 +299,7 @@ def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, floa
 _ROUNDING: Final = 1e-9
 
 
-def rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
+def find_rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
     """Compute the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
 
     Returns the restitutions by angular momentum, NaN without such a body, and the height of the centre of mass divided
@@ -318,46 +312,48 @@ def rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
     quotient = 1.0 / (cosine * p**2)  # (k^2 + R^2)/(g h)
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = (quotient[:, 0] - quotient[:, 1]) / (tangent[:, 0] - tangent[:, 1])
-        kept: Floats = 1.0 - np.sin(alpha[:, ::-1]) * p[:, ::-1] ** 2 * slope[:, None]
+        factors: Floats = 1.0 - np.sin(alpha[:, ::-1]) * p[:, ::-1] ** 2 * slope[:, None]
         depth = slope / tangent.sum(axis=1)
-    differing, most = _differences(p, cosine)
-    kept[differing >= most] = np.nan
-    equal = np.all([abs(each[:, 0] - each[:, 1]) <= _ROUNDING * each[:, 0] for each in (p, alpha)], axis=0)
-    kept[equal] = 1.0 - 1.5 * np.sin(alpha[equal]) ** 2
+    difference, bound = _compare_sides(p, cosine)
+    factors[difference >= bound] = np.nan
+    equal = np.all([abs(values[:, 0] - values[:, 1]) <= _ROUNDING * values[:, 0] for values in (p, alpha)], axis=0)
+    factors[equal] = 1.0 - 1.5 * np.sin(alpha[equal]) ** 2
     depth[equal] = np.nan
-    return kept, depth
+    return factors, depth
 
 
-def _differences(p: Floats, cosine: Floats) -> tuple[Floats, Floats]:
+def _compare_sides(p: Floats, cosine: Floats) -> tuple[Floats, Floats]:
     """Return logarithmic differences of p between sides, and their bounds for a rigid body."""
     return np.abs(np.log(p[:, 0] / p[:, 1])), 0.5 * np.abs(np.log(cosine[:, 0] / cosine[:, 1]))
 
 
-def no_body(p: Floats, alpha: Floats) -> str:
+def describe_missing_body(p: Floats, alpha: Floats) -> str:
     """Return the message that no rigid body has the p and alpha of two sides."""
-    differ, most = (100.0 * math.expm1(float(each[0])) for each in _differences(p[None], np.cos(alpha)[None]))
+    difference, bound = (
+        100.0 * math.expm1(float(values[0])) for values in _compare_sides(p[None], np.cos(alpha)[None])
+    )
     return (
         f"no rigid body has p = {p[0]:g} and {p[1]:g} rad/s on sides of alpha = {alpha[0]:g} and {alpha[1]:g} rad: its "
-        f"p would differ by less than {most:.2g} %, not by {differ:.2g} %; give p and alpha with more digits, or "
+        f"p would differ by less than {bound:.2g} %, not by {difference:.2g} %; give p and alpha with more digits, or "
         "give {} a value in (0, 1]"
     )
 
 
-def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
+def compute_eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
     """Compute rectangles with an offset centre of mass and these slendernesses, shape (n, 2).
 
     Returns p of each side divided by p of the symmetric rectangle, and the restitutions by angular momentum.
     """
     distances = np.tan(alpha)  # divided by the height of the centre of mass
     half_width, offset = 0.5 * distances.sum(axis=1), 0.5 * (distances[:, 1] - distances[:, 0])
-    squared = gyration_squared(half_width, 1.0, offset)[:, None]
+    gyration = square_gyration(half_width, 1.0, offset)[:, None]
     radius = np.hypot(distances, 1.0)
-    inertia = squared + radius**2
+    inertia = gyration + radius**2
     p = np.sqrt(radius / inertia * (4.0 / 3.0) * np.hypot(half_width, 1.0)[:, None])
-    kept = squared + 1.0 - np.prod(distances, axis=1, keepdims=True)
-    return p, kept / inertia[:, ::-1]
+    numerator = gyration + 1.0 - np.prod(distances, axis=1, keepdims=True)
+    return p, numerator / inertia[:, ::-1]
 
 
-def gyration_squared(half_width: Number, half_height: float, offset: Number) -> Number:
+def square_gyration(half_width: Number, half_height: float, offset: Number) -> Number:
     """Return the squared radius of gyration, m^2, of a rectangle with an offset centre of mass."""
     return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset

@@ -12,19 +12,19 @@ import numpy as np
 from rocking.block.body import KINDS, SINGLE, Bodies, Body, Coordinate
 from rocking.block.sides import (
     Side,
-    checked_gravity,
-    checked_length,
-    checked_mass,
-    checked_pair,
-    checked_parameter,
-    even_sides,
-    gyration_squared,
+    build_even_sides,
+    build_sides,
+    check_gravity,
+    check_length,
+    check_mass,
+    check_pair,
+    check_parameter,
+    choose_restitutions,
+    describe_missing_body,
+    find_rigid_bodies,
+    format_sides,
     housner_restitution,
-    in_line,
-    no_body,
-    restitutions,
-    rigid_bodies,
-    sides_on_pivots,
+    square_gyration,
 )
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
@@ -37,8 +37,8 @@ ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_accelerati
 #: Relative rounding error of a length.
 _ROUNDING: Final = 1e-12
 #: Largest difference of a restitution from the value of a rigid body that counts as equal.
-_SAME_RESTITUTION: Final = 1e-9
-_HEAVIEST_BEAM: Final = 1e12
+_RESTITUTION_TOLERANCE: Final = 1e-9
+_MAX_MASS_RATIO: Final = 1e12
 
 
 class Rocking:
@@ -46,7 +46,7 @@ class Rocking:
 
     def __str__(self: Body) -> str:
         """Return the description and the parameters in one line."""
-        return f"{self.description}; {in_line(self.sides)}"
+        return f"{self.description}; {format_sides(self.sides)}"
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self}>"
@@ -96,7 +96,7 @@ class Block(Rocking):
 
     Notes
     -----
-    alpha = atan(b/h), R = hypot(b, h), p = sqrt(3 g/(4 R)) (paper, section 2; Housner 1963).
+    alpha = atan(b/h), R = hypot(b, h), p = sqrt(3 g/(4 R)) (paper, section 2; :cite:t:`housner1963`).
 
     With an offset s the block is the body of `from_pivots` with distances (b - s, b + s), height h and radius of
     gyration k = sqrt((b^2 + h^2)/3 - s^2). Its moment of inertia about the middle is unchanged, as for halves of
@@ -134,28 +134,28 @@ class Block(Rocking):
         if unnamed:
             raise InvalidBlock("give the sizes of a block by name, in m: Block({}=0.4, {}=2.0)", "width", "height")
         for name in unknown:
-            makers = {"p": "from_parameters", "alpha": "from_parameters", "distances": "from_pivots"}
-            makers |= {"radius_of_gyration": "from_pivots", "mass_ratio": "from_frame"}
-            hint = f"use Block.{makers[name]}" if name in makers else "see help(rocking.Block)"
+            constructors = {"p": "from_parameters", "alpha": "from_parameters", "distances": "from_pivots"}
+            constructors |= {"radius_of_gyration": "from_pivots", "mass_ratio": "from_frame"}
+            hint = f"use Block.{constructors[name]}" if name in constructors else "see help(rocking.Block)"
             raise TypeError(f"Block has no argument {name}; {hint}")
-        b, h = _half_sizes((half_width, half_height), (width, height))
-        g = checked_gravity(gravity)
-        text = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
+        b, h = _resolve_half_sizes((half_width, half_height), (width, height))
+        g = check_gravity(gravity)
+        description = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
         s = checks.finite(offset, "offset", InvalidBlock)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
             raise InvalidBlock(
-                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}: of a block with its mass "
-                "farther out the pivots and the radius of gyration must be given",
+                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}; for a block with its mass "
+                "farther out, the pivots and the radius of gyration must be given",
                 "offset",
                 value=offset,
             )
         if s == 0.0:
             alpha = math.atan2(b, h)
-            sides = even_sides(g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha))
+            sides = build_even_sides(g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha))
         else:
-            sides = sides_on_pivots((b - s, b + s), h, gyration_squared(b, h, s), g, restitution)
-            text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
-        self._fill(sides, g, text, mass, (b, h, s))
+            sides = build_sides((b - s, b + s), h, square_gyration(b, h, s), g, restitution)
+            description += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
+        self._fill(sides, g, description, mass, (b, h, s))
 
     def _fill(
         self,
@@ -167,15 +167,15 @@ class Block(Rocking):
     ) -> Block:
         """Set all attributes, for a rectangle with half sizes and offset, m."""
         for side in sides:
-            checked_parameter(side.p, "p", origin=" (from the sizes)")
-            checked_parameter(side.alpha, "alpha", origin=" (from the sizes)")
-        mass = None if mass is None else checked_mass(mass)
+            check_parameter(side.p, "p", origin=" (from the sizes)")
+            check_parameter(side.alpha, "alpha", origin=" (from the sizes)")
+        mass = None if mass is None else check_mass(mass)
         self.__dict__.update(sides=sides, gravity=gravity, description=description, mass=mass)
         self.__dict__.update(zip(("half_width", "half_height", "offset"), rectangle, strict=True))
         return self
 
-    def _rows(self) -> list[tuple[float, ...]]:
-        """Return the parameters of both sides as stored in `Blocks`."""
+    def _build_rows(self) -> list[tuple[float, ...]]:
+        """Collect the parameters of both sides as stored in `Blocks`."""
         return [(side.p, side.alpha, side.restitution) for side in self.sides]
 
     def _with_sides(self, sides: tuple[Side, Side]) -> Block:
@@ -232,24 +232,26 @@ class Block(Rocking):
         >>> [round(side.restitution, 3) for side in statue.sides]
         [0.95, 0.914]
         """
-        g = checked_gravity(gravity)
-        rates = [checked_parameter(value, "p") for value in checked_pair(p, "p")]
-        angles = [checked_parameter(value, "alpha") for value in checked_pair(alpha, "alpha")]
-        radii, text = [0.75 * g / rate**2 for rate in rates], "block from its parameters"
+        g = check_gravity(gravity)
+        rates = [check_parameter(value, "p") for value in check_pair(p, "p")]
+        angles = [check_parameter(value, "alpha") for value in check_pair(alpha, "alpha")]
+        radii, description = [0.75 * g / rate**2 for rate in rates], "block from its parameters"
         if rates[0] == rates[1] and angles[0] == angles[1]:
-            e = restitutions(restitution, (housner_restitution(angles[0]),) * 2)
+            e = choose_restitutions(restitution, (housner_restitution(angles[0]),) * 2)
         else:
-            kept, depths = rigid_bodies(np.array([rates]), np.array([angles]))
-            conserved, depth = kept[0].tolist(), g * float(depths[0])
+            factors, depths = find_rigid_bodies(np.array([rates]), np.array([angles]))
+            conserved, depth = factors[0].tolist(), g * float(depths[0])
             if restitution is None and math.isnan(conserved[0]):
-                raise InvalidBlock(no_body(np.array(rates), np.array(angles)), "restitution")
-            e = restitutions(restitution, conserved)
-            if depth > 0.0 and all(abs(e[i] - conserved[i]) <= _SAME_RESTITUTION for i in range(2)):
+                raise InvalidBlock(describe_missing_body(np.array(rates), np.array(angles)), "restitution")
+            e = choose_restitutions(restitution, conserved)
+            if depth > 0.0 and all(abs(e[i] - conserved[i]) <= _RESTITUTION_TOLERANCE for i in range(2)):
                 radii = [depth / math.cos(angle) for angle in angles]
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
-                text = f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
+                description = (
+                    f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
+                )
         sides = tuple(Side(rates[i], angles[i], e[i], radii[i]) for i in range(2))
-        return cls.__new__(cls)._fill((sides[0], sides[1]), g, text)
+        return cls.__new__(cls)._fill((sides[0], sides[1]), g, description)
 
     @classmethod
     def from_pivots(
@@ -306,11 +308,11 @@ class Block(Rocking):
         >>> abs(body.p - rectangle.p) < 1e-15, abs(body.restitution - rectangle.restitution) < 1e-15
         (True, True)
         """
-        plus, minus = (checked_length(value, "distances") for value in checked_pair(distances, "distances"))
-        h = checked_length(height, "height")
-        k = checked_length(radius_of_gyration, "radius_of_gyration")
-        g = checked_gravity(gravity)
-        sides = sides_on_pivots((plus, minus), h, k * k, g, restitution)
+        plus, minus = (check_length(value, "distances") for value in check_pair(distances, "distances"))
+        h = check_length(height, "height")
+        k = check_length(radius_of_gyration, "radius_of_gyration")
+        g = check_gravity(gravity)
+        sides = build_sides((plus, minus), h, k * k, g, restitution)
         pivots = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
         return cls.__new__(cls)._fill(sides, g, description or pivots, mass)
 
@@ -350,7 +352,7 @@ class Block(Rocking):
         Notes
         -----
         The block has the slenderness of a column and R' = R (1 + 3 gamma)/(1 + 2 gamma). Therefore a heavier beam
-        increases the stability (Makris and Vassiliou 2013; derived in the documentation).
+        increases the stability (:cite:t:`makris2013`; derived in the documentation).
 
         Examples
         --------
@@ -359,17 +361,17 @@ class Block(Rocking):
         >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
         (True, 1.4)
         """
-        b, h = checked_length(half_width, "half_width"), checked_length(half_height, "half_height")
-        g = checked_gravity(gravity)
-        gamma = checks.between(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _HEAVIEST_BEAM)
+        b, h = check_length(half_width, "half_width"), check_length(half_height, "half_height")
+        g = check_gravity(gravity)
+        gamma = checks.between(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _MAX_MASS_RATIO)
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
-        kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
+        numerator = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
         # The beam moves twice as far as the centres of the columns.
         arm = math.hypot(b, h) * (1.0 + 2.0 * gamma) / (1.0 + gamma)
-        sides = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), arm)
-        text = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
-        return cls.__new__(cls)._fill(sides, g, text)
+        sides = build_even_sides(g, radius, alpha, restitution, numerator / (1.0 + 3.0 * gamma), arm)
+        description = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
+        return cls.__new__(cls)._fill(sides, g, description)
 
     @classmethod
     def one_sided(cls, *restraints: Any, lean: float = 0.0, restitution: Any = None, **sizes: Any) -> Any:
@@ -418,33 +420,33 @@ class Block(Rocking):
     @property
     def p(self) -> float:
         """Frequency parameter, rad/s, if both sides are equal. Otherwise use `sides`."""
-        return self._of_both_sides("p")
+        return self._get_common("p")
 
     @property
     def alpha(self) -> float:
         """Slenderness, rad, if both sides are equal. Otherwise use `sides`."""
-        return self._of_both_sides("alpha")
+        return self._get_common("alpha")
 
     @property
     def radius(self) -> float:
         """Distance R from the pivot to the centre of mass, m, if both sides are equal. Otherwise use `sides`."""
-        return self._of_both_sides("radius")
+        return self._get_common("radius")
 
     @property
     def restitution(self) -> float:
         """Factor on the angular speed at an impact if both sides are equal. Otherwise use `sides`."""
-        return self._of_both_sides("restitution")
+        return self._get_common("restitution")
 
     @property
     def is_symmetric(self) -> bool:
         """Whether both sides are equal."""
         return self.sides[0] == self.sides[1]
 
-    def _of_both_sides(self, name: str) -> float:
+    def _get_common(self, name: str) -> float:
         plus, minus = (getattr(side, name) for side in self.sides)
         if plus != minus:
             raise UnequalSides(
-                f"{name} is {plus:g} on side + and {minus:g} on side - of this block: ask block.sides[0].{name} and "
+                f"{name} is {plus:g} on side + and {minus:g} on side - of this block: use block.sides[0].{name} and "
                 f"block.sides[1].{name}"
             )
         value: float = plus
@@ -473,13 +475,13 @@ class Block(Rocking):
         pivot, where R is the `arm` of the side if it has one. The forces are m (a + x'') and m (g + a_v + y''), at
         rest m (a, g + a_v).
         """
-        leaning, (rotation, velocity, acceleration) = np.maximum(side, 0), motion
-        sides = [(each.alpha, each.radius if each.arm is None else each.arm) for each in self.sides]
-        alpha, arm = np.array(sides).T[:, leaning]
-        sign, over_g = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning), arm / self.gravity
+        side_index, (rotation, velocity, acceleration) = np.maximum(side, 0), motion
+        sides = [(item.alpha, item.radius if item.arm is None else item.arm) for item in self.sides]
+        alpha, arm = np.array(sides).T[:, side_index]
+        sign, arm_over_g = np.where(side < 0, 0.0, 1.0 - 2.0 * side_index), arm / self.gravity
         psi, towards_pivot, speed = alpha - np.abs(rotation), sign * acceleration, np.abs(sign) * velocity**2
-        horizontal = sign * over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
-        vertical = over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
+        horizontal = sign * arm_over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
+        vertical = arm_over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
         return ground_over_g[0] + horizontal, 1.0 + ground_over_g[1] + vertical
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
@@ -488,26 +490,26 @@ class Block(Rocking):
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
-def one_block(block: object, needed: str = "a free Block") -> Block:
+def require_block(block: object, requirement: str = "a free Block") -> Block:
     """Return the block, or raise `InvalidBlock` that names the required object."""
     if not isinstance(block, Block):
-        how = "make one with Block(width=, height=), in m"
+        hint = "make one with Block(width=, height=), in m"
         if hasattr(block, "rose"):
-            how = "use solid.block(azimuth), the block that a Solid is in one vertical plane"
-        raise InvalidBlock(f"{needed} is needed, not a {type(block).__name__}: {how}")
+            hint = "use solid.block(azimuth), the block that a Solid is in one vertical plane"
+        raise InvalidBlock(f"{requirement} is needed, not a {type(block).__name__}: {hint}")
     return block
 
 
-def _half_sizes(
+def _resolve_half_sizes(
     halves: tuple[float | None, float | None], full: tuple[float | None, float | None]
 ) -> tuple[float, float]:
     """Return half sizes, m, from half or full sizes."""
-    given = [size is not None for size in (*halves, *full)]
-    if given == [True, True, False, False]:
-        return checked_length(halves[0], "half_width"), checked_length(halves[1], "half_height")
-    if given == [False, False, True, True]:
-        return 0.5 * checked_length(full[0], "width"), 0.5 * checked_length(full[1], "height")
+    is_given = [size is not None for size in (*halves, *full)]
+    if is_given == [True, True, False, False]:
+        return check_length(halves[0], "half_width"), check_length(halves[1], "half_height")
+    if is_given == [False, False, True, True]:
+        return 0.5 * check_length(full[0], "width"), 0.5 * check_length(full[1], "height")
     raise InvalidBlock(
-        "a block takes either {} and {}, or {} and {} (the full sizes), all in m",
+        "a block requires either {} and {}, or {} and {} (the full sizes), all in m",
         "half_width", "half_height", "width", "height",
     )  # fmt: skip

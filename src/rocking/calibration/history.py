@@ -28,8 +28,8 @@ from rocking.core.result import Result
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.response import Response, drawing_times
-from rocking.response.sensitivity import changes_along
+from rocking.response import Response, choose_times
+from rocking.response.sensitivity import compute_changes
 from rocking.simulation.simulate import simulate
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ class HistoryCalibration(Result):
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
         end = min(float(self.times[-1]), self.response.duration)
-        fine_times = drawing_times(self.response, float(self.times[0]), end)
+        fine_times = choose_times(self.response, float(self.times[0]), end)
         return draw_measured_history(
             time=self.times,
             measured=simulated + self.residuals,
@@ -330,7 +330,7 @@ class _Problem:
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
         is_overturned = times > response.duration
-        changes = changes_along(response._history, times[~is_overturned], [unknown.name for unknown in self.unknowns])
+        changes = compute_changes(response._history, times[~is_overturned], [unknown.name for unknown in self.unknowns])
         jacobian = np.zeros((count, len(logs)))
         jacobian[~is_overturned] = -np.column_stack([changes[unknown.name] for unknown in self.unknowns])
         return jacobian

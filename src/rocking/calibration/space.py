@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.block import Blocks, housner_restitution
-from rocking.block.sides import eccentric_rectangles
+from rocking.block.sides import compute_eccentric_rectangles
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption
@@ -140,7 +140,7 @@ class Space:
         unknown_values = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
         values = unknown_values | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
         if "restitution" not in values and self.two_sided:
-            factors, values["restitution"] = eccentric_rectangles(values["alpha"])
+            factors, values["restitution"] = compute_eccentric_rectangles(values["alpha"])
             values["p"] = values["p"] * factors
         elif "restitution" not in values:
             values["restitution"] = np.vectorize(housner_restitution)(values["alpha"])

@@ -20,7 +20,7 @@ from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
 from rocking.core.result import Result
 from rocking.core.tables import Column, escape_dollars, format_count, format_table, records_to_columns
-from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion, find_distinct_motions, make_names_unique
@@ -348,8 +348,8 @@ def validate(
             outlier_probability = blocks.outlier_probability if outlier_probability is None else outlier_probability
         else:
             description, equation = describe_pool(blocks, weights), model or "nonlinear"
-            bodies = bodies_of(blocks)
-            slenderness_of(bodies)  # checked before the simulations
+            bodies = gather_bodies(blocks)
+            compute_slenderness(bodies)  # checked before the simulations
             shares = normalise_weights(weights, len(bodies)) / len(bodies)
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
         overturned = simulate_outcomes(bodies, distinct, equation)

@@ -30,7 +30,7 @@ from rocking.core.bisection import bisect
 from rocking.core.progress import Progress
 from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
-from rocking.engine.schemes import critical_amplitudes_by
+from rocking.engine.schemes import compute_critical_amplitudes
 from rocking.engine.tasks import require_finished
 from rocking.errors import InvalidOption, Unfinished
 from rocking.kernels.sine import SequenceStatus
@@ -389,7 +389,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     """
     selected = checks.choice(method, "method", InvalidOption, ("exact", "eq76", "eq77"))
     shape, flat_parameters = broadcast_flat(check_frequency(omega), check_restitution(eta))
-    return critical_amplitudes_by(selected, *flat_parameters).reshape(shape)[()]
+    return compute_critical_amplitudes(selected, *flat_parameters).reshape(shape)[()]
 
 
 def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike) -> Floats:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 from rocking import pulses
-from rocking.block import Block, one_block
+from rocking.block import Block, require_block
 from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.errors import InvalidMotion, InvalidOption
@@ -203,7 +203,7 @@ def record(
 
 def _find_threshold(block: Block, model: Model) -> float:
     """Compute the lowest uplift acceleration, m/s^2."""
-    return min(one_block(block).uplift_thresholds(model))
+    return min(require_block(block).uplift_thresholds(model))
 
 
 def _to_hertz(block: Block, omega: float) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.block import one_block
+from rocking.block import require_block
 from rocking.chattering.families import Family, SimulationInput
 from rocking.core import checks
 from rocking.core.arrays import Integers, clear_rounding
@@ -22,7 +22,7 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, Result
 from rocking.core.tables import array_to_rows, escape_dollars, format_table
 from rocking.core.threads import map_in_threads
-from rocking.engine.tasks import OUTCOME, complete_chattering
+from rocking.engine.tasks import OUTCOME, detect_complete_chattering
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.motion.motion import Motion, find_exceedances
@@ -325,7 +325,7 @@ def _simulate_point(point: SimulationInput) -> _MapPoint:
         if not math.isnan(times["upper"]):
             states, trail = state.new_states(1, 0), response.solution.trail
             states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, times["upper"]
-            results["complete_chattering"] = complete_chattering(trail.ground, np.array([trail.block]), states)
+            results["complete_chattering"] = detect_complete_chattering(trail.ground, np.array([trail.block]), states)
     return _MapPoint(
         int(classify_uplifts(results, last_exceedance)[0]), uplift, **times, rests=rests, overturned=response.overturned
     )
@@ -455,7 +455,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     if response.motion is None:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     episodes["ground"] = response.motion.acceleration(sequences["end"])
-    block = one_block(response.block)
+    block = require_block(response.block)
     exceedances = find_exceedances(response.motion, block.uplift_thresholds(response.model), block.gravity)
     if not len(exceedances) or exceedances[0, 0] >= response.duration:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)

@@ -15,7 +15,7 @@ from cyclopts import Group, Parameter, Token
 
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, literal
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, escape_braces
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes, vertical_notes
@@ -140,7 +140,9 @@ class RestrainedOptions(BlockOptions):
         except InvalidBlock as error:
             if not forces or error.argument != "offset":
                 raise
-            raise InvalidBlock(literal(str(error))) from error  # offset of a restraint, not the --offset of the block
+            raise InvalidBlock(
+                escape_braces(str(error))
+            ) from error  # offset of a restraint, not the --offset of the block
         bodies.note_likely_mistakes([block], [body])
         return body
 
@@ -183,7 +185,7 @@ def _add_option_to_errors(option: str) -> Iterator[None]:
     try:
         yield
     except RockingError as error:
-        raise InvalidOption(f"{{}}: {literal(str(error))}", option) from error
+        raise InvalidOption(f"{{}}: {escape_braces(str(error))}", option) from error
 
 
 def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
@@ -197,7 +199,7 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
         name = name.replace("-", "_")
         if not equals or name in values:
             sentence = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
-            raise InvalidOption(sentence + literal(repr(text)), option, value=text)
+            raise InvalidOption(sentence + escape_braces(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
             raise InvalidOption(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
         values[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)

@@ -14,7 +14,7 @@ from cyclopts import Group, Parameter
 
 from rocking.core.progress import note
 from rocking.core.tables import to_json, write_figure, write_text
-from rocking.errors import InvalidOption, Message, OutputError, literal
+from rocking.errors import InvalidOption, Message, OutputError, escape_braces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,7 +72,7 @@ def skip_on_error(files: str, error_type: type[InvalidOption] = InvalidOption) -
     try:
         yield
     except error_type as error:
-        note(Message(f"{literal(files)} left out: {error.message.template}", error.message.arguments))
+        note(Message(f"{escape_braces(files)} left out: {error.message.template}", error.message.arguments))
 
 
 def deliver(

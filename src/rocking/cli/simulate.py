@@ -48,8 +48,8 @@ from rocking.records.named import (
     reject_redundant_arguments,
     shipped,
 )
-from rocking.response import PRECISION, Response, steps_within
-from rocking.response.mechanics import friction_coefficient
+from rocking.response import PRECISION, Response, choose_steps
+from rocking.response.mechanics import check_friction
 from rocking.rules import check as apply_rules
 from rocking.simulation.simulate import simulate as run_simulation
 
@@ -92,8 +92,8 @@ def simulate(
         Also draw the phase plane (phase-plane.png, .pdf) and the energy against time (energy.png, .pdf) into --out.
     """
     if start.friction is not None:
-        friction_coefficient(start.friction)  # checked before the simulation
-    steps_within(start.precision)
+        check_friction(start.friction)  # checked before the simulation
+    choose_steps(start.precision)
     summary_options: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
     body = block.body()
     options: dict[str, Any] = {**model.arguments(), **start.read_values()}

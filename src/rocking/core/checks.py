@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.core.arrays import Floats
-from rocking.errors import RockingError, literal
+from rocking.errors import RockingError, escape_braces
 
 #: Largest number of characters of a value in a message.
 _MAX_LENGTH: Final = 60
@@ -209,7 +209,7 @@ def axis(values: ArrayLike, name: str, error: Error) -> Floats:
 def short_repr(value: object) -> str:
     """Return a value for a message, in one line of limited length."""
     text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())
-    return literal(text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH - 10]}...{text[-7:]}")
+    return escape_braces(text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH - 10]}...{text[-7:]}")
 
 
 def find_similar(name: str, known: Iterable[str], similarity: float = 0.6) -> str | None:

@@ -26,7 +26,7 @@ from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
-from rocking.simulation.simulate import response_to
+from rocking.simulation.simulate import compute_response
 
 
 class Law(NamedTuple):
@@ -488,7 +488,9 @@ def simulate(
     body, motion = _require_linear_body(body), check_motion(motion)
     end_time = _choose_duration(body, motion, duration)
     position = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
-    return convert_to_positions(response_to(body, motion, "linear", chattering, end_time, (position, initial_velocity)))
+    return convert_to_positions(
+        compute_response(body, motion, "linear", chattering, end_time, (position, initial_velocity))
+    )
 
 
 def _require_linear_body(body: object) -> LinearBody:

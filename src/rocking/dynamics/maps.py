@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.block.body import Body
-from rocking.block.sides import in_line
+from rocking.block.sides import format_sides
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import MODELS, Model
 from rocking.core.threads import map_in_threads
 from rocking.dynamics.bodies import LinearBody
-from rocking.engine.problem import FASTEST, one_body, set_start
+from rocking.engine.problem import MAX_SPEED, require_body, set_start
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
@@ -49,7 +49,7 @@ class PeriodicForcing:
             )
         if one_period.vertical is not None:
             raise InvalidMotion("motion must not have a vertical component for a stroboscopic map")
-        self.body, self.motion = one_body(body), one_period
+        self.body, self.motion = require_body(body), one_period
         self.bodies = self.body.alone()
         self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
         if model is not None:
@@ -62,7 +62,9 @@ class PeriodicForcing:
                 f"the accelerations of the motion must be below {_LIFTING_ACCELERATION:g} g for a stroboscopic map"
             )
         self._ground = build_repeated_ground(self.motion, self.body.gravity)
-        run = Setup(self.bodies, self.model, self.chattering, self.forcing_period).run(self.motion, ground=self._ground)
+        run = Setup(self.bodies, self.model, self.chattering, self.forcing_period).prepare(
+            self.motion, ground=self._ground
+        )
         self._body_records, self._settings = run.records, run.settings
         self._settings["stop"], self._settings["no_end_time"] = np.inf, True
         if np.any(self._body_records["yielding"]):
@@ -214,15 +216,15 @@ def split_states(count: int, periods: int) -> Sequence[slice]:
 
 def check_magnitudes(values: Floats, name: str) -> None:
     """Raise an error for coordinates or velocities that are not finite or too large."""
-    if not values.size or not np.all(np.abs(values) <= FASTEST):
-        raise InvalidOption(f"{{}} must be finite numbers between -{FASTEST:g} and {FASTEST:g}", name)
+    if not values.size or not np.all(np.abs(values) <= MAX_SPEED):
+        raise InvalidOption(f"{{}} must be finite numbers between -{MAX_SPEED:g} and {MAX_SPEED:g}", name)
 
 
 def describe_input(subject: Body | Motion) -> str:
     """Describe a body or a motion with its parameters in one line."""
     if isinstance(subject, Motion):
         return ", ".join(part for part in (subject.label, subject.description.numbers) if part)
-    return f"{subject.description}, {in_line(subject.sides)}"
+    return f"{subject.description}, {format_sides(subject.sides)}"
 
 
 class StroboscopicMap(PeriodicForcing):

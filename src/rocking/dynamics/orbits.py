@@ -22,7 +22,7 @@ from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.simulation.simulate import response_to
+from rocking.simulation.simulate import compute_response
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -209,7 +209,9 @@ def simulate_periods(strobe: StroboscopicMap, state: Floats, periods: int) -> Re
         breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
     )
     start = float(state[0]), float(state[1])
-    response = response_to(strobe.body, repeated, strobe.model, strobe.chattering, duration, start, "initial_position")
+    response = compute_response(
+        strobe.body, repeated, strobe.model, strobe.chattering, duration, start, "initial_position"
+    )
     return convert_to_positions(response) if isinstance(strobe.body, LinearBody) else response
 
 

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from rocking.block import Block, one_block
+from rocking.block import Block, require_block
 from rocking.block.body import KINDS, Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -22,14 +22,14 @@ from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 
 #: Largest initial velocity, rad/s or m/s, with squares and fourth powers far from overflow.
-FASTEST = 1e6
+MAX_SPEED = 1e6
 
 #: Requirement for an argument that may be any body.
-_NEEDED = "a Block or another body"
+_REQUIREMENT = "a Block or another body"
 
 
 @functools.lru_cache(maxsize=8)
-def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Ground:
+def prepare_ground(motion: Motion | None, gravity: float, factor: float = 1.0) -> Ground:
     """Create the ground of a motion multiplied by a factor, without pieces if there is no motion.
 
     A negative factor applies to the horizontal component only. The last few results are cached, because their creation
@@ -37,55 +37,57 @@ def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Gro
     """
     if motion is None:
         return ground.build_ground(_NO_BREAKPOINTS, _NO_COEFFICIENTS, 1.0, 0.0)
-    coefficients = motion.coefficients if factor == 1.0 else _frozen(motion.coefficients * factor)
+    coefficients = motion.coefficients if factor == 1.0 else _freeze(motion.coefficients * factor)
     if motion.vertical is None:
         return ground.build_ground(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
-    (breakpoints, pushes), (_, lifts) = _joined(motion)
+    (breakpoints, pushes), (_, lifts) = _align_components(motion)
     error = max(motion.error, motion.vertical.error)
     return ground.build_ground(
         breakpoints, pushes * factor, 1.0 / gravity, error * abs(factor), vertical=lifts * abs(factor)
     )
 
 
-def step_of(motion: Motion) -> float | None:
-    """Return the length of the pieces of `ground_of` if equally long and linear in all components, else None."""
+def find_common_step(motion: Motion) -> float | None:
+    """Return the length of the pieces of `prepare_ground` if equally long and linear in all components, else None."""
     if motion.vertical is None:
         return motion.dt
-    steps = [piecewise.find_even_step(pieces) for pieces in _joined(motion)]
+    steps = [piecewise.find_even_step(pieces) for pieces in _align_components(motion)]
     return None if None in steps else steps[0]
 
 
-def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
+def gather_bodies(blocks: Bodies | Body | Iterable[Body]) -> Bodies:
     """Return bodies unchanged, and convert single ones of one kind to `Bodies` of that kind."""
-    if isinstance(given, Bodies) and not isinstance(given, type):
-        return given
-    several = isinstance(given, Iterable) and not isinstance(given, (str, Body))
-    bodies = [one_body(each) for each in (cast("Iterable[Body]", given) if several else [cast("Body", given)])]
+    if isinstance(blocks, Bodies) and not isinstance(blocks, type):
+        return blocks
+    is_iterable = isinstance(blocks, Iterable) and not isinstance(blocks, (str, Body))
+    bodies = [
+        require_body(body) for body in (cast("Iterable[Body]", blocks) if is_iterable else [cast("Body", blocks)])
+    ]
     if len(bodies) == 1:
         return bodies[0].alone()
     return KINDS[bodies[0].alone().kind if bodies else "blocks"].from_bodies(bodies)
 
 
-def slenderness_of(bodies: Bodies) -> Floats:
+def compute_slenderness(bodies: Bodies) -> Floats:
     """Return the slenderness of each body as it stands, rad, the smaller of two sides, which normalises rotations."""
-    found = bodies.parameters().get("alpha")
-    if found is None:
-        raise InvalidOption(f"this is known of blocks alone, which have a slenderness, not of {bodies.kind}")
-    return np.asarray(found[0].min(axis=1))
+    parameter = bodies.parameters().get("alpha")
+    if parameter is None:
+        raise InvalidOption(f"slenderness is defined for blocks only, not for {bodies.kind}")
+    return np.asarray(parameter[0].min(axis=1))
 
 
-def thresholds_of(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
+def compute_thresholds(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
     """Return uplift accelerations of each body and side, and the parts due to its own weight, m/s^2, shape (n, 2)."""
-    made = bodies.kernel_records(model, np.zeros((len(bodies), 2)))
-    own = bodies.gravity * made["threshold"]
-    return own + bodies.gravity * made["restraint_threshold"], own
+    records = bodies.kernel_records(model, np.zeros((len(bodies), 2)))
+    weight_part = bodies.gravity * records["threshold"]
+    return weight_part + bodies.gravity * records["restraint_threshold"], weight_part
 
 
-def one_body(body: Body) -> Body:
+def require_body(body: Body) -> Body:
     """Return the body, or raise an error if the argument is not a body."""
     if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # protocols are slow
         return body
-    return one_block(body, _NEEDED)
+    return require_block(body, _REQUIREMENT)
 
 
 def set_start(
@@ -98,8 +100,8 @@ def set_start(
 ) -> None:
     """Set the states of bodies at rest at time zero to coordinates and their rates.
 
-    There is one body per state, or one for all. By default the coordinate is zero, or the stop if zero is behind it.
-    ``name`` is the coordinate in errors, by default as in "initial_rotation".
+    There is one body for each state, or one for all. By default the coordinate is zero, or the stop if zero is behind
+    it. ``name`` is the coordinate in errors, by default as in "initial_rotation".
 
     Raises
     ------
@@ -107,40 +109,42 @@ def set_start(
         If a state is inadmissible, or a number is not finite or absurdly large.
     """
     stops = bodies.stops
-    still = not isinstance(rate, np.ndarray) and rate == 0.0 and (coordinate is None or coordinate == 0.0)
-    if still and not np.count_nonzero(stops):
+    is_at_rest = not isinstance(rate, np.ndarray) and rate == 0.0 and (coordinate is None or coordinate == 0.0)
+    if is_at_rest and not np.count_nonzero(stops):
         return
-    facing, one_sided = records["two_stops"], records["next_side"][:, 0] == 0
+    has_two_stops, is_one_sided = records["two_stops"], records["next_side"][:, 0] == 0
     if coordinate is None:
-        coordinate = np.clip(0.0, stops[:, 0], np.where(facing, stops[:, 1], np.inf))
+        coordinate = np.clip(0.0, stops[:, 0], np.where(has_two_stops, stops[:, 1], np.inf))
     if not isinstance(rate, np.ndarray):  # arrays are already checked, and a body in them may have overturned
         _check_start(coordinate, rate, records, bodies, name)
-    at, speed = np.asarray(coordinate, dtype=float), np.asarray(rate, dtype=float)
-    from_plus = at - stops[:, 0]
-    sign = np.where(one_sided, 1.0, np.sign(np.where(from_plus == 0.0, speed, from_plus)))
-    at_other = facing & (at == stops[:, 1])
-    u, v = np.where(at_other, 0.0, sign * from_plus), np.where(at_other, -speed, sign * speed)
-    wrong = one_sided & ((u < 0.0) | (facing & (u > records["overturn_angle"])) | ((u == 0.0) & (v < 0.0)))
-    if np.any(wrong):
-        body = bodies[min(k := int(np.argmax(wrong)), len(bodies) - 1)]
-        called, unit = name or f"initial_{body.coordinate.name}", body.coordinate.unit
+    position, speed = np.asarray(coordinate, dtype=float), np.asarray(rate, dtype=float)
+    from_plus = position - stops[:, 0]
+    sign = np.where(is_one_sided, 1.0, np.sign(np.where(from_plus == 0.0, speed, from_plus)))
+    is_at_second_stop = has_two_stops & (position == stops[:, 1])
+    u, v = np.where(is_at_second_stop, 0.0, sign * from_plus), np.where(is_at_second_stop, -speed, sign * speed)
+    is_invalid = is_one_sided & (
+        (u < 0.0) | (has_two_stops & (u > records["overturn_angle"])) | ((u == 0.0) & (v < 0.0))
+    )
+    if np.any(is_invalid):
+        body = bodies[min(k := int(np.argmax(is_invalid)), len(bodies) - 1)]
+        argument, unit = name or f"initial_{body.coordinate.name}", body.coordinate.unit
         low, high = body.stops
-        where = f"from {low:g} to {high:g} {unit}" if high > low else f"at least {low:g} {unit}"
-        value, fast = (float(np.broadcast_to(each, u.shape)[k]) for each in (at, speed))
+        range_text = f"from {low:g} to {high:g} {unit}" if high > low else f"at least {low:g} {unit}"
+        value, rate_value = (float(np.broadcast_to(values, u.shape)[k]) for values in (position, speed))
         raise InvalidOption(
-            f"{{}} must be {where}, in front of the body's stop, and {{}} must not lead into it: they are {value:g} "
-            f"{unit} and {fast:g} {unit}/s",
-            called,
+            f"{{}} must be {range_text}, in front of the body's stop, and {{}} must not point into it; they are "
+            f"{value:g} {unit} and {rate_value:g} {unit}/s",
+            argument,
             "initial_velocity",
             value=value,
         )
-    side = np.where((sign < 0.0) | at_other, 1, 0)
-    at_rest = (u == 0.0) & (v == 0.0)
-    states["side"] = np.where(at_rest, np.where(facing, -1 - side, state.AT_REST), side)
-    states["u"], states["v"], states["peak"] = u, v, np.where(at_other, records["overturn_angle"], u)
+    side = np.where((sign < 0.0) | is_at_second_stop, 1, 0)
+    stands = (u == 0.0) & (v == 0.0)
+    states["side"] = np.where(stands, np.where(has_two_stops, -1 - side, state.AT_REST), side)
+    states["u"], states["v"], states["peak"] = u, v, np.where(is_at_second_stop, records["overturn_angle"], u)
 
 
-def highest(states: state.Records, records: state.Records, stops: Floats) -> Floats:
+def compute_peaks(states: state.Records, records: state.Records, stops: Floats) -> Floats:
     """Return peaks of coordinates from the peaks in the frame of side +, exactly the stop at a second stop."""
     peaks: Floats = states["peak"] + stops[..., 0]
     if not records["two_stops"].any():
@@ -152,24 +156,24 @@ def _check_start(
     coordinate: float | Floats, rate: float, records: state.Records, bodies: Bodies, name: str | None
 ) -> None:
     """Check the coordinate and the rate of one body or of all, fastest for Python numbers."""
-    plain = type(coordinate) is float and type(rate) is float and math.isfinite(coordinate) and abs(rate) <= FASTEST
-    fallen = np.where(records["two_stops"], np.inf, records["overturn_angle"]).min()
-    if plain and abs(coordinate) < fallen:
+    is_valid = (
+        type(coordinate) is float and type(rate) is float and math.isfinite(coordinate) and abs(rate) <= MAX_SPEED
+    )
+    overturn_angle = np.where(records["two_stops"], np.inf, records["overturn_angle"]).min()
+    if is_valid and abs(coordinate) < overturn_angle:
         return
     kind = bodies[0].coordinate
-    called = name or f"initial_{kind.name}"
-    u = float(coordinate[0]) if isinstance(coordinate, np.ndarray) else checks.finite(coordinate, called, InvalidOption)
+    label = name or f"initial_{kind.name}"
+    u = float(coordinate[0]) if isinstance(coordinate, np.ndarray) else checks.finite(coordinate, label, InvalidOption)
     v = checks.finite(rate, "initial_velocity", InvalidOption)
-    if abs(v) > FASTEST:
+    if abs(v) > MAX_SPEED:
         raise InvalidOption(
-            f"{{}} must be at most {FASTEST:g} {kind.unit}/s in size, not {v:g}", "initial_velocity", value=v
+            f"{{}} must be at most {MAX_SPEED:g} {kind.unit}/s in size, not {v:g}", "initial_velocity", value=v
         )
-    if abs(u) >= fallen:
-        limit = "pi/2" if fallen == 0.5 * math.pi else f"{fallen:g}"
+    if abs(u) >= overturn_angle:
+        limit = "pi/2" if overturn_angle == 0.5 * math.pi else f"{overturn_angle:g}"
         hint = checks.hint_at_degrees(u) if kind.unit == "rad" else ""
-        raise InvalidOption(
-            f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", called, value=coordinate
-        )
+        raise InvalidOption(f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", label, value=coordinate)
 
 
 def never_rests(bodies: Bodies) -> bool:
@@ -178,7 +182,7 @@ def never_rests(bodies: Bodies) -> bool:
     return bool(np.count_nonzero(e[:, 0] * e[:, 1] == 1.0))
 
 
-def settings_of(
+def build_settings(
     bodies: Bodies, model: Model, scheme: ChatteringScheme, duration: float | None, *, record: bool
 ) -> state.Record:
     """Check and return the settings of a simulation; a duration is required if nothing comes to rest."""
@@ -186,7 +190,7 @@ def settings_of(
     if duration is None:
         if never_rests(bodies):
             raise InvalidOption(
-                "a block with {} 1 never comes to rest; give {} to say when to stop", "restitution", "duration"
+                "a block with {} 1 never comes to rest; give {} to limit the simulation", "restitution", "duration"
             )
     else:
         duration = checks.positive(duration, "duration", InvalidOption, "s")
@@ -196,16 +200,16 @@ def settings_of(
 
 
 @functools.lru_cache(maxsize=8)
-def _joined(motion: Motion) -> tuple[piecewise.Pieces, piecewise.Pieces]:
+def _align_components(motion: Motion) -> tuple[piecewise.Pieces, piecewise.Pieces]:
     """Return both components of a motion on the same pieces."""
     assert motion.vertical is not None
     breakpoints, (pushes, lifts) = piecewise.align_pieces(motion, motion.vertical)
     return piecewise.Pieces(breakpoints, pushes), piecewise.Pieces(breakpoints, lifts)
 
 
-def _frozen(array: Floats) -> Floats:
+def _freeze(array: Floats) -> Floats:
     array.flags.writeable = False
     return array
 
 
-_NO_BREAKPOINTS, _NO_COEFFICIENTS = _frozen(np.zeros(1)), _frozen(np.zeros((0, 2)))
+_NO_BREAKPOINTS, _NO_COEFFICIENTS = _freeze(np.zeros(1)), _freeze(np.zeros((0, 2)))

@@ -26,14 +26,14 @@ FITTED_FREQUENCIES: Final = (0.5, 8.0)
 FITTED_RESTITUTIONS: Final = (0.5, 0.97)
 
 #: Number of critical amplitudes per call of a kernel, which takes about a third of a second.
-_CRITICAL_TOGETHER: Final = 512
+_CRITICAL_BATCH: Final = 512
 
-_BY_NAME: dict[str, type[ChatteringScheme]] = {}
+_SCHEMES: dict[str, type[ChatteringScheme]] = {}
 
 
 @dataclass(frozen=True)
 class ChatteringScheme(ABC):
-    """ChatteringScheme of chattering: the rule by which a sequence of impacts ends.
+    """Chattering scheme: the rule by which a sequence of impacts ends.
 
     A user-defined subclass is available by its `name` as soon as it is imported. At an impact, one of the measures of
     the kernels (`rocking.kernels.state`) is compared with its thresholds.
@@ -53,7 +53,7 @@ class ChatteringScheme(ABC):
     unit: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
-        _BY_NAME[cls.name] = cls
+        _SCHEMES[cls.name] = cls
 
     def __post_init__(self) -> None:
         """Check that all parameters are positive numbers."""
@@ -89,11 +89,13 @@ class ChatteringScheme(ABC):
     def from_text(cls, value: str) -> ChatteringScheme:
         """Create the scheme from the text after "NAME=", or raise `InvalidOption`."""
         if not fields(cls):
-            raise InvalidOption(f"the chattering scheme {cls.name} takes no parameter, not {value!r}")
+            raise InvalidOption(f"the chattering scheme {cls.name} has no parameter; got {value!r}")
         try:
             return cls(float(value))  # type: ignore[call-arg]
         except ValueError:
-            raise InvalidOption(f"the chattering scheme {cls.name} takes one number, not {value!r}") from None
+            raise InvalidOption(
+                f"the parameter of the chattering scheme {cls.name} must be a number, not {value!r}"
+            ) from None
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ class AsymptoticTime(ChatteringScheme):
         is_sine = motion is not None and motion.description.family == "sine" and motion.vertical is None
         if not (isinstance(bodies, Blocks) and not bodies.terms and bodies.is_symmetric and motion and is_sine):
             raise InvalidOption(
-                '{} "time" is the scheme for symmetric blocks under sinusoidal motions (rocking.pulses.sine) without a '
+                '{} "time" requires symmetric blocks under sinusoidal motions (rocking.pulses.sine) without a '
                 'vertical component; use "certified"',
                 "chattering",
             )
@@ -164,7 +166,7 @@ class AsymptoticTime(ChatteringScheme):
         amplitude = abs(factor * parameters["amplitude"]) / (bodies.gravity * threshold)
         frequency = 2.0 * np.pi * parameters["frequency"] / bodies.p
         critical, lossy = np.ones(frequency.shape), eta < 1.0
-        critical[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], eta[lossy])
+        critical[lossy] = compute_critical_amplitudes(self.critical, frequency[lossy], eta[lossy])
         complete = (amplitude >= 1.0) & (amplitude < critical)
         first, third = np.reshape([sum_eq65(e) for e in eta.flat], (*eta.shape, 2)).T
         first, third = (np.where(np.isfinite(sums), sums, 0.0) for sums in (first, third))  # infinite without losses
@@ -253,8 +255,7 @@ class GeometricBypass(VelocityThreshold):
 
     Notes
     -----
-    Source: Nordmark, A. B. and Piiroinen, P. T. (2009). Simulation and stability analysis of impacting systems with
-    complete chattering. Nonlinear Dynamics 58, 85-106; to first order in the speed.
+    The method is the one of :cite:t:`nordmark2009`, to first order in the speed.
     """
 
     name: ClassVar[str] = "bypass"
@@ -298,16 +299,16 @@ def chattering_scheme(chattering: str | ChatteringScheme) -> ChatteringScheme:
     """
     if isinstance(chattering, ChatteringScheme):
         return chattering
-    name, given, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
-    if name not in _BY_NAME:
+    name, separator, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
+    if name not in _SCHEMES:
         kinds = "" if isinstance(chattering, str) else " or a scheme"
         raise InvalidOption(
-            f"{{}} must be one of {', '.join(_BY_NAME)}{kinds}, not {chattering!r}", "chattering", value=chattering
+            f"{{}} must be one of {', '.join(_SCHEMES)}{kinds}, not {chattering!r}", "chattering", value=chattering
         )
-    if not given:
-        return _BY_NAME[name]()
+    if not separator:
+        return _SCHEMES[name]()
     try:
-        return _BY_NAME[name].from_text(value)
+        return _SCHEMES[name].from_text(value)
     except InvalidOption as error:
         sentence = f'{{}} "{chattering}": {error.message.template}'
         raise InvalidOption(sentence, "chattering", *error.message.arguments) from None
@@ -324,28 +325,28 @@ _EQ76: Final = np.array([
 _EQ77: Final = np.array([[1.271], [-0.45], [0.5763], [-0.3941]])
 
 
-def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
+def compute_critical_amplitudes(method: str, omega: Floats, eta: Floats) -> Floats:
     """Compute critical amplitudes, divided by g alpha, flat: "exact", or by the fits "eq76" and "eq77" of the paper."""
     from rocking.kernels.sine.sequence import write_critical_amplitudes
 
     if method != "exact":
-        low, high = FITTED_FREQUENCIES
-        least, most = FITTED_RESTITUTIONS
-        outside: Flags = (omega < low) | (omega > high) | (eta < least) | (eta > most)
+        min_omega, max_omega = FITTED_FREQUENCIES
+        min_eta, max_eta = FITTED_RESTITUTIONS
+        outside: Flags = (omega < min_omega) | (omega > max_omega) | (eta < min_eta) | (eta > max_eta)
         if outside.any():
             k = int(np.argmax(outside))
             warnings.warn(
-                f"Eq. {method[2:]} was fitted for omega from {low:g} to {high:g} and eta from {least:g} to {most:g}; "
-                f'at omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g} it means nothing: use "exact"',
+                f"Eq. {method[2:]} was fitted for omega from {min_omega:g} to {max_omega:g} and eta from {min_eta:g} "
+                f'to {max_eta:g}, not for omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g}; use "exact"',
                 OutsideFit,
                 stacklevel=2,
             )
         fitted: Floats = polynomial.polyval2d(eta, omega, _EQ76 if method == "eq76" else _EQ77)
         return fitted
-    found = np.ones(omega.size)
+    critical = np.ones(omega.size)
     lossy = np.flatnonzero(eta < 1.0)
-    for some in split_range(lossy.size, _CRITICAL_TOGETHER):
-        here = np.zeros(lossy[some].size)
-        write_critical_amplitudes(omega[lossy[some]], eta[lossy[some]], here)
-        found[lossy[some]] = here
-    return found
+    for part in split_range(lossy.size, _CRITICAL_BATCH):
+        amplitudes = np.zeros(lossy[part].size)
+        write_critical_amplitudes(omega[lossy[part]], eta[lossy[part]], amplitudes)
+        critical[lossy[part]] = amplitudes
+    return critical

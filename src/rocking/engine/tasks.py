@@ -17,7 +17,7 @@ from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import Model
 from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
-from rocking.engine.problem import ground_of, highest, set_start, settings_of, step_of
+from rocking.engine.problem import build_settings, compute_peaks, find_common_step, prepare_ground, set_start
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidMotion, Unfinished
 from rocking.kernels import lanes, state
@@ -45,7 +45,7 @@ OUTCOME = np.dtype(
 
 #: Step budget of a simulation, besides a few steps for every piece of its motion.
 BUDGET: Final = 3_000_000
-_BUDGET_OF_A_PIECE: Final = 4
+_BUDGET_PER_PIECE: Final = 4
 
 #: Steps per call of a kernel, for one body and for each of many: milliseconds until an interrupt.
 SLICE: Final = 50_000
@@ -53,11 +53,11 @@ _FIRST_SLICE: Final = 5_000
 
 #: Number of bodies simulated together: the capacity of the fastest cache, or fewer for a long motion, so that one call
 #: of a kernel takes at most half a second.
-_TOGETHER: Final = 16 * WIDTH
-_PIECES: Final = 20_000_000
+_GROUP_SIZE: Final = 16 * WIDTH
+_GROUP_PIECES: Final = 20_000_000
 
 #: Steps of all bodies in one task: enough to amortise the call, few enough to stop soon after an interrupt.
-_TASK: Final = 8_000_000
+_TASK_STEPS: Final = 8_000_000
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Setup:
     #: Coordinate of all bodies at time 0 and its rate; None means zero, or the stop if zero is behind the stop.
     start: tuple[float | None, float] = (None, 0.0)
 
-    def run(
+    def prepare(
         self,
         motion: Motion | None,
         factor: float = 1.0,
@@ -83,10 +83,10 @@ class Setup:
         """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments."""
         bodies = self.bodies
         check_components(bodies, motion)
-        settings = settings_of(bodies, self.model, self.chattering, self.duration, record=record)
+        settings = build_settings(bodies, self.model, self.chattering, self.duration, record=record)
         records = bodies.kernel_records(self.model, self.chattering.thresholds(bodies, motion, self.model, factor))
         if ground is None:
-            ground = ground_of(motion, bodies.gravity, factor)
+            ground = prepare_ground(motion, bodies.gravity, factor)
         states = state.new_states(len(bodies), 0)
         set_start(states, records, bodies, *self.start, name)
         return Run(ground, records, settings, states)
@@ -119,15 +119,15 @@ def simulate_tasks(setup: Setup, tasks: Iterable[Task]) -> Iterator[tuple[Task, 
     """
     cancelled = threading.Event()
 
-    def simulated(task: Task) -> tuple[Task, NDArray[np.void]]:
+    def run_task(task: Task) -> tuple[Task, NDArray[np.void]]:
         return task, simulate_task(setup, task, cancelled)
 
-    yield from map_in_threads(simulated, tasks, cancelled=cancelled)
+    yield from map_in_threads(run_task, tasks, cancelled=cancelled)
 
 
-def parts_of(count: int, motion: Motion) -> Iterator[slice]:
+def split_bodies(count: int, motion: Motion) -> Iterator[slice]:
     """Divide ``count`` bodies into ranges of the size of a task."""
-    size = _TOGETHER * max(1, _TASK // (_TOGETHER * len(motion.coefficients)))
+    size = _GROUP_SIZE * max(1, _TASK_STEPS // (_GROUP_SIZE * len(motion.coefficients)))
     yield from split_range(count, size)
 
 
@@ -137,21 +137,23 @@ def simulate_each(setup: Setup, motion: Motion, factors: Floats) -> Iterator[tup
     starts = np.flatnonzero(np.diff(factors[order], prepend=np.nan) != 0.0)
     groups = np.split(order, starts[1:])
     tasks = (
-        Task(group[part], motion, float(factors[group[0]])) for group in groups for part in parts_of(len(group), motion)
+        Task(group[part], motion, float(factors[group[0]]))
+        for group in groups
+        for part in split_bodies(len(group), motion)
     )
     yield from simulate_tasks(setup, tasks)
 
 
 def require_finished(unfinished: bool) -> None:
-    """Raise an error if a required simulation was abandoned."""
+    """Raise an error if a required simulation was aborted."""
     if unfinished:
         raise Unfinished(
-            f"a simulation was given up after more than {BUDGET:,} steps, so that its outcome is not known; "
-            "simulate it alone to see how far it came, or give a duration"
+            f"a simulation was aborted after more than {BUDGET:,} steps, so its outcome is unknown; "
+            "simulate this case alone for its partial response, or give a duration"
         )
 
 
-def missing_text(missing: Flags | int) -> str:
+def describe_missing(missing: Flags | int) -> str:
     """Return a sentence on the abandoned simulations, whose outcomes are missing; empty if there are none."""
     count = int(np.sum(missing))
     return f"{format_count(count, 'simulation')} given up after too many steps: outcomes missing" * (count > 0)
@@ -168,40 +170,40 @@ def check_components(bodies: Bodies, motion: Motion | None) -> None:
 def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = None) -> NDArray[np.void]:
     """Compute the outcomes of one task; they are invalid if it is ``cancelled`` on the way."""
     bodies = setup.bodies.select(task.bodies)
-    ground, records, settings, states = replace(setup, bodies=bodies).run(task.motion, task.factor)
-    states["budget"] = _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces)
-    step = step_of(task.motion)
-    for chosen, substeps in _groups(ground, records, task.motion, setup.model):
+    ground, records, settings, states = replace(setup, bodies=bodies).prepare(task.motion, task.factor)
+    states["budget"] = _FIRST_SLICE + _BUDGET_PER_PIECE * len(ground.pieces)
+    step = find_common_step(task.motion)
+    for group, substeps in _group_bodies(ground, records, task.motion, setup.model):
         if cancelled is not None and cancelled.is_set():
             break
-        _march_together(ground, settings, (records, states), chosen, step, substeps)
-    _march_on(ground, settings, records, states, cancelled)
-    outcomes = _outcomes(states, task.motion.end)
-    outcomes["peak_rotation"] = highest(states, records, bodies.stops)
-    known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
+        _march_together(ground, settings, (records, states), group, step, substeps)
+    _resume_marches(ground, settings, records, states, cancelled)
+    outcomes = _collect_outcomes(states, task.motion.end)
+    outcomes["peak_rotation"] = compute_peaks(states, records, bodies.stops)
+    is_known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
     stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
-    outcomes["residual_rotation"] = np.where(known, stop + (1.0 - 2.0 * side) * states["leaning_rotation"], np.nan)
-    outcomes["complete_chattering"] = complete_chattering(ground, records, states)
+    outcomes["residual_rotation"] = np.where(is_known, stop + (1.0 - 2.0 * side) * states["leaning_rotation"], np.nan)
+    outcomes["complete_chattering"] = detect_complete_chattering(ground, records, states)
     return outcomes
 
 
-def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> Iterator[tuple[Integers, int]]:
+def _group_bodies(ground: Ground, records: Records, motion: Motion, model: Model) -> Iterator[tuple[Integers, int]]:
     """Yield bodies that are simulated together, with their number of substeps; -1 for bodies simulated alone."""
-    substeps, step = np.full(len(records), -1), step_of(motion)
+    substeps, step = np.full(len(records), -1), find_common_step(motion)
     if step is not None:
         width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * max_absolute_weight(ground))
-        substeps = np.where(width <= lanes.MAX_STEP, _substeps(width, model, motion.vertical is not None), -1.0).astype(
-            np.int64
-        )
+        substeps = np.where(
+            width <= lanes.MAX_STEP, _count_substeps(width, model, motion.vertical is not None), -1.0
+        ).astype(np.int64)
     substeps[records["restrained"] | records["two_stops"]] = -1
-    size = min(_TOGETHER, max(1, _PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
+    size = min(_GROUP_SIZE, max(1, _GROUP_PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
     for count in np.unique(substeps):
-        chosen = np.flatnonzero(substeps == count)
-        for some in split_range(len(chosen), size):
-            yield chosen[some], int(count)
+        indices = np.flatnonzero(substeps == count)
+        for part in split_range(len(indices), size):
+            yield indices[part], int(count)
 
 
-def _substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
+def _count_substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
     """Compute the substeps per sample in lanes, for each sqrt(|lam W|) h; 0 if one formula covers the sample."""
     if model == "nonlinear":
         return np.ceil(width / lanes.MAX_SUBSTEP)
@@ -211,63 +213,63 @@ def _substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
 def _march_together(
     ground: Ground,
     settings: Record,
-    whole: tuple[Records, Records],
-    chosen: Integers,
+    arrays: tuple[Records, Records],
+    indices: Integers,
     step: float | None,
     substeps: int,
 ) -> None:
     """Simulate some of the bodies in lanes, or one after the other if lanes do not support them."""
-    records, states = whole
+    records, states = arrays
     pieces = len(ground.pieces) - 1
-    finer = max(substeps, 0) if settings["nonlinear"] else 0
-    together = lanes.build_pool(records[chosen], states[chosen], pieces, step or 1.0, finer)
+    n_substeps = max(substeps, 0) if settings["nonlinear"] else 0
+    pool = lanes.build_pool(records[indices], states[indices], pieces, step or 1.0, n_substeps)
     if substeps < 0:
-        lanes.march_blocks(ground, settings, state.new_scratch(), together)
+        lanes.march_blocks(ground, settings, state.new_scratch(), pool)
     else:
-        lanes.run_lanes(ground, settings, state.new_scratch(), together, substeps)
-    states[chosen] = together.states
+        lanes.run_lanes(ground, settings, state.new_scratch(), pool, substeps)
+    states[indices] = pool.states
 
 
-def _march_on(
+def _resume_marches(
     ground: Ground, settings: Record, records: Records, states: Records, cancelled: threading.Event | None
 ) -> None:
     """Continue simulations that have used up their first slice of steps, up to their budget."""
-    nothing, scratch = state.new_table(0), state.new_scratch()
+    empty_table, scratch = state.new_table(0), state.new_scratch()
     for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
-        one = states[k]
-        one["stop_piece"] = state.TO_THE_END
-        for _ in range(slices(ground)):
+        body_state = states[k]
+        body_state["stop_piece"] = state.TO_THE_END
+        for _ in range(count_slices(ground)):
             if cancelled is not None and cancelled.is_set():
                 return
-            one["budget"] = SLICE
-            one["ending"] = march(ground, records[k], settings, nothing, scratch, one)
-            if int(one["ending"]) != state.Ending.PAUSED:
+            body_state["budget"] = SLICE
+            body_state["ending"] = march(ground, records[k], settings, empty_table, scratch, body_state)
+            if int(body_state["ending"]) != state.Ending.PAUSED:
                 break
         else:
-            one["ending"] = state.Ending.UNFINISHED
+            body_state["ending"] = state.Ending.UNFINISHED
 
 
-def slices(ground: Ground) -> int:
+def count_slices(ground: Ground) -> int:
     """Return the number of slices in the budget of a simulation."""
-    return math.ceil((BUDGET + _BUDGET_OF_A_PIECE * len(ground.pieces)) / SLICE)
+    return math.ceil((BUDGET + _BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
 
 
-def complete_chattering(ground: Ground, records: Records, states: Records) -> Flags:
+def detect_complete_chattering(ground: Ground, records: Records, states: Records) -> Flags:
     """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
     write_completeness(ground, records, states, state.new_scratch(), complete)
     return complete
 
 
-def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
+def _collect_outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes = np.empty(len(states), dtype=OUTCOME)
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     outcomes["leans"] = states["ending"] == state.Ending.LEANS
-    early = (states["side"] >= 0) | (states["end_time"] < motion_end)
-    # A body that balances for ever has no outcome either.
-    undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))
-    outcomes["stopped"] = undecided & early
+    is_early = (states["side"] >= 0) | (states["end_time"] < motion_end)
+    # A body that remains balanced also has no outcome.
+    is_undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))
+    outcomes["stopped"] = is_undecided & is_early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
         ("rests", "rests"), ("time_at_rest", "time_at_rest"), ("first_uplift", "first_uplift"),

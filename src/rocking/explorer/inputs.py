@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from rocking.block import Block, one_block
+from rocking.block import Block, require_block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
@@ -125,7 +125,7 @@ def require_possible(peak: float) -> None:
 
 def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str]:
     """Write a response as the texts of its case; the store keeps a motion that no text can name."""
-    block, motion = one_block(response.block), response.motion
+    block, motion = require_block(response.block), response.motion
     texts = _block_to_texts(block)
     texts |= {"motion": "none"} if motion is None else motion_to_texts(motion, uploads)
     if response.model != "nonlinear":

@@ -18,7 +18,7 @@ from urllib.parse import urlencode
 
 from rocking.core.progress import note
 from rocking.core.threads import set_options
-from rocking.errors import InvalidOption, install
+from rocking.errors import InvalidOption, describe_install
 from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
 from rocking.response import Response
 
@@ -39,7 +39,7 @@ _BACKLOG: Final = 128
 def require_packages() -> None:
     """Raise `InvalidOption` unless the packages of the explorer are installed."""
     if any(util.find_spec(name) is None for name in ("starlette", "uvicorn", "bokeh")):
-        raise InvalidOption(f"the explorer needs packages that are not installed: {install('explorer')}")
+        raise InvalidOption(f"the explorer needs packages that are not installed: {describe_install('explorer')}")
 
 
 @dataclass(frozen=True)

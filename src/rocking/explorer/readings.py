@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rocking.block import one_block
+from rocking.block import require_block
 from rocking.core.arrays import clear_rounding
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
@@ -14,8 +14,8 @@ from rocking.explorer.core import Explorer
 from rocking.explorer.parameters import READING, Texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.simulated import SimulatedCase, check_window, describe_outcome, thin_line
-from rocking.response import Response, active_span
-from rocking.response.figure import boundary_of, course_of, marked
+from rocking.response import Response, find_active_span
+from rocking.response.figure import compute_boundary, compute_course, find_event_times
 
 
 def sample_phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payload:
@@ -31,17 +31,17 @@ def sample_phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) 
     simulated = explorer.simulate(texts)
     start, end = check_window(window, simulated.response.duration)
     response = simulated.select_response(start, end)
-    trajectory = course_of(response, start, end)
-    x, y = boundary_of(response)
-    marks = marked(response, start, end)
-    header = {"window": {"from": start, "to": end}, "needed": response._energy.needed.tolist()}
+    trajectory = compute_course(response, start, end)
+    x, y = compute_boundary(response)
+    marks = find_event_times(response, start, end)
+    header = {"window": {"from": start, "to": end}, "needed": response._energy.overturning_energy.tolist()}
     arrays = {
         "time": trajectory.time - start,
         "rotation": trajectory.rotation,
         "velocity": trajectory.velocity,
         "kinetic": trajectory.kinetic,
         "potential": trajectory.potential,
-        "before": trajectory.before.astype(float),
+        "before": trajectory.impact_rows.astype(float),
         "boundary_x": x,
         "boundary_y": y,
         **{kind: times - start for kind, times in marks.items()},
@@ -71,7 +71,7 @@ def find_state(
     response = simulated.response if window is None else simulated.select_response(*check_window(window, duration))
     rotation, velocity, acceleration = response.states(time_value).tolist()
     kinetic, potential = float(response.kinetic_energy(time_value)), float(response.potential_energy(time_value))
-    sides = one_block(response.block).sides
+    sides = require_block(response.block).sides
     return {
         "time": time_value,
         "state": _describe_state(response, time_value, rotation),
@@ -120,13 +120,13 @@ def create_thumbnail(explorer: Explorer, texts: Texts) -> Payload:
     """
     simulated = explorer.simulate(texts)
     response = simulated.response
-    start, end = active_span(response)
+    start, end = find_active_span(response)
     times = np.linspace(start, end, 2_000)
     rotation = response.rotation(times)
-    plus, minus = (side.alpha for side in one_block(response.block).sides)
+    plus, minus = (side.alpha for side in require_block(response.block).sides)
     indices = thin_line(rotation, 300)
     normalised = np.where(rotation >= 0.0, rotation / plus, rotation / minus)
-    outcome = describe_outcome(response, one_block(response.block).uplift_thresholds(simulated.case.model))
+    outcome = describe_outcome(response, require_block(response.block).uplift_thresholds(simulated.case.model))
     return Payload(
         {"verdict": outcome, "from": start, "to": end}, {"time": times[indices], "rotation": normalised[indices]}
     )

@@ -19,7 +19,7 @@ from rocking.explorer.inputs import Case
 from rocking.explorer.payload import phrase
 from rocking.inputs.notes import block_notes, motion_notes
 from rocking.motion.motion import Motion
-from rocking.response import Response, in_words, known_ratio
+from rocking.response import Response, format_outcome, round_ratio
 
 #: Evaluation times of a rotation in a window, and points of a line in a payload.
 _MAX_TIMES: Final = 12_000
@@ -107,7 +107,7 @@ def describe_case(simulated: SimulatedCase) -> dict[str, Any]:
         "model": case.model,
         "treatment": str(case.chattering),
         **{name: getattr(response, name) for name in _RESPONSE_PROPERTIES},
-        "peak_over_slenderness": known_ratio(response),
+        "peak_over_slenderness": round_ratio(response),
         "impacts": len(response.impacts),
         "rests": int(np.sum(response.events["kind"] == "rest")),
         "proven": int(np.sum(~np.isnan(response.sequences["upper"]))),
@@ -120,7 +120,7 @@ def describe_case(simulated: SimulatedCase) -> dict[str, Any]:
 def describe_outcome(response: Response, thresholds: tuple[float, float]) -> dict[str, Any] | str:
     """Describe the outcome of a block with these uplift accelerations (m/s^2) in one sentence, overturning first."""
     if response.stopped:
-        sentence = in_words(response, "")
+        sentence = format_outcome(response, "")
         return f"{sentence[0].upper()}{sentence[1:]}."
     if not len(response.events) and not len(response.impacts) and response.peak_rotation == 0.0:
         if response.motion is None:
@@ -145,7 +145,7 @@ def describe_outcome(response: Response, thresholds: tuple[float, float]) -> dic
     rest_phrase = phrase("verdict.rests", count=rests) if rests else phrase("verdict.no_rest")
     if unproven:
         rest_phrase = phrase("verdict.unproven", rests=rest_phrase, unproven=unproven)
-    ratio = known_ratio(response)
+    ratio = round_ratio(response)
     # Two digits, or four near 100 %, where they matter.
     ratio_phrase = phrase("verdict.percent" if ratio < 0.99 else "verdict.near_percent", value=100.0 * ratio)
     return phrase("verdict.stays", share=ratio_phrase, resting=rest_phrase)

@@ -11,7 +11,7 @@ from rocking.block import Block, RestrainedBlock, Restraint
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.progress import note
-from rocking.errors import InvalidBlock, InvalidOption, literal
+from rocking.errors import InvalidBlock, InvalidOption, escape_braces
 from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, INPUTS, READERS, SHAPES, Shape
 from rocking.inputs.notes import block_notes, restraint_notes
@@ -98,7 +98,7 @@ def check_parameters(factory: Callable[..., object], provided: Iterable[str], ow
     for name in provided:
         if name not in parameters:
             hint = checks.suggest(name, [*parameters], f"there are {', '.join(parameters)}")
-            raise InvalidOption(f"{owner} has no {literal(name)}; {hint}", *names, name)
+            raise InvalidOption(f"{owner} has no {escape_braces(name)}; {hint}", *names, name)
     missing = [name for name, item in parameters.items() if item.default is item.empty and name not in {*provided}]
     if missing:
         raise InvalidOption(f"{owner} needs {' and '.join(missing)} as well", *names)

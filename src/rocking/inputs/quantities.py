@@ -12,7 +12,7 @@ import numpy as np
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import round_decimal
-from rocking.errors import InvalidOption, literal
+from rocking.errors import InvalidOption, escape_braces
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import ACCELERATION_UNITS, TIME_UNITS, Unit, normalise_spelling
 
@@ -216,7 +216,9 @@ def read_densities(text: str, name: str) -> float | dict[str, float]:
         part, equals, value = entry.rpartition("=")
         if not equals:
             raise InvalidOption(
-                f"{{}} takes a number, or PART=NUMBER with commas between, not {literal(repr(text))}", name, value=text
+                f"{{}} takes a number, or PART=NUMBER with commas between, not {escape_braces(repr(text))}",
+                name,
+                value=text,
             )
         densities_read[part.strip()] = read_number(value, name)
     return densities_read

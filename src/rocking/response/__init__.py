@@ -1,6 +1,6 @@
 """Responses: results of a single simulation."""
 
-from rocking.response.figure import active_span, drawing_times
+from rocking.response.figure import choose_times, find_active_span
 from rocking.response.gradient import Gradient, gradient
 from rocking.response.history import Solution
 from rocking.response.perturbed import (
@@ -9,13 +9,13 @@ from rocking.response.perturbed import (
     RELATIVE,
     Perturbed,
     Repeat,
-    factors_near,
-    percent,
-    steps_within,
+    choose_steps,
+    format_percent,
+    list_factors,
 )
 from rocking.response.response import Response
 from rocking.response.sensitivity import Sensitivity
-from rocking.response.summary import in_brief, in_words, known_ratio, ratio_text
+from rocking.response.summary import format_brief_outcome, format_outcome, format_ratio, round_ratio
 
 __all__ = [
     "COUNT",
@@ -27,14 +27,14 @@ __all__ = [
     "Response",
     "Sensitivity",
     "Solution",
-    "active_span",
-    "drawing_times",
-    "factors_near",
+    "choose_steps",
+    "choose_times",
+    "find_active_span",
+    "format_brief_outcome",
+    "format_outcome",
+    "format_percent",
+    "format_ratio",
     "gradient",
-    "in_brief",
-    "in_words",
-    "known_ratio",
-    "percent",
-    "ratio_text",
-    "steps_within",
+    "list_factors",
+    "round_ratio",
 ]

@@ -13,7 +13,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
-from rocking.engine.problem import thresholds_of
+from rocking.engine.problem import compute_thresholds
 from rocking.errors import InvalidOption
 from rocking.plot.canvas import (
     ABOVE,
@@ -29,7 +29,7 @@ from rocking.plot.canvas import (
 )
 from rocking.plot.curves import draw_ground
 from rocking.response.simulated import Simulated
-from rocking.response.summary import time_text
+from rocking.response.summary import format_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,21 +42,21 @@ RotationUnits = Literal["slenderness", "rad", "deg"]
 _EVEN_TIMES: Final = 4001
 
 #: Largest number of drawn impacts; others are omitted evenly.
-_MOST_IMPACTS: Final = 2000
+_MAX_IMPACTS: Final = 2000
 
 #: Limit of drawn rotations and velocities; beyond it a block only falls.
-_FARTHEST: Final = 2.0
+_MAX_RATIO: Final = 2.0
 
 _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 
 
-def titled(response: Simulated) -> str:
+def make_title(response: Simulated) -> str:
     """Return the title of a figure: the body and its motion."""
-    shaken = "no motion" if response.motion is None else response.motion.label
-    return escape_dollars(f"{response.block.description} under {shaken}")
+    motion_text = "no motion" if response.motion is None else response.motion.label
+    return escape_dollars(f"{response.block.description} under {motion_text}")
 
 
-def active_span(response: Simulated) -> tuple[float, float]:
+def find_active_span(response: Simulated) -> tuple[float, float]:
     """Return the interval of all events, with margins, s."""
     times = np.concatenate([response.events["time"], response.impacts["time"]])
     if len(times) == 0:
@@ -66,10 +66,10 @@ def active_span(response: Simulated) -> tuple[float, float]:
     return max(0.0, first - margin), min(response.duration, float(times.max()) + margin)
 
 
-def shown_span(response: Simulated, window: Sequence[float] | None) -> tuple[float, float]:
+def resolve_window(response: Simulated, window: Sequence[float] | None) -> tuple[float, float]:
     """Return a valid window of a response, s, or its active span."""
     if window is None:
-        return active_span(response)
+        return find_active_span(response)
     ends: Any = checks.numbers(window, "window", InvalidOption)
     if ends.shape != (2,) or not 0.0 <= ends[0] < ends[1] <= response.duration:
         raise InvalidOption(
@@ -80,19 +80,19 @@ def shown_span(response: Simulated, window: Sequence[float] | None) -> tuple[flo
     return float(ends[0]), float(ends[1])
 
 
-def drawing_times(response: Simulated, start: float, end: float) -> Floats:
+def choose_times(response: Simulated, start: float, end: float) -> Floats:
     """Return times for a smooth line: even ones and visible steps."""
     even = np.linspace(start, end, _EVEN_TIMES)
-    steps = _within(response._history.trail.nodes["time"], start, end)
+    steps = _crop(response._history.trail.nodes["time"], start, end)
     visible = np.diff(np.floor(steps / max(even[1] - even[0], 1e-12)), prepend=-1.0) > 0.0
     return np.union1d(even, steps[visible])
 
 
-def _within(times: Floats, start: float, end: float) -> Floats:
+def _crop(times: Floats, start: float, end: float) -> Floats:
     return times[(times >= start) & (times <= end)]
 
 
-def histories(
+def draw_histories(
     response: Simulated,
     units: RotationUnits,
     window: Sequence[float] | None,
@@ -106,35 +106,35 @@ def histories(
     interval to the next impact against the time to rest, both logarithmic. In `ax` only the rotation is drawn.
     """
     checks.choice(units, "rotation_units", InvalidOption, get_args(RotationUnits))
-    shown = shown_span(response, window)
-    time, coordinate = drawing_times(response, *shown), response.block.coordinate
+    span = resolve_window(response, window)
+    time, coordinate = choose_times(response, *span), response.block.coordinate
     is_rotation = coordinate.unit == "rad"
-    plus, minus = balances = _balances(response)
+    plus, minus = balances = _find_balances(response)
     if not is_rotation or (units == "slenderness" and any(map(math.isinf, balances))):
         units = "rad"
-    scales = {"slenderness": (1.0 / plus, 1.0 / minus), "deg": (math.degrees(1.0),) * 2, "rad": (1.0, 1.0)}[units]
+    factors = {"slenderness": (1.0 / plus, 1.0 / minus), "deg": (math.degrees(1.0),) * 2, "rad": (1.0, 1.0)}[units]
     names = {"slenderness": f"rotation / {coordinate.limit}", "deg": "rotation (°)", "rad": "rotation (rad)"}
 
-    def scale(values: Floats) -> Floats:
-        return np.where(values >= 0.0, *scales)
+    def normalise(values: Floats) -> Floats:
+        return np.where(values >= 0.0, *factors)
 
     rotation = response.states(time)[:, 0]
-    drawn = rotation * scale(rotation)
-    sequence = _longest_sequence(response, *shown) if longest_sequence and options.get("ax") is None else None
-    traces = _ground_traces(response, *shown)
+    scaled_rotation = rotation * normalise(rotation)
+    sequence = _find_longest_sequence(response, *span) if longest_sequence and options.get("ax") is None else None
+    traces = _compute_ground_traces(response, *span)
     with open_page((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **options) as page:
-        main, *grounds = _panels(page, 1 + len(traces), zoomed=sequence is not None)
-        _shade_rest(main, np.clip(response.rest_intervals, *shown))
-        _draw_rotation(main, time, drawn, np.array([-minus, plus]) * scales[::-1], coordinate.limit)
+        main, *grounds = _create_panels(page, 1 + len(traces), zoomed=sequence is not None)
+        _shade_rest(main, np.clip(response.rest_intervals, *span))
+        _draw_rotation(main, time, scaled_rotation, np.array([-minus, plus]) * factors[::-1], coordinate.limit)
         if units != "deg" and is_rotation:
-            to_degrees = (lambda y: np.degrees(y / scale(y)), lambda y: np.radians(y) * scale(y))
+            to_degrees = (lambda y: np.degrees(y / normalise(y)), lambda y: np.radians(y) * normalise(y))
             main.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
         if plus != minus:
-            _tell_sides(main, scales)
-        _mark_events(main, response, *shown)
-        if response.overturned and response.overturn_time <= shown[1]:
-            _mark_fall(main, time, drawn, f"overturned at {response.overturn_time:.3f} s")
-        main.set_xlim(*shown)
+            _label_sides(main, factors)
+        _mark_events(main, response, *span)
+        if response.overturned and response.overturn_time <= span[1]:
+            _mark_overturning(main, time, scaled_rotation, f"overturned at {response.overturn_time:.3f} s")
+        main.set_xlim(*span)
         for axes, (trace_time, trace) in zip(grounds, traces.values(), strict=False):
             draw_ground(axes, trace_time, trace, 0.6)
         for axes in grounds[:1]:
@@ -143,47 +143,49 @@ def histories(
         label = names[units] if is_rotation else f"{coordinate.name} ({coordinate.unit})"
         for axes, name in zip(panels, (label, *traces), strict=False):
             axes.tick_params(labelbottom=axes is panels[-1])
-            add_labels(axes, _time_label(*shown, response.duration) if axes is panels[-1] else "", name)
+            add_labels(axes, _format_time_label(*span, response.duration) if axes is panels[-1] else "", name)
         if sequence is not None:
             _draw_sequence(main, page.panel_axes[-1], response, sequence)
     return page.figure
 
 
-def _balances(response: Simulated) -> tuple[float, float]:
+def _find_balances(response: Simulated) -> tuple[float, float]:
     """Return the balance on each side, for a one-sided body the same value twice."""
-    (pair,), _ = thresholds_of(response.block.alone(), response.model)
+    (pair,), _ = compute_thresholds(response.block.alone(), response.model)
     return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
 
 
-def _ground_traces(response: Simulated, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
+def _compute_ground_traces(response: Simulated, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
     """Return times and ground accelerations, g, by label."""
     motion = response.motion
     if motion is None:
         return {}
     times = motion.drawing_times(start, end)
-    parts = {"ground acceleration (g)": motion, "vertical (g)": motion.vertical}
+    components = {"ground acceleration (g)": motion, "vertical (g)": motion.vertical}
     return {
-        name: (times, part.acceleration(times) / STANDARD_GRAVITY) for name, part in parts.items() if part is not None
+        name: (times, component.acceleration(times) / STANDARD_GRAVITY)
+        for name, component in components.items()
+        if component is not None
     }
 
 
-def _longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
+def _find_longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
     """Return the sequence with the most impacts in the interval, if its time of rest is bracketed."""
     inside = response.sequences[(response.sequences["start"] >= start) & (response.sequences["end"] <= end)]
     longest: np.void | None = max(inside, key=lambda row: row["impacts"], default=None)
     if longest is None or not math.isfinite(longest["upper"] - longest["lower"]):
         return None
-    return longest if _within(response.impacts["time"], longest["start"], longest["end"]).size > 1 else None
+    return longest if _crop(response.impacts["time"], longest["start"], longest["end"]).size > 1 else None
 
 
-def _panels(page: Page, histories: int, *, zoomed: bool) -> list[Axes]:
+def _create_panels(page: Page, count: int, *, zoomed: bool) -> list[Axes]:
     """Return the panels of rotation and motion, above the panel of the chattering sequence."""
     panels = page.create_panels(
-        ";".join("RGV"[:histories] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:histories]] + [1.0] * zoomed
+        ";".join("RGV"[:count] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:count]] + [1.0] * zoomed
     )
-    for axes in panels[1:histories]:
+    for axes in panels[1:count]:
         axes.sharex(panels[0])
-    return panels[:histories]
+    return panels[:count]
 
 
 def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
@@ -191,90 +193,103 @@ def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
         axes.axvspan(start, end, color=REST, linewidth=0.0, label="at rest")
 
 
-def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats, limit: str) -> None:
+def _draw_rotation(axes: Axes, time: Floats, rotation: Floats, tipping_angles: Floats, limit: str) -> None:
     """Draw the rotation, in its units, and the angles, to side - and to side +, at which the block tips over."""
     axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time, drawn, color=INK, linewidth=0.9, label="_rotation")
-    lowest = max(float(np.min(drawn, initial=0.0)), _FARTHEST * float(tipping[0]))
-    highest = min(float(np.max(drawn, initial=0.0)), _FARTHEST * float(tipping[1]))
+    axes.plot(time, rotation, color=INK, linewidth=0.9, label="_rotation")
+    lowest = max(float(np.min(rotation, initial=0.0)), _MAX_RATIO * float(tipping_angles[0]))
+    highest = min(float(np.max(rotation, initial=0.0)), _MAX_RATIO * float(tipping_angles[1]))
     span = (highest - lowest) or 1.0
     # Space for the marks of impacts and uplifts.
     low, high = axes.set_ylim(lowest - 0.28 * span, highest + 0.1 * span)
     label = "tipping, θ = ±α" if limit == "slenderness" else "unstable balance without ground motion"
-    for level in tipping[(tipping > low) & (tipping < high)]:
+    for level in tipping_angles[(tipping_angles > low) & (tipping_angles < high)]:
         axes.axhline(level, label=label, **_BOUNDARY)
 
 
 def _mark_events(axes: Axes, response: Simulated, start: float, end: float) -> None:
-    impacts, uplifts = _within(response.impacts["time"], start, end), marked(response, start, end)["uplift"]
+    impacts, uplifts = (_crop(response.impacts["time"], start, end), find_event_times(response, start, end)["uplift"])
     if impacts.size:
         add_ticks(axes, impacts, 0.055, label=f"resolved impacts ({impacts.size})")
     if uplifts.size:
         add_ticks(axes, uplifts, 0.13, "^", color=ABOVE, markersize=4.5, markeredgewidth=0.0, label="uplift")
 
 
-def _mark_fall(axes: Axes, time: Floats, drawn: Floats, label: str) -> None:
+def _mark_overturning(axes: Axes, time: Floats, rotation: Floats, label: str) -> None:
     """Draw a cross where the curve ends or leaves the frame."""
     low, high = axes.get_ylim()
-    inside = np.flatnonzero((drawn >= low) & (drawn <= high))
+    inside = np.flatnonzero((rotation >= low) & (rotation <= high))
     end = inside[-1] if inside.size else -1
     axes.plot(
-        time[end], np.clip(drawn[end], low, high), "X", color=ABOVE, markersize=7, clip_on=False, zorder=4, label=label
+        time[end],
+        np.clip(rotation[end], low, high),
+        "X",
+        color=ABOVE,
+        markersize=7,
+        clip_on=False,
+        zorder=4,
+        label=label,
     )
 
 
-def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
+def _label_sides(axes: Axes, factors: tuple[float, float]) -> None:
     """Label the sides, with the angle of 1 on each."""
-    for name, place, off, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
-        words = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
-        look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
-        add_text(axes, words, (0.0, 0.0), (3, off), **look)
+    for name, alignment, offset, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
+        text = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
+        style = {"va": alignment, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
+        add_text(axes, text, (0.0, 0.0), (3, offset), **style)
 
 
 def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
     """Draw the uplift thresholds, which vary with the weight, and the motion beyond them."""
-    (pair,), (own,) = thresholds_of(response.block.alone(), response.model)
+    (pair,), (weight_part,) = compute_thresholds(response.block.alone(), response.model)
     lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
-    above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
-    for sign, size, change in ((-1.0, pair[0], own[0]), (1.0, pair[1], own[1])):
+    fill_style: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
+    for sign, size, weight_slope in ((-1.0, pair[0], weight_part[0]), (1.0, pair[1], weight_part[1])):
         if math.isinf(size):
             continue  # no uplift to this side
-        threshold = sign * (size + lift / response.block.gravity * change) / STANDARD_GRAVITY
-        beyond = sign * acceleration > sign * threshold
-        if np.any(beyond):
-            axes.fill_between(time, acceleration, threshold, where=beyond, label="beyond a threshold", **above)
+        threshold = sign * (size + lift / response.block.gravity * weight_slope) / STANDARD_GRAVITY
+        is_beyond = sign * acceleration > sign * threshold
+        if np.any(is_beyond):
+            axes.fill_between(time, acceleration, threshold, where=is_beyond, label="beyond a threshold", **fill_style)
         axes.plot(time, threshold, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
         if pair[0] != pair[1]:
-            words, place = ("lifts to side +", "bottom") if sign < 0.0 else ("lifts to side −", "top")
-            look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
-            add_text(axes, words, (0.0, threshold[0]), (3, -2.0 * sign), **look)
+            text, alignment = ("lifts to side +", "bottom") if sign < 0.0 else ("lifts to side −", "top")
+            text_style = {"va": alignment, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
+            add_text(axes, text, (0.0, threshold[0]), (3, -2.0 * sign), **text_style)
 
 
-def _time_label(start: float, end: float, duration: float) -> str:
+def _format_time_label(start: float, end: float, duration: float) -> str:
     is_all = start <= 0.0 and end >= duration * (1.0 - 1e-9)
     return "time (s)" if is_all else f"time (s); shown: {start:.4g}–{end:.4g} s of {duration:.4g} s"
 
 
 def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.void) -> None:
     """Draw a sequence impact by impact, and mark it in the histories."""
-    times = _within(response.impacts["time"], sequence["start"], sequence["end"])
+    times = _crop(response.impacts["time"], sequence["start"], sequence["end"])
     ranges = response.perturbed().event_ranges[response.events["time"] == sequence["end"]]
     low, high = ranges.T.max(axis=1, initial=0.0)
-    first, last, at = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
-    main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
-    look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
-    add_text(main, "A", (0.5 * (first + last), 0.955), (0, 2), **look)
+    first, last, transform = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
+    main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=transform)
+    style: dict[str, Any] = {
+        "ha": "center",
+        "va": "bottom",
+        "color": ABOVE,
+        "fontweight": "bold",
+        "xycoords": transform,
+    }
+    add_text(main, "A", (0.5 * (first + last), 0.955), (0, 2), **style)
     rest, start, interval = 0.5 * (sequence["lower"] + sequence["upper"]), times[:-1], np.diff(times)
     # Logarithms are undefined for impacts closer than floating-point spacing.
-    shown = (interval > 0.0) & (rest > start)
-    look = {"color": INK, "markersize": 2.6, "markerfacecolor": "white", "markeredgewidth": 0.6}
-    axes.loglog(rest - start[shown], interval[shown], "o", **look)
+    is_positive = (interval > 0.0) & (rest > start)
+    style = {"color": INK, "markersize": 2.6, "markerfacecolor": "white", "markeredgewidth": 0.6}
+    axes.loglog(rest - start[is_positive], interval[is_positive], "o", **style)
     axes.invert_xaxis()
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid(True)
-    known = f"about {rest:.0f} s, if at all" if math.isnan(low) else time_text(rest, low, high)
-    words = f"A: at rest at {known}; bracket of the computation {sequence['upper'] - sequence['lower']:.0e} s"
-    axes.set_title(textwrap.fill(words, max(20, int(axes.bbox.width / axes.figure.dpi * 14))), color=ABOVE, loc="left")
+    rest_text = f"about {rest:.0f} s, if at all" if math.isnan(low) else format_time(rest, low, high)
+    title = f"A: at rest at {rest_text}; bracket of the computation {sequence['upper'] - sequence['lower']:.0e} s"
+    axes.set_title(textwrap.fill(title, max(20, int(axes.bbox.width / axes.figure.dpi * 14))), color=ABOVE, loc="left")
 
 
 class Course(NamedTuple):
@@ -289,7 +304,7 @@ class Course(NamedTuple):
         balance. If a side has no balance, rotation in rad and velocity divided by p.
     kinetic, potential : ndarray
         Energies as of `Response.kinetic_energy`.
-    before : ndarray of int
+    impact_rows : ndarray of int
         Indices of the points before impacts.
     """
 
@@ -298,50 +313,53 @@ class Course(NamedTuple):
     velocity: Floats
     kinetic: Floats
     potential: Floats
-    before: Integers
+    impact_rows: Integers
 
-    def parted(self, values: Floats) -> Floats:
+    def insert_gaps(self, values: Floats) -> Floats:
         """Insert a gap at each impact, where a line would jump."""
-        return np.insert(values, self.before + 1, np.nan)
+        return np.insert(values, self.impact_rows + 1, np.nan)
 
 
-def course_of(response: Simulated, start: float, end: float) -> Course:
+def compute_course(response: Simulated, start: float, end: float) -> Course:
     """Compute the course of a response between two times, s."""
     history, energy = response._history, response._energy
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]
-    impacts = impacts[:: 1 + len(impacts) // _MOST_IMPACTS]
-    at = np.asarray(impacts["time"], dtype=float)
-    times = np.setdiff1d(np.linspace(start, end, _EVEN_TIMES), at)
-    rows = history.rows(times)
+    impacts = impacts[:: 1 + len(impacts) // _MAX_IMPACTS]
+    impact_times = np.asarray(impacts["time"], dtype=float)
+    times = np.setdiff1d(np.linspace(start, end, _EVEN_TIMES), impact_times)
+    rows = history.find_rows(times)
     theta, rate, _ = history.states_in(times, rows).T
-    where = np.searchsorted(times, at)
+    positions = np.searchsorted(times, impact_times)
 
-    def joined(values: Floats | Integers, before: Floats | Integers, after: Floats | Integers) -> Floats:
-        return np.insert(values.astype(float), np.repeat(where, 2), np.column_stack([before, after]).ravel())
+    def insert(values: Floats | Integers, before: Floats | Integers, after: Floats | Integers) -> Floats:
+        return np.insert(values.astype(float), np.repeat(positions, 2), np.column_stack([before, after]).ravel())
 
-    left, entered = energy.sides_at(impacts)
-    side = joined(history.trail.nodes["side"][rows], left, entered).astype(np.int64)
-    back, out = (2.0 * left - 1.0) * impacts["speed_before"], (1.0 - 2.0 * entered) * impacts["speed_after"]
-    rotation, velocity = joined(theta, 0.0 * at, 0.0 * at), joined(rate, back, out)
-    own = np.maximum(side, 0)
-    unit = energy.unit_of_rotation[own]
+    side_left, side_entered = energy.find_sides(impacts)
+    side = insert(history.trail.nodes["side"][rows], side_left, side_entered).astype(np.int64)
+    v_before, v_after = (
+        (2.0 * side_left - 1.0) * impacts["speed_before"],
+        (1.0 - 2.0 * side_entered) * impacts["speed_after"],
+    )
+    rotation, velocity = (insert(theta, 0.0 * impact_times, 0.0 * impact_times), insert(rate, v_before, v_after))
+    side_index = np.maximum(side, 0)
+    unit = energy.unit_of_rotation[side_index]
     return Course(
-        joined(times, at, at),
+        insert(times, impact_times, impact_times),
         rotation / unit,
-        velocity / (energy.p[own] * unit),
+        velocity / (energy.p[side_index] * unit),
         energy.kinetic(velocity, side),
         energy.potential(rotation, side),
-        where + 2 * np.arange(len(where)),
+        positions + 2 * np.arange(len(positions)),
     )
 
 
-def boundary_of(response: Simulated) -> tuple[Floats, Floats]:
+def compute_boundary(response: Simulated) -> tuple[Floats, Floats]:
     """Return rotations and velocities, in units of a `Course`, with the energy of the balance."""
     energy, gap = response._energy, np.array([np.nan])
     x: list[Floats] = []
     y: list[Floats] = []
     for side, sign in enumerate((1.0, -1.0)):
-        u, speed = energy.boundary(side)
+        u, speed = energy.compute_boundary(side)
         falling = np.where(u < 1.0, speed, -speed)  # two branches cross at the balance
         unit = energy.balance[side] / energy.unit_of_rotation[side]
         for direction in (1.0, -1.0) if len(u) else ():
@@ -350,41 +368,41 @@ def boundary_of(response: Simulated) -> tuple[Floats, Floats]:
     return np.concatenate(x), np.concatenate(y)
 
 
-def marked(response: Simulated, start: float, end: float) -> dict[str, Floats]:
+def find_event_times(response: Simulated, start: float, end: float) -> dict[str, Floats]:
     """Return the times of uplift and rest within an interval, s."""
     events = response.events
     inside = (events["time"] >= start) & (events["time"] <= end)
     return {kind: np.asarray(events["time"][inside & (events["kind"] == kind)], float) for kind in ("uplift", "rest")}
 
 
-def phase_plane(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
+def draw_phase_plane(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw normalised velocity against normalised rotation in a window, in units of a `Course`."""
-    span = shown_span(response, window)
-    course = course_of(response, *span)
+    span = resolve_window(response, window)
+    course = compute_course(response, *span)
     limit = response.block.coordinate.limit if response._energy.has_balances else "rad"
     with open_page((4.6, 4.2), **options) as page:
         (axes,) = page.create_panels()
         axes.axhline(0.0, color=INK, linewidth=0.4)
         axes.axvline(0.0, color=INK, linewidth=0.4)
-        axes.plot(*boundary_of(response), label="as much energy as at the balance", **_BOUNDARY)
-        if len(course.before):
-            jumps = np.column_stack([course.velocity[course.before], course.velocity[course.before + 1]])
+        axes.plot(*compute_boundary(response), label="as much energy as at the balance", **_BOUNDARY)
+        if len(course.impact_rows):
+            jumps = np.column_stack([course.velocity[course.impact_rows], course.velocity[course.impact_rows + 1]])
             y = np.insert(jumps, 2, np.nan, axis=1).ravel()
             axes.plot(0.0 * y, y, color=GROUND, linewidth=1.1, linestyle=(0, (1, 1.5)), label="impact")
-        rotation, velocity = course.parted(course.rotation), course.parted(course.velocity)
+        rotation, velocity = course.insert_gaps(course.rotation), course.insert_gaps(course.velocity)
         axes.plot(rotation, velocity, color=INK, linewidth=0.8, label="response")
-        if name := " and ".join(kind for kind, times in marked(response, *span).items() if len(times)):
+        if name := " and ".join(kind for kind, times in find_event_times(response, *span).items() if len(times)):
             axes.plot(0.0, 0.0, "o", label=name, color=INK, markersize=5.0, markerfacecolor=REST, zorder=4)
         for values, set_limits in ((rotation, axes.set_xlim), (velocity, axes.set_ylim)):
-            reach = 1.1 * min(max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-12), _FARTHEST)
+            reach = 1.1 * min(max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-12), _MAX_RATIO)
             set_limits(-reach, reach)
         add_labels(axes, f"rotation / {limit}", f"velocity / (p × {limit})")
     return page.figure
 
 
-def energies(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
+def draw_energies(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw kinetic, potential and total energy, divided by the overturning energy, in a window."""
-    course = course_of(response, *shown_span(response, window))
+    course = compute_course(response, *resolve_window(response, window))
     time, total = course.time, course.kinetic + course.potential
     with open_page((7.0, 3.0), **options) as page:
         (axes,) = page.create_panels()
@@ -393,8 +411,8 @@ def energies(response: Simulated, window: Sequence[float] | None, **options: Unp
         axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")
         axes.plot(time, course.potential, color=GROUND, linewidth=1.0, label="potential")
         axes.plot(time, course.kinetic, color="#3c6aa0", linewidth=0.8, linestyle=(0, (4, 1.5)), label="kinetic")
-        axes.plot(time[course.before], 0.0 * course.before, "|", color=INK, markersize=6, markeredgewidth=0.5)
-        levels = [level for level in response._energy.needed.tolist() if level < min(1.6 * top, math.inf)]
+        axes.plot(time[course.impact_rows], 0.0 * course.impact_rows, "|", color=INK, markersize=6, markeredgewidth=0.5)
+        levels = [level for level in response._energy.overturning_energy.tolist() if level < min(1.6 * top, math.inf)]
         for level in levels:
             axes.axhline(level, label="as much energy as at the balance", **_BOUNDARY)
         axes.set_xlim(time[0], time[-1])

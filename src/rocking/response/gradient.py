@@ -18,26 +18,26 @@ from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, copy_trail
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
-from rocking.response.history import steps_to_events, steps_to_impacts
+from rocking.response.history import find_event_steps, find_impact_steps
 from rocking.response.response import Response
 
 #: Quantities that can be differentiated.
 Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
 
 #: Time before a rest, s, up to which impacts are followed. The remainder is of first order, and rounding smaller.
-_CLOSE: Final = 1e-5
+_REST_MARGIN: Final = 1e-5
 
-_OVERTURNS: Final = "the block overturns: its peak is where it falls, whatever changes a little"
-_AT_STOP: Final = "the body reaches its second stop: its peak is there, whatever changes a little"
-_UNFINISHED: Final = "the simulation was not finished: its derivatives are not known"
-_FROM_REST: Final = "the response starts on the ground: a start to the other side changes it otherwise"
+_OVERTURNS: Final = "the block overturns, so its peak does not depend on small changes"
+_AT_STOP: Final = "the body reaches its second stop, so its peak does not depend on small changes"
+_UNFINISHED: Final = "the simulation was not finished, so its derivatives are unknown"
+_FROM_REST: Final = "the response starts on the ground, where derivatives differ between the two sides"
 _REASONS: Final = {
     AdjointEnd.GRAZES: (
-        "the block touches the ground without speed: with a little less motion it does not, or it hits it"
+        "the block touches the ground without speed, so a slightly weaker motion causes no contact or an impact"
     ),
     AdjointEnd.LEAVES_AT_ONCE: "the block leaves the ground at the instant at which it comes to rest",
     AdjointEnd.TOUCHES_THRESHOLD: (
-        "the motion touches the threshold of uplift: with a little less of it there is no uplift"
+        "the motion touches the uplift threshold, so a slightly weaker motion causes no uplift"
     ),
 }
 
@@ -81,7 +81,7 @@ class Gradient:
         InvalidOption
             If the motion is not linear between samples.
         """
-        return _by_samples(self.motion, self.coefficients)
+        return _convert_to_samples(self.motion, self.coefficients)
 
     @property
     def vertical_samples(self) -> Floats:
@@ -93,14 +93,14 @@ class Gradient:
             If there is no vertical component, or it is not linear between samples.
         """
         if self.motion is None or self.motion.vertical is None or self.vertical is None:
-            raise InvalidOption("the motion has no vertical component; give it one by `with_vertical`")
-        return _by_samples(self.motion.vertical, self.vertical)
+            raise InvalidOption("the motion has no vertical component; add one by `with_vertical`")
+        return _convert_to_samples(self.motion.vertical, self.vertical)
 
     def __repr__(self) -> str:
         if np.isnan(self.coefficients).any():
             return f"<Gradient: {self.reason}>"
-        moved = int(np.count_nonzero(np.any(self.coefficients != 0.0, axis=1)))
-        text = f"{self.value:.6g} depends on {moved} of {len(self.coefficients)} pieces of the motion"
+        count = int(np.count_nonzero(np.any(self.coefficients != 0.0, axis=1)))
+        text = f"{self.value:.6g} depends on {count} of {len(self.coefficients)} pieces of the motion"
         return f"<Gradient: {'; '.join(filter(None, [text, self.reason]))}>"
 
 
@@ -146,30 +146,30 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
     >>> response = rocking.simulate(block, record)
-    >>> [f"{each:.5f}" for each in rocking.gradient(response).samples]
+    >>> [f"{value:.5f}" for value in rocking.gradient(response).samples]
     ['-0.00175', '-0.01310', '0.01048', '0.04288', '0.03351']
     """
     if not isinstance(response, Response):
         raise InvalidOption("{} must be a response, as `rocking.simulate` returns it", "response", value=response)
     checks.choice(of, "of", InvalidOption, get_args(Quantity))
     if of == "peak":
-        target = _peak(response, at)
+        target = _target_peak(response, at)
     elif of in ("rotation", "velocity"):
-        target = _state(response, of, at)
+        target = _target_state(response, of, at)
     else:
-        target = _time(response, of, at)
+        target = _target_time(response, of, at)
     trail = response.solution.trail
-    out = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
+    derivatives = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
     change = np.zeros(3)
     reason = _UNFINISHED if response.unfinished else target.reason
-    if response.rounding_decisions and not reason and _ties_before(trail, target.instant):
+    if response.rounding_decisions and not reason and _has_ties_before(trail, target.instant):
         reason = _REASONS[AdjointEnd.GRAZES]
-    reason = reason or _by_adjoint(target, change, out)
+    reason = reason or _apply_adjoint(target, change, derivatives)
     if reason and reason != _FROM_REST:
         change[:] = math.nan
-        out[:] = math.nan
-    horizontal, vertical = _by_components(response.motion, trail, response.block.gravity, out)
-    sign = _sign(int(trail.nodes["side"][0]))
+        derivatives[:] = math.nan
+    horizontal, vertical = _split_components(response.motion, trail, response.block.gravity, derivatives)
+    sign = _find_sign(int(trail.nodes["side"][0]))
     return Gradient(
         value=target.value,
         coefficients=horizontal,
@@ -199,9 +199,9 @@ class _Target:
     is_height: bool = False
 
 
-def _peak(response: Response, at: float | None) -> _Target:
+def _target_peak(response: Response, at: float | None) -> _Target:
     if at is not None:
-        raise InvalidOption('{} is for other quantities: a "peak" is where it is', "at", value=at)
+        raise InvalidOption('{} does not apply to a "peak"', "at", value=at)
     trail, value, instant = response.solution.trail, response.peak_rotation, response.peak_time
     reason = ""
     if response.overturned:
@@ -213,51 +213,53 @@ def _peak(response: Response, at: float | None) -> _Target:
     return _Target(value, instant, trail, row, since, (1.0, 0.0), reason, is_height=True)
 
 
-def _state(response: Response, of: Quantity, at: float | None) -> _Target:
-    """Return the target for the rotation or velocity at a time."""
+def _target_state(response: Response, of: Quantity, at: float | None) -> _Target:
+    """Create the target for the rotation or velocity at a time."""
     if at is None:
-        raise InvalidOption(f"a {of} needs the time, {{}}, at which it is asked for, s", "at")
+        raise InvalidOption(f"a {of} requires {{}}, the time in s", "at")
     time = checks.between(at, "at", InvalidOption, 0.0, response.duration, "s")
     trail, history = response.solution.trail, response._history
-    found = history.states(time)
+    motion_state = history.states(time)
     row = int(np.searchsorted(trail.nodes["time"], time, side="right")) - 1
-    nodes = state.expose_fields(np.concatenate([trail.nodes[: row + 1], _later(response, row, time)]))
+    nodes = state.expose_fields(np.concatenate([trail.nodes[: row + 1], _find_later_nodes(response, row, time)]))
     row = len(nodes) - 1
-    sign = _sign(int(nodes["side"][row])) if np.any(found) or time == 0.0 else 0.0
+    sign = _find_sign(int(nodes["side"][row])) if np.any(motion_state) or time == 0.0 else 0.0
     by_state = (sign, 0.0) if of == "rotation" else (0.0, sign)
     since = max(0.0, time - float(nodes["time"][row]))
-    value = float(found[0 if of == "rotation" else 1])
+    value = float(motion_state[0 if of == "rotation" else 1])
     return _Target(value, time, trail._replace(nodes=nodes), row, since, by_state)
 
 
-def _time(response: Response, of: Quantity, at: float | None) -> _Target:
-    """Return the target for the time of an event or impact."""
+def _target_time(response: Response, of: Quantity, at: float | None) -> _Target:
+    """Create the target for the time of an event or impact."""
     trail, rows = response.solution.trail, response.events if of == "event" else response.impacts
     if not len(rows):
-        raise InvalidOption(f"the response has no {of}; ask for another quantity, {{}}", "of", value=of)
+        raise InvalidOption(f"the response has no {of}; choose another quantity {{}}", "of", value=of)
     k = checks.integer(at, "at", InvalidOption, -len(rows), len(rows) - 1)
     nodes = trail.nodes
-    row = int((steps_to_events(nodes, overturns=response.overturned) if of == "event" else steps_to_impacts(nodes))[k])
+    row = int(
+        (find_event_steps(nodes, overturns=response.overturned) if of == "event" else find_impact_steps(nodes))[k]
+    )
     if row > 0 and nodes["side"][row + 1] < 0 and nodes["time"][row + 1] == nodes["time"][row]:
         row -= 1  # a rest at the instant of the impact
     instant = float(rows["time"][k])
     since = math.inf if nodes["side"][row] >= 0 and nodes["side"][row + 1] >= 0 else 0.0
     if nodes["side"][row] >= 0 and nodes["side"][row + 1] < 0:
-        later = _later(response, row, instant - _CLOSE)
+        later = _find_later_nodes(response, row, instant - _REST_MARGIN)
         later = later[: int(np.max(np.flatnonzero(later["u"] == 0.0), initial=-1)) + 1]
         trail = trail._replace(nodes=state.expose_fields(np.concatenate([nodes[: row + 1], later, nodes[row + 1 :]])))
         row += len(later)
     return _Target(instant, instant, trail, row, since)
 
 
-def _later(response: Response, row: int, until: float) -> Records:
+def _find_later_nodes(response: Response, row: int, until: float) -> Records:
     """Return the nodes after a row up to a time, including impacts after a proof."""
     nodes: Records = response._history.trail.nodes
-    found: Records = nodes[(nodes["time"] > response.solution.trail.nodes["time"][row]) & (nodes["time"] <= until)]
-    return found
+    later: Records = nodes[(nodes["time"] > response.solution.trail.nodes["time"][row]) & (nodes["time"] <= until)]
+    return later
 
 
-def _ties_before(trail: Trail, instant: float) -> bool:
+def _has_ties_before(trail: Trail, instant: float) -> bool:
     """Return whether rounding determined a touch up to an instant, by integrating again."""
     rules, start = trail.settings.copy(), state.state_at_node(trail.nodes[0])
     rules["stop"], rules["no_end_time"], rules["record"] = math.nextafter(instant, math.inf), False, False
@@ -265,26 +267,28 @@ def _ties_before(trail: Trail, instant: float) -> bool:
     return bool(start["rounding_decisions"] > 0)
 
 
-def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
+def _apply_adjoint(target: _Target, change: Floats, derivatives: Floats) -> str:
     """Write derivatives by the initial state and by pieces of the motion; return the reason if there are none."""
     nodes, scratch = target.trail.nodes, state.new_scratch()
-    starts_at_rest, begin = int(nodes["side"][0]) < 0, float(nodes["time"][0])
-    ends = AdjointEnd.START
+    starts_at_rest, start_time = int(nodes["side"][0]) < 0, float(nodes["time"][0])
+    ending = AdjointEnd.START
     if target.by_state is None:
-        ends = AdjointEnd(adjoint_of_final_state(copy_trail(target.trail), scratch, target.row, change, out))
+        ending = AdjointEnd(adjoint_of_final_state(copy_trail(target.trail), scratch, target.row, change, derivatives))
     else:
         change[:2] = target.by_state
-        if not np.any(change) or (target.instant == begin and not target.is_height):
+        if not np.any(change) or (target.instant == start_time and not target.is_height):
             return ""  # at rest, or the initial state itself
-    if ends in _REASONS:
-        return _REASONS[ends]
-    if target.instant > begin:
-        work = state.new_record(state.VARIATION)
-        ends = AdjointEnd(adjoint(copy_trail(target.trail), scratch, work, target.row, target.since, change, out))
-        if ends in _REASONS:
-            return _REASONS[ends]
-        waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)
-        if ends == AdjointEnd.REST or waits:
+    if ending in _REASONS:
+        return _REASONS[ending]
+    if target.instant > start_time:
+        variation = state.new_record(state.VARIATION)
+        ending = AdjointEnd(
+            adjoint(copy_trail(target.trail), scratch, variation, target.row, target.since, change, derivatives)
+        )
+        if ending in _REASONS:
+            return _REASONS[ending]
+        is_waiting = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > start_time)
+        if ending == AdjointEnd.REST or is_waiting:
             return ""  # a new rest before any uplift removes all dependence
         if not starts_at_rest:
             change[0] = math.nan if nodes["u"][0] == 0.0 else change[0]
@@ -293,42 +297,44 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
     return _FROM_REST if np.any(np.isnan(change)) else ""
 
 
-def _sign(side: int) -> float:
+def _find_sign(side: int) -> float:
     """Return the sign of a coordinate in the frame of a side, or at rest."""
     return -1.0 if side == 1 else 1.0
 
 
-def _by_components(motion: Motion | None, trail: Trail, gravity: float, out: Floats) -> tuple[Floats, Floats | None]:
+def _split_components(
+    motion: Motion | None, trail: Trail, gravity: float, derivatives: Floats
+) -> tuple[Floats, Floats | None]:
     """Return derivatives by both components from derivatives by their common pieces."""
     if motion is None:
         return np.zeros((0, 2)), None
     starts, columns = trail.ground.pieces[:-1, 0], trail.ground.columns
-    horizontal = _by_own_pieces(motion, starts, out[:-1, :columns] / gravity)
+    horizontal = _sum_over_pieces(motion, starts, derivatives[:-1, :columns] / gravity)
     if motion.vertical is None:
         return horizontal, None
-    return horizontal, _by_own_pieces(motion.vertical, starts, out[:-1, columns:] / gravity)
+    return horizontal, _sum_over_pieces(motion.vertical, starts, derivatives[:-1, columns:] / gravity)
 
 
-def _by_own_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
-    """Convert derivatives by finer pieces to the pieces of a motion: the transpose of `refined`."""
+def _sum_over_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
+    """Convert derivatives by finer pieces to the pieces of a motion: the transpose of a refinement."""
     within = starts < motion.duration
     starts, values = starts[within], values[within]
     piece = np.searchsorted(motion.breakpoints, starts, side="right") - 1
     shift = starts - motion.breakpoints[piece]
     columns = motion.coefficients.shape[1]
-    found = np.zeros((len(motion.coefficients), columns))
+    sums = np.zeros((len(motion.coefficients), columns))
     for j in range(columns):
         for i in range(j + 1):
-            np.add.at(found[:, j], piece, math.comb(j, i) * shift ** (j - i) * values[:, i])
-    return found
+            np.add.at(sums[:, j], piece, math.comb(j, i) * shift ** (j - i) * values[:, i])
+    return sums
 
 
-def _by_samples(motion: Motion | None, values: Floats) -> Floats:
+def _convert_to_samples(motion: Motion | None, values: Floats) -> Floats:
     """Convert derivatives by the coefficients of lines to accelerations at their ends."""
     if motion is None or values.shape[1] != 2 or piecewise.has_jumps(motion):
-        raise InvalidOption("the motion is not linear between samples; take the derivatives by its `coefficients`")
+        raise InvalidOption("the motion is not linear between samples; use the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)
-    found = np.zeros(len(values) + 1)
-    found[:-1] = values[:, 0] - rates
-    found[1:] += rates
-    return found
+    derivatives = np.zeros(len(values) + 1)
+    derivatives[:-1] = values[:, 0] - rates
+    derivatives[1:] += rates
+    return derivatives

@@ -21,20 +21,20 @@ from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, copy_trail, trace
 
 #: Number of samples per step in the search for the last passage of the balance.
-_LOOKS: Final = 33
+_SAMPLES_PER_STEP: Final = 33
 
 #: Parts of a step in the search for turning points, and bisections of the time of a turning point, at which the
 #: coordinate is stationary.
-_PARTS: Final = 8
-_TURNINGS: Final = 30
+_PARTS_PER_STEP: Final = 8
+_BISECTIONS: Final = 30
 
 
 #: Bounds on the impacts after the last resolved one: smallest speed, divided by p and in rad, below which the motion
 #: and the impacts no longer contribute; largest number per sequence, which suffices for restitutions up to 0.998; for
 #: bodies without stiffness, smallest ratio to the speed at the end of the resolved sequence.
-_SLOWEST: Final = 1e-10
-_MOST_IMPACTS: Final = 10_000
-_LEAST_SHARE: Final = 1e-9
+_MIN_SPEED: Final = 1e-10
+_MAX_IMPACTS: Final = 10_000
+_MIN_SPEED_RATIO: Final = 1e-9
 
 
 class Solution(NamedTuple):
@@ -43,15 +43,15 @@ class Solution(NamedTuple):
     trail: Trail  # ground, body and settings for kernels, and the nodes of the series
     sequences: NDArray[np.void]  # as proven, without the rounding before the proof
     residual: float  # coordinate at the end
-    again: Callable[[float], Any]  # repeats the simulation with the motion and the start multiplied by a factor
+    repeat: Callable[[float], Any]  # repeats the simulation with the motion and the start multiplied by a factor
 
     def __repr__(self) -> str:
         return f"<Solution: {format_count(len(self.trail.nodes), 'node')}>"
 
 
 @dataclass(frozen=True, eq=False)
-class History:
-    """The computed trail as functions of time, from 0 to `end` (s)."""
+class TimeHistory:
+    """Computed solution as functions of time, from 0 to `end` (s)."""
 
     trail: Trail
     end: float
@@ -65,40 +65,40 @@ class History:
         """Return `states`, and the side at each time: 0, 1, or negative at rest."""
         times = checks.numbers(time, "time", InvalidOption)
         flat = times.ravel()
-        rows = self.rows(flat)
-        found = self.states_in(flat, rows)
-        found[self.outside(flat)] = np.nan
+        rows = self.find_rows(flat)
+        states = self.states_in(flat, rows)
+        states[self.is_outside(flat)] = np.nan
         sides = self.trail.nodes["side"][rows].astype(np.int64)
-        return found.reshape((*times.shape, 3)), sides.reshape(times.shape)
+        return states.reshape((*times.shape, 3)), sides.reshape(times.shape)
 
     def states_in(self, times: Floats, rows: Integers) -> Floats:
         """Return coordinate and rates, shape (n, 3), at times in the steps that start at these rows."""
-        found = np.empty((len(times), 3))
-        given = times.view()
-        given.flags.writeable = False  # one type for any caller: `trace` is compiled once
-        trace(copy_trail(self.trail), state.new_scratch(), given, rows, found)
+        states = np.empty((len(times), 3))
+        sample_times = times.view()
+        sample_times.flags.writeable = False  # one type for any caller: `trace` is compiled once
+        trace(copy_trail(self.trail), state.new_scratch(), sample_times, rows, states)
         if any(self.stops):
             side = self.trail.nodes["side"][rows]
-            found[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]
-        return found
+            states[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]
+        return states
 
-    def rows(self, times: Floats) -> Integers:
+    def find_rows(self, times: Floats) -> Integers:
         """Return the row of the first node of the step of each time."""
         rows = np.searchsorted(self.trail.nodes["time"], times, side="right") - 1
         return np.maximum(rows, 0).astype(np.int64)
 
-    def outside(self, times: Floats) -> Flags:
+    def is_outside(self, times: Floats) -> Flags:
         """Return whether each time is outside [0, end] or NaN."""
         return ~((times >= 0.0) & (times <= self.end))
 
-    def rests(self) -> Floats:
+    def find_rests(self) -> Floats:
         """Return start and end of each interval at rest, shape (n, 2), s."""
         nodes = self.trail.nodes
         rows = np.flatnonzero(nodes["side"] < 0)
-        after = np.append(nodes["time"][1:], self.end)
-        return np.column_stack([nodes["time"][rows], after[rows]])
+        ends = np.append(nodes["time"][1:], self.end)
+        return np.column_stack([nodes["time"][rows], ends[rows]])
 
-    def tipping_time(self, balances: tuple[float, float]) -> float:
+    def find_tipping_time(self, balances: tuple[float, float]) -> float:
         """Return the last time, s, at which a body passes its unstable balance outwards; NaN if it ends within it.
 
         ``balances``: coordinates of the balance on side + and side -.
@@ -115,44 +115,44 @@ class History:
         if not is_beyond(self.end):
             return math.nan
         ends = last_arc["time"]
-        times = (ends[:-1, None] + np.linspace(0.0, 1.0, _LOOKS) * np.diff(ends)[:, None]).ravel()
+        times = (ends[:-1, None] + np.linspace(0.0, 1.0, _SAMPLES_PER_STEP) * np.diff(ends)[:, None]).ravel()
         within = np.flatnonzero(np.abs(self.states(times)[:, 0]) < balance)
         if not len(within):
             return float(ends[0])  # beyond it from the start
         return bisect(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
 
-    def largest(self) -> tuple[float, float]:
+    def find_peaks(self) -> tuple[float, float]:
         """Return the largest rotation of a block on each side, rad, from parts of steps and turning points."""
         nodes = self.trail.nodes
         moving = np.flatnonzero(nodes["side"] >= 0)
         side = nodes["side"][moving]
         ends = np.append(nodes["time"][1:], self.end)[moving]
-        times = np.linspace(nodes["time"][moving], ends, _PARTS + 1, axis=1)
-        states = self.states_in(times.ravel(), np.repeat(moving, _PARTS + 1)).reshape(*times.shape, 3)
-        found, rate = np.abs(states[..., 0]).max(axis=1), (1.0 - 2.0 * side)[:, None] * states[..., 1]
+        times = np.linspace(nodes["time"][moving], ends, _PARTS_PER_STEP + 1, axis=1)
+        states = self.states_in(times.ravel(), np.repeat(moving, _PARTS_PER_STEP + 1)).reshape(*times.shape, 3)
+        peaks, rate = np.abs(states[..., 0]).max(axis=1), (1.0 - 2.0 * side)[:, None] * states[..., 1]
         step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
         low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
-        for _ in range(_TURNINGS if len(step) else 0):
-            out = sign * self.states_in(find_middles(low, high), rows)[:, 1] > 0.0
-            low, high = halve(low, high, out, ~out)
-        np.maximum.at(found, step, np.abs(self.states_in(low, rows)[:, 0]))
-        plus, minus = (float(np.max(found[side == k], initial=0.0)) for k in range(2))
+        for _ in range(_BISECTIONS if len(step) else 0):
+            is_outward = sign * self.states_in(find_middles(low, high), rows)[:, 1] > 0.0
+            low, high = halve(low, high, is_outward, ~is_outward)
+        np.maximum.at(peaks, step, np.abs(self.states_in(low, rows)[:, 0]))
+        plus, minus = (float(np.max(peaks[side == k], initial=0.0)) for k in range(2))
         return plus, minus
 
 
-def even_times(end: float, dt: float) -> Floats:
+def create_times(end: float, dt: float) -> Floats:
     """Return multiples of a step from 0 to the end, s."""
     return np.minimum(dt * np.arange(math.floor(end / dt * (1.0 + 1e-12)) + 1, dtype=np.float64), end)
 
 
-def steps_to_events(nodes: Records, *, overturns: bool) -> Integers:
+def find_event_steps(nodes: Records, *, overturns: bool) -> Integers:
     """Return the rows of nodes whose steps end in an uplift, a rest or, if specified, overturning."""
     rests = nodes["side"] < 0
     rows = np.flatnonzero(rests[:-1] | rests[1:])
     return np.append(rows, len(nodes) - 2) if overturns else rows
 
 
-def steps_to_impacts(nodes: Records) -> Integers:
+def find_impact_steps(nodes: Records) -> Integers:
     """Return the rows of nodes whose steps end in an impact, as `trace.is_impact`."""
     side, moves = nodes["side"], nodes["side"] >= 0
     onto_ground = moves[:-1] & moves[1:] & (nodes["u"][1:] == 0.0)
@@ -160,7 +160,7 @@ def steps_to_impacts(nodes: Records) -> Integers:
     return np.flatnonzero(onto_ground & ((side[1:] != side[:-1]) | (nodes["v"][1:] > 0.0) | rests))
 
 
-def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
+def add_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
 
     ``cut``: whether the response ends within a sequence after its proof. Later impacts still exert forces, and are
@@ -169,41 +169,41 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     nodes = trail.nodes
     # No rest follows the last impact if the duration ends within a sequence after its proof.
     rests = np.append(nodes["side"][1:] < 0, cut)
-    closing = np.flatnonzero(rests & (nodes["side"] >= 0) & (nodes["u"] == 0.0))
-    slowest = _SLOWEST * np.sqrt(np.abs(trail.block["stiffness"]))
-    closing = closing[nodes["v"][closing] > slowest[nodes["side"][closing]]]
-    if not len(closing):
+    last_impacts = np.flatnonzero(rests & (nodes["side"] >= 0) & (nodes["u"] == 0.0))
+    min_speeds = _MIN_SPEED * np.sqrt(np.abs(trail.block["stiffness"]))
+    last_impacts = last_impacts[nodes["v"][last_impacts] > min_speeds[nodes["side"][last_impacts]]]
+    if not len(last_impacts):
         return trail
     body, rules, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
     rules["rest_rule"], rules["no_end_time"], rules["record"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
-    parts, done, plastic = [], 0, plastic_elongations(trail)
-    for row in closing:
-        start = state.state_at_node(nodes[row], plastic[row], _MOST_IMPACTS)
-        body["rest_limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
+    parts, next_row, plastic = [], 0, compute_plastic_elongations(trail)
+    for row in last_impacts:
+        start = state.state_at_node(nodes[row], plastic[row], _MAX_IMPACTS)
+        body["rest_limit"] = np.maximum(min_speeds, _MIN_SPEED_RATIO * start["v"])
         start["peak"] = math.inf  # the peak is not needed, and weight is positive at a proven rest
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
         while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
             table = state.enlarge_table(table)
-        found = table["node"][1 : start["nodes"]]
-        parts += [nodes[done : row + 1], found[(found["side"] >= 0) & (found["time"] < rules["stop"])]]
-        done = row + 1
-    return trail._replace(nodes=state.expose_fields(np.concatenate([*parts, nodes[done:]])))
+        later = table["node"][1 : start["nodes"]]
+        parts += [nodes[next_row : row + 1], later[(later["side"] >= 0) & (later["time"] < rules["stop"])]]
+        next_row = row + 1
+    return trail._replace(nodes=state.expose_fields(np.concatenate([*parts, nodes[next_row:]])))
 
 
-def elongation(trail: Trail, rotations: Floats, side: Integers) -> Floats:
+def compute_elongation(trail: Trail, rotations: Floats, side: Integers) -> Floats:
     """Return the elongation of a yielding tendon at rotations to each side, m."""
-    bend = 2.0 * np.sin(0.5 * rotations) if trail.settings["nonlinear"] else rotations
-    return np.asarray(trail.block["lever_arm"][np.maximum(side, 0)] * bend)
+    opening_ratio = 2.0 * np.sin(0.5 * rotations) if trail.settings["nonlinear"] else rotations
+    return np.asarray(trail.block["lever_arm"][np.maximum(side, 0)] * opening_ratio)
 
 
-def plastic_elongations(trail: Trail) -> Floats:
+def compute_plastic_elongations(trail: Trail) -> Floats:
     """Return the plastic elongation of a tendon from each node on, m, as `restraints.plastic_at_node`."""
     nodes = trail.nodes
     if not trail.block["yielding"]:
         return np.zeros(len(nodes))
     law, side = nodes["law"], nodes["side"]
-    turns = np.append(side[:1] >= 0, (law[1:] == state.TendonLaw.ELASTIC) & (law[:-1] == state.TendonLaw.PLASTIC))
-    after = np.maximum(0.0, elongation(trail, nodes["u"], side) - trail.block["yield_elongation"])
-    last = np.maximum.accumulate(np.where(turns, np.arange(len(nodes)), -1))
-    return np.where(last >= 0, after[last], 0.0)
+    unloads = np.append(side[:1] >= 0, (law[1:] == state.TendonLaw.ELASTIC) & (law[:-1] == state.TendonLaw.PLASTIC))
+    plastic = np.maximum(0.0, compute_elongation(trail, nodes["u"], side) - trail.block["yield_elongation"])
+    last = np.maximum.accumulate(np.where(unloads, np.arange(len(nodes)), -1))
+    return np.where(last >= 0, plastic[last], 0.0)

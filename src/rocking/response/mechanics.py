@@ -24,41 +24,41 @@ from rocking.errors import InvalidOption
 from rocking.kernels.ground import component_coefficients
 from rocking.kernels.state import Record
 from rocking.motion import piecewise
-from rocking.response.history import History, elongation, plastic_elongations
+from rocking.response.history import TimeHistory, compute_elongation, compute_plastic_elongations
 
 #: Samples per step, and refinements around the largest one, in the search for extreme forces.
 _SAMPLES: Final = 9
 _REFINEMENTS: Final = 10
 
 #: Upper bound of the friction of any materials.
-_ROUGHEST: Final = 3.0
+_MAX_FRICTION: Final = 3.0
 
 #: Function of the ratios of horizontal and vertical force to the weight.
-Measure = Callable[[Floats, Floats], Floats]
+ForceMeasure = Callable[[Floats, Floats], Floats]
 
 
-def friction_coefficient(value: object) -> float:
+def check_friction(value: object) -> float:
     """Return a coefficient of friction, or raise `InvalidOption` if it is not in (0, 3]."""
     coefficient = checks.positive(value, "friction", InvalidOption)
-    if coefficient > _ROUGHEST:
-        text = f"{{}} must be at most {_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent"
+    if coefficient > _MAX_FRICTION:
+        text = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}; use the tangent of an angle of friction"
         raise InvalidOption(text, "friction", value=value)
     return coefficient
 
 
-def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
+def compute_friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
     """Return the friction coefficient required to stick: |H|/N, infinite without normal force, NaN for NaN."""
     demand = np.where(np.isnan(vertical), np.nan, np.inf)
     np.divide(np.abs(horizontal), vertical, out=demand, where=vertical > 0.0)
     return demand
 
 
-def pull(_: Floats, vertical: Floats) -> Floats:
-    """Return the required tensile force of the ground: the negative normal force."""
+def compute_pull(_: Floats, vertical: Floats) -> Floats:
+    """Compute the required tensile force of the ground: the negative normal force."""
     return -vertical
 
 
-def _reach(values: Floats) -> Floats:
+def _bound_steps(values: Floats) -> Floats:
     """Return an upper estimate of a quantity in each step: its largest sample plus the span of samples."""
     return np.asarray(2.0 * values.max(axis=1) - values.min(axis=1))
 
@@ -71,120 +71,125 @@ class Contact:
     impulses of impacts are not included.
     """
 
-    history: History
+    history: TimeHistory
     law: ContactLaw
     until: float
 
     @cached_property
     def _plastic(self) -> Floats:
-        return plastic_elongations(self.history.trail)
+        return compute_plastic_elongations(self.history.trail)
 
-    def forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
+    def compute_forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
         """Return both forces at times of any shape; NaN outside the response."""
         times = checks.numbers(time, "time", InvalidOption)
         flat = times.ravel()
-        outside = self.history.outside(flat)
+        outside = self.history.is_outside(flat)
         within = np.where(outside, 0.0, flat)
-        horizontal, vertical = self._forces_in(within, self.history.rows(within))
+        horizontal, vertical = self._compute_forces_in(within, self.history.find_rows(within))
         horizontal[outside] = vertical[outside] = np.nan
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
-    def extremes(self) -> tuple[float, float]:
+    def find_extremes(self) -> tuple[float, float]:
         """Return the largest friction required to stick, and the smallest normal force."""
-        times, rows = self._samples()
-        horizontal, vertical = (force.reshape(times.shape) for force in self._forces_in(times.ravel(), rows.ravel()))
-        friction, least = float(friction_demand(horizontal, vertical).max()), float(vertical.min())
+        times, rows = self._sample_steps()
+        horizontal, vertical = (
+            force.reshape(times.shape) for force in self._compute_forces_in(times.ravel(), rows.ravel())
+        )
+        friction, min_normal = float(compute_friction_demand(horizontal, vertical).max()), float(vertical.min())
 
-        def refined(measure: Measure, beyond: Floats) -> float:
+        def refine_maximum(measure: ForceMeasure, beyond: Floats) -> float:
             """Return the largest value of a measure in the steps where ``beyond`` may become positive."""
-            near = np.flatnonzero(_reach(beyond) > 0.0)
-            return float(self._peaks(measure, times[near], rows[near])[1].max(initial=-math.inf))
+            near = np.flatnonzero(_bound_steps(beyond) > 0.0)
+            return float(self._find_peaks(measure, times[near], rows[near])[1].max(initial=-math.inf))
 
         if math.isfinite(friction):
             # Unlike the demand, this measure is smooth and bounded if the normal force nearly vanishes.
-            friction = max(friction, refined(friction_demand, np.abs(horizontal) - friction * vertical))
-        return friction, min(least, -refined(pull, least - vertical))
+            friction = max(friction, refine_maximum(compute_friction_demand, np.abs(horizontal) - friction * vertical))
+        return friction, min(min_normal, -refine_maximum(compute_pull, min_normal - vertical))
 
-    def first(self, measure: Measure, is_beyond: Callable[[Floats], Flags]) -> float:
+    def find_first_time(self, measure: ForceMeasure, is_beyond: Callable[[Floats], Flags]) -> float:
         """Return the first time, s, at which a measure exceeds a level (``is_beyond`` is monotonic); NaN if never."""
-        times, rows = self._samples()
-        values = self._measured(measure, times, rows)
-        near = np.flatnonzero(is_beyond(_reach(values)))
+        times, rows = self._sample_steps()
+        values = self._evaluate(measure, times, rows)
+        near = np.flatnonzero(is_beyond(_bound_steps(values)))
         if not len(near):
             return math.nan
-        at, peaks = self._peaks(measure, times[near], rows[near])
-        passing = np.flatnonzero(is_beyond(peaks))
-        if not len(passing):
+        peak_times, peaks = self._find_peaks(measure, times[near], rows[near])
+        exceeding = np.flatnonzero(is_beyond(peaks))
+        if not len(exceeding):
             return math.nan
-        step = near[passing[0]]
-        looks = np.append(times[step], at[passing[0]])
-        beyond = is_beyond(np.append(values[step], peaks[passing[0]]))
-        high = float(looks[beyond].min())
-        before = looks[~beyond & (looks < high)]
-        if not len(before):
+        step = near[exceeding[0]]
+        sample_times = np.append(times[step], peak_times[exceeding[0]])
+        beyond = is_beyond(np.append(values[step], peaks[exceeding[0]]))
+        high = float(sample_times[beyond].min())
+        earlier = sample_times[~beyond & (sample_times < high)]
+        if not len(earlier):
             return high  # at a jump
 
         def passes(time: float) -> bool:
-            return bool(is_beyond(self._measured(measure, np.array([time]), rows[step, :1]))[0])
+            return bool(is_beyond(self._evaluate(measure, np.array([time]), rows[step, :1]))[0])
 
-        return bisect(float(before.max()), high, passes)[1]
+        return bisect(float(earlier.max()), high, passes)[1]
 
-    def _peaks(self, measure: Measure, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
+    def _find_peaks(self, measure: ForceMeasure, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
         """Return the times and values of the maxima in these steps."""
-        at, best = times[:, 0], np.full(len(times), -np.inf)
+        best_times, best_values = times[:, 0], np.full(len(times), -np.inf)
         for _ in range(_REFINEMENTS):
-            values = self._measured(measure, times, rows)
-            place = values.argmax(axis=1)[:, None]
-            value, where = (np.take_along_axis(array, place, axis=1)[:, 0] for array in (values, times))
-            at, best = np.where(value > best, where, at), np.maximum(value, best)
-            low = np.take_along_axis(times, np.maximum(place - 1, 0), axis=1)
-            high = np.take_along_axis(times, np.minimum(place + 1, times.shape[1] - 1), axis=1)
+            values = self._evaluate(measure, times, rows)
+            index = values.argmax(axis=1)[:, None]
+            value, time_at_max = (np.take_along_axis(array, index, axis=1)[:, 0] for array in (values, times))
+            best_times, best_values = (
+                np.where(value > best_values, time_at_max, best_times),
+                np.maximum(value, best_values),
+            )
+            low = np.take_along_axis(times, np.maximum(index - 1, 0), axis=1)
+            high = np.take_along_axis(times, np.minimum(index + 1, times.shape[1] - 1), axis=1)
             times = low + (high - low) * np.linspace(0.0, 1.0, times.shape[1])
-        return at, best
+        return best_times, best_values
 
-    def _measured(self, measure: Measure, times: Floats, rows: Integers) -> Floats:
-        return measure(*self._forces_in(times.ravel(), rows.ravel())).reshape(times.shape)
+    def _evaluate(self, measure: ForceMeasure, times: Floats, rows: Integers) -> Floats:
+        return measure(*self._compute_forces_in(times.ravel(), rows.ravel())).reshape(times.shape)
 
-    def _forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
+    def _compute_forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
         """Compute the forces in the steps that start at these rows, with the side and the piece of each."""
         theta, rate, acceleration = self.history.states_in(times, rows).T
         side = self.history.trail.nodes["side"][rows]
-        ground = self._ground_in(times, rows, side < 0)
-        stretch = elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
+        ground = self._evaluate_ground(times, rows, side < 0)
+        stretch = compute_elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
         return self.law((theta, rate, acceleration), ground, side, stretch)
 
-    def _ground_in(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
+    def _evaluate_ground(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
         """Return both ground accelerations in g, from the piece at the start of a step or, at rest, any piece."""
         ground = self.history.trail.ground
-        anywhere = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
-        piece = np.where(at_rest, anywhere, self.history.trail.nodes["piece"][rows])
+        current = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
+        piece = np.where(at_rest, current, self.history.trail.nodes["piece"][rows])
         elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
         push, *lift = (
             piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in component_coefficients(ground, piece)
         )
         return push, lift[0] if lift else np.zeros_like(push)
 
-    def _samples(self) -> tuple[Floats, Integers]:
+    def _sample_steps(self) -> tuple[Floats, Integers]:
         """Return samples of every step and, at rest, of every piece of the motion, in order, with their steps."""
         nodes = self.history.trail.nodes
-        corners = self.history.trail.ground.pieces[:, 0]
-        corners = corners[nodes["side"][self.history.rows(corners)] < 0]
-        starts = np.unique(np.concatenate([nodes["time"], corners]))
+        breakpoints = self.history.trail.ground.pieces[:, 0]
+        breakpoints = breakpoints[nodes["side"][self.history.find_rows(breakpoints)] < 0]
+        starts = np.unique(np.concatenate([nodes["time"], breakpoints]))
         starts = starts[(starts < self.until) | (starts == starts[0])]
-        if nodes["side"][self.history.rows(np.array([self.until]))[0]] < 0:
+        if nodes["side"][self.history.find_rows(np.array([self.until]))[0]] < 0:
             starts = np.union1d(starts, [self.until])  # motion after a jump at the end
         ends = np.append(starts[1:], max(self.until, starts[-1]))
-        rows = self.history.rows(starts)
+        rows = self.history.find_rows(starts)
         fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))
         times = starts[:, None] + fractions * (ends - starts)[:, None]
-        resting = nodes["side"][rows] < 0  # motion before a jump
-        times[resting, -1] = np.maximum(np.nextafter(times[resting, -1], 0.0), times[resting, 0])
+        is_resting = nodes["side"][rows] < 0  # motion before a jump
+        times[is_resting, -1] = np.maximum(np.nextafter(times[is_resting, -1], 0.0), times[is_resting, 0])
         return times, np.repeat(rows[:, None], _SAMPLES, axis=1)
 
 
 #: Number of points of a boundary, and its extent divided by the balance.
-_BOUNDARY: Final = 201
-_FARTHEST: Final = 1.6
+_N_BOUNDARY: Final = 201
+_MAX_RATIO: Final = 1.6
 
 #: Fields of a record that determine the potential.
 _FIELDS: Final = (
@@ -217,7 +222,7 @@ class Energy:
     @cached_property
     def balance(self) -> Floats:
         """Rotation of the unstable balance on each side in this model, rad; infinite if there is none."""
-        return np.array(self.body.balance) if self.nonlinear else linear_balance(self.body)
+        return np.array(self.body.balance) if self.nonlinear else find_linear_balance(self.body)
 
     @cached_property
     def has_balances(self) -> bool:
@@ -230,47 +235,47 @@ class Energy:
         return np.where(np.isfinite(self.balance), self.balance, 1.0) if self.has_balances else np.ones(2)
 
     @cached_property
-    def highest(self) -> Floats:
+    def balance_energy(self) -> Floats:
         """Potential energy at the balance of each side, divided by inertia, 1/s^2; infinite if there is none."""
-        found = np.full(2, math.inf)
-        for k, at in enumerate(self.balance):
-            if math.isfinite(at):
-                found[k] = float(self._potential(np.array([at]), np.array([k]))[0])
-        return found
+        energies = np.full(2, math.inf)
+        for k, balance in enumerate(self.balance):
+            if math.isfinite(balance):
+                energies[k] = float(self._potential(np.array([balance]), np.array([k]))[0])
+        return energies
 
     @cached_property
-    def needed(self) -> Floats:
+    def overturning_energy(self) -> Floats:
         """Overturning energy to each side, divided by the smaller one: 1 to the easier side."""
-        return self.highest * self._inertia / self._unit
+        return self.balance_energy * self._inertia / self._unit
 
     @cached_property
     def _unit(self) -> float:
-        return float(np.min(self.highest * self._inertia))
+        return float(np.min(self.balance_energy * self._inertia))
 
     def kinetic(self, velocity: Floats, side: Integers) -> Floats:
         """Return the kinetic energy at velocities, rad/s."""
-        found: Floats = 0.5 * velocity**2 * (self._inertia / self._unit)[np.maximum(side, 0)]
-        return found
+        energy: Floats = 0.5 * velocity**2 * (self._inertia / self._unit)[np.maximum(side, 0)]
+        return energy
 
     def potential(self, rotation: Floats, side: Integers) -> Floats:
         """Return the potential energy at rotations, rad: zero upright, without the ground motion."""
-        of = np.maximum(side, 0)
-        found: Floats = self._potential(np.abs(rotation), of) * (self._inertia / self._unit)[of]
-        return found
+        side_index = np.maximum(side, 0)
+        energy: Floats = self._potential(np.abs(rotation), side_index) * (self._inertia / self._unit)[side_index]
+        return energy
 
     def _potential(self, u: Floats, side: Integers) -> Floats:
         """Return V(u) of these sides, 1/s^2, without cancellation at small rotations."""
-        made = {name: self.record[name][side] for name in _FIELDS}
-        weight, push = 1.0 + made["added_weight"], made["added_push"]
+        fields = {name: self.record[name][side] for name in _FIELDS}
+        weight, push = 1.0 + fields["added_weight"], fields["added_push"]
         if self.nonlinear:
             half = 2.0 * np.sin(0.5 * u)
-            psi = made["slenderness"] - 0.5 * u
-            lifted = made["stiffness"] * (weight * np.sin(psi) + push * np.cos(psi)) + made["prestress"]
-            return np.asarray(half * lifted + 0.5 * made["spring"] * u * u)
-        stands = made["threshold_slope"] * (made["threshold"] * weight + push) + made["prestress"]
-        return np.asarray(u * (stands - 0.5 * (made["stiffness"] * weight - made["spring"]) * u))
+            psi = fields["slenderness"] - 0.5 * u
+            raised = fields["stiffness"] * (weight * np.sin(psi) + push * np.cos(psi)) + fields["prestress"]
+            return np.asarray(half * raised + 0.5 * fields["spring"] * u * u)
+        restoring = fields["threshold_slope"] * (fields["threshold"] * weight + push) + fields["prestress"]
+        return np.asarray(u * (restoring - 0.5 * (fields["stiffness"] * weight - fields["spring"]) * u))
 
-    def boundary(self, side: int) -> tuple[Floats, Floats]:
+    def compute_boundary(self, side: int) -> tuple[Floats, Floats]:
         """Return normalised rotations and velocities with the energy of the balance of a side.
 
         Rotations are divided by the balance, absolute velocities by p times the balance.
@@ -278,55 +283,55 @@ class Energy:
         balance = self.balance[side]
         if not math.isfinite(balance):
             return np.empty(0), np.empty(0)
-        farthest = min(_FARTHEST, 0.5 * math.pi / balance)
-        u = balance * np.union1d(np.linspace(0.0, farthest, _BOUNDARY), 1.0)
-        left = self.highest[side] - self._potential(u, np.full(u.shape, side))
-        speed = np.sqrt(2.0 * np.maximum(left, 0.0)) / (balance * self.p[side])
+        farthest = min(_MAX_RATIO, 0.5 * math.pi / balance)
+        u = balance * np.union1d(np.linspace(0.0, farthest, _N_BOUNDARY), 1.0)
+        remaining = self.balance_energy[side] - self._potential(u, np.full(u.shape, side))
+        speed = np.sqrt(2.0 * np.maximum(remaining, 0.0)) / (balance * self.p[side])
         return u / balance, speed
 
-    def sides_at(self, impacts: NDArray[np.void]) -> tuple[Integers, Integers]:
+    def find_sides(self, impacts: NDArray[np.void]) -> tuple[Integers, Integers]:
         """Return the sides that the body leaves and enters at impacts of a response."""
-        into: Integers = np.where(impacts["side"] > 0, 0, 1)
-        return (into if int(self.record["next_side"][0]) == 0 else 1 - into), into
+        entered: Integers = np.where(impacts["side"] > 0, 0, 1)
+        return (entered if int(self.record["next_side"][0]) == 0 else 1 - entered), entered
 
-    def losses(self, impacts: NDArray[np.void]) -> Floats:
+    def compute_losses(self, impacts: NDArray[np.void]) -> Floats:
         """Return the energy loss of each impact of a response."""
-        left, entered = self.sides_at(impacts)
+        left, entered = self.find_sides(impacts)
         return self.kinetic(impacts["speed_before"], left) - self.kinetic(impacts["speed_after"], entered)
 
 
-def linear_balance(body: Block | RestrainedBlock) -> Floats:
+def find_linear_balance(body: Block | RestrainedBlock) -> Floats:
     """Return the rotation of the unstable balance on each side in the linear model, rad; infinite if there is none.
 
-    A yielding tendon yields for the first time: with the smaller of elastic force and strength, so at the nearer
-    balance.
+    For a yielding tendon the first yield is considered, with the smaller of elastic force and strength, so the nearer
+    balance is returned.
     """
-    (made,) = body.alone().kernel_records("linear", np.zeros((1, 2)))
-    elastic = _balance_on_a_line(made, made["added_weight"], made["added_push"], made["prestress"])
-    if not made["yielding"]:
+    (record,) = body.alone().kernel_records("linear", np.zeros((1, 2)))
+    elastic = _solve_linear_balance(record, record["added_weight"], record["added_push"], record["prestress"])
+    if not record["yielding"]:
         return elastic
-    pull = made["base_prestress"] + made["tendon_stiffness"] * (made["yield_elongation"] - made["slack_elongation"])
-    return np.minimum(elastic, _balance_on_a_line(made, made["base_weight"], made["base_push"], pull))
+    force = record["base_prestress"] + record["tendon_stiffness"] * (
+        record["yield_elongation"] - record["slack_elongation"]
+    )
+    return np.minimum(elastic, _solve_linear_balance(record, record["base_weight"], record["base_push"], force))
 
 
-def _balance_on_a_line(made: Record, added_weight: Floats, added_push: Floats, prestress: Floats) -> Floats:
+def _solve_linear_balance(record: Record, added_weight: Floats, added_push: Floats, prestress: Floats) -> Floats:
     """Return the rotation without restoring moment, if the moment is linear in the rotation."""
-    found, weight = np.full(2, math.inf), 1.0 + added_weight
-    falls = made["stiffness"] * weight - made["spring"]
-    stands = made["threshold_slope"] * (made["threshold"] * weight + added_push) + prestress
-    np.divide(stands, falls, out=found, where=falls > 0.0)
-    return found
+    balance, weight = np.full(2, math.inf), 1.0 + added_weight
+    softening = record["stiffness"] * weight - record["spring"]
+    restoring = record["threshold_slope"] * (record["threshold"] * weight + added_push) + prestress
+    np.divide(restoring, softening, out=balance, where=softening > 0.0)
+    return balance
 
 
-def energy_of(body: Body, record: Record, *, nonlinear: bool) -> Energy:
+def build_energy(body: Body, record: Record, *, nonlinear: bool) -> Energy:
     """Return the energy of a block; raise `InvalidOption` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
-        raise InvalidOption(
-            f"the energy that overturns a body is known of blocks alone, not of a {type(body).__name__}"
-        )
+        raise InvalidOption(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")
     if record["yielding"]:
-        raise InvalidOption("a tendon that yields keeps no energy: leave the strength of the tendon out to see it")
-    found = Energy(body, record, nonlinear)
-    if not np.any(np.isfinite(found.balance)):
-        raise InvalidOption("no energy overturns this block: its restraints hold it back at any rotation")
-    return found
+        raise InvalidOption("the energy is not defined for a yielding tendon; omit the strength of the tendon")
+    energy = Energy(body, record, nonlinear)
+    if not np.any(np.isfinite(energy.balance)):
+        raise InvalidOption("this block has no overturning energy, because its restraints hold it at any rotation")
+    return energy

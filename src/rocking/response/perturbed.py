@@ -22,7 +22,7 @@ COUNT: Final = 5
 
 #: Relative precision of a ground motion, and number of factors within it, in summaries and tables.
 PRECISION: Final = 1e-3
-_WITHIN_PRECISION: Final = 11
+_N_WITHIN_PRECISION: Final = 11
 
 #: Outcomes. A block that does not move also stands.
 OVERTURNS: Final = "overturns"
@@ -76,7 +76,7 @@ class Perturbed(Result):
     @property
     def sample(self) -> str:
         """Text with the number of simulations, the scaled input and the range of factors."""
-        return f"{len(self.repeats)} {self.scaled} within {percent(self.within)}"
+        return f"{len(self.repeats)} {self.scaled} within {format_percent(self.within)}"
 
     @property
     def factors(self) -> Floats:
@@ -91,22 +91,22 @@ class Perturbed(Result):
     @property
     def is_decided(self) -> bool:
         """Whether the outcome is the same for all factors."""
-        return len({_kind(repeat.outcome) for repeat in self.repeats}) == 1
+        return len({_merge(repeat.outcome) for repeat in self.repeats}) == 1
 
     @property
     def peak_range(self) -> tuple[float, float]:
         """Smallest and largest peak among the simulations with the outcome of factor 1, rad."""
-        return _range([repeat.peak for repeat in self.alike])
+        return _find_range([repeat.peak for repeat in self.alike])
 
     @property
     def peak_time_range(self) -> tuple[float, float]:
         """Earliest and latest time of the peak among the simulations with the outcome of factor 1, s."""
-        return _range([repeat.peak_time for repeat in self.alike])
+        return _find_range([repeat.peak_time for repeat in self.alike])
 
     @property
     def overturn_range(self) -> tuple[float, float]:
         """Earliest and latest time of overturning, s; NaN if the block does not overturn at factor 1."""
-        return _range([repeat.overturn_time for repeat in self.alike])
+        return _find_range([repeat.overturn_time for repeat in self.alike])
 
     @property
     def event_ranges(self) -> Floats:
@@ -117,10 +117,10 @@ class Perturbed(Result):
         events = self._middle.events
         ranges = np.full((len(events), 2), np.nan)
         common = min(len(repeat.events) for repeat in self.repeats)
-        every = np.array([repeat.events[:common] for repeat in self.repeats])
-        same = ((every["kind"] == every["kind"][0]) & (every["side"] == every["side"][0])).all(axis=0)
+        rows = np.array([repeat.events[:common] for repeat in self.repeats])
+        same = ((rows["kind"] == rows["kind"][0]) & (rows["side"] == rows["side"][0])).all(axis=0)
         count = int(np.argmin(np.append(same, False)))
-        times = every["time"][:, :count]
+        times = rows["time"][:, :count]
         ranges[:count] = np.stack([times.min(axis=0), times.max(axis=0)], axis=1)
         return ranges
 
@@ -136,7 +136,7 @@ class Perturbed(Result):
     @property
     def alike(self) -> list[Repeat]:
         """Simulations with the outcome of factor 1."""
-        return [repeat for repeat in self.repeats if _kind(repeat.outcome) == _kind(self._middle.outcome)]
+        return [repeat for repeat in self.repeats if _merge(repeat.outcome) == _merge(self._middle.outcome)]
 
     @property
     def outcome(self) -> str:
@@ -156,14 +156,14 @@ class Perturbed(Result):
         return f"undecided: {f'{OVERTURNS} in {overturned} of {self.sample}' if overturned else self.share()}"
 
     def _columns(self, table: str) -> list[Column]:
-        (name, _, _, unit, _), each = self.coordinate, list(zip(*self.repeats, strict=True))
+        (name, _, _, unit, _), columns = self.coordinate, list(zip(*self.repeats, strict=True))
         return [
-            Column("factor", each[0]),
-            Column("outcome", each[1], label="outcome"),
-            Column(f"peak_{name}", each[2], unit, f"peak, {unit}"),
-            Column("peak_time", each[3], "s", "peak time, s"),
-            Column("overturn_time", each[4], "s"),
-            Column("last_rest", each[5], "s", "last rest, s"),
+            Column("factor", columns[0]),
+            Column("outcome", columns[1], label="outcome"),
+            Column(f"peak_{name}", columns[2], unit, f"peak, {unit}"),
+            Column("peak_time", columns[3], "s", "peak time, s"),
+            Column("overturn_time", columns[4], "s"),
+            Column("last_rest", columns[5], "s", "last rest, s"),
         ]
 
     def rows(self) -> list[dict[str, Any]]:
@@ -171,8 +171,8 @@ class Perturbed(Result):
         return columns_to_records(self._columns("repeats"))
 
     def summary(self) -> str:
-        away = Column("away", [f"{factor - 1.0:+.2g}" for factor in self.factors], label="factor - 1")
-        return f"{self.sentence()}\n\n{format_columns([away, *self._columns('repeats')])}"
+        differences = Column("away", [f"{factor - 1.0:+.2g}" for factor in self.factors], label="factor - 1")
+        return f"{self.sentence()}\n\n{format_columns([differences, *self._columns('repeats')])}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -185,31 +185,31 @@ class Perturbed(Result):
         }
 
 
-def checked_factors(relative: float, count: int) -> list[float]:
-    """Return the factors of `factors_near`, or raise `InvalidOption` if an argument is out of range."""
+def check_factors(relative: float, count: int) -> list[float]:
+    """Return the factors of `list_factors`, or raise `InvalidOption` if an argument is out of range."""
     step = checks.between(relative, "relative", InvalidOption, 1e-12, 0.1)
     if checks.integer(count, "count", InvalidOption, 3, 1001) % 2 == 0:
-        odd = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
-        raise InvalidOption(odd, "count", value=count)
+        sentence = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
+        raise InvalidOption(sentence, "count", value=count)
     if step * (count - 2) >= 1.0:
-        below = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
-        raise InvalidOption(below, "relative", value=step)
-    return factors_near(step, count)
+        sentence = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
+        raise InvalidOption(sentence, "relative", value=step)
+    return list_factors(step, count)
 
 
-def factors_near(relative: float, count: int) -> list[float]:
+def list_factors(relative: float, count: int) -> list[float]:
     """Return the factors 1, 1 +- relative, 1 +- 3 relative, and so on, in ascending order."""
-    more = range(1, count - 1, 2)
-    return [*(1.0 - k * relative for k in reversed(more)), 1.0, *(1.0 + k * relative for k in more)]
+    multiples = range(1, count - 1, 2)
+    return [*(1.0 - k * relative for k in reversed(multiples)), 1.0, *(1.0 + k * relative for k in multiples)]
 
 
-def steps_within(precision: float) -> tuple[float, int]:
+def choose_steps(precision: float) -> tuple[float, int]:
     """Return the relative step and number (eleven) of factors within a precision, for `Response.perturbed`."""
-    most = checks.between(precision, "precision", InvalidOption, 1e-6, 0.1)
-    return most / (_WITHIN_PRECISION - 2), _WITHIN_PRECISION
+    limit = checks.between(precision, "precision", InvalidOption, 1e-6, 0.1)
+    return limit / (_N_WITHIN_PRECISION - 2), _N_WITHIN_PRECISION
 
 
-def percent(share: float) -> str:
+def format_percent(share: float) -> str:
     """Return a small share as text, in percent from 0.01 % on."""
     if share >= 1e-4:
         return f"{100.0 * share:.3g} %"
@@ -217,9 +217,9 @@ def percent(share: float) -> str:
     return f"{float(mantissa):g}e{int(exponent)}"
 
 
-def _kind(outcome: str) -> str:
+def _merge(outcome: str) -> str:
     return STANDS if outcome == UNMOVED else outcome
 
 
-def _range(values: Sequence[float]) -> tuple[float, float]:
+def _find_range(values: Sequence[float]) -> tuple[float, float]:
     return float(np.min(values)), float(np.max(values))

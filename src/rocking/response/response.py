@@ -17,8 +17,8 @@ from rocking.core.tables import Column, add_unit, columns_to_frame, columns_to_r
 from rocking.errors import InvalidOption
 from rocking.response import figure, summary
 from rocking.response.figure import RotationUnits
-from rocking.response.history import even_times
-from rocking.response.perturbed import PRECISION, steps_within
+from rocking.response.history import create_times
+from rocking.response.perturbed import PRECISION, choose_steps
 from rocking.response.simulated import Simulated
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 _WIDTH = 20
 
 #: Largest number of points of a history (memory), and the number for a motion without a step.
-_MOST_POINTS = 50_000_000
-_POINTS = 2000
+_MAX_POINTS = 50_000_000
+_N_POINTS = 2000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,16 +87,16 @@ class Response(Simulated):
     TABLES = ("histories", "events", "impacts", "sequences")
 
     def _headline(self) -> str:
-        return summary.line(self)
+        return summary.format_line(self)
 
     def summary_rows(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
         """Return the lines of `summary` as rows of name, value, unit and note; arguments as of `summary`."""
-        return summary.summary_rows(self, friction, precision)
+        return summary.build_rows(self, friction, precision)
 
     def facts(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
         """Return the entries of `to_dict` as rows of name, value and unit; arguments as of `summary`."""
         body, motion, limit = self.block, self.motion, self.block.coordinate.limit
-        shaken = motion and {
+        entries = motion and {
             "name": motion.name,
             add_unit("duration", "s"): motion.duration,
             add_unit("pga", "m/s^2"): motion.pga,
@@ -104,13 +104,13 @@ class Response(Simulated):
             "vertical": motion.vertical
             and {"name": motion.vertical.name, add_unit("pga", "m/s^2"): motion.vertical.pga},
         }
-        rows = [Row("block", {"description": body.description, **self._parameters()}), Row("motion", shaken)]
-        rows += self._outcome_rows()
+        rows = [Row("block", {"description": body.description, **self._list_parameters()}), Row("motion", entries)]
+        rows += self._build_outcome_rows()
         if limit:
             rows.append(Row(f"peak_over_{limit}", self.peak_over_slenderness))
         if isinstance(body, RestrainedBlock):
             rows.append(Row("balance", list(self.balance), body.coordinate.unit))
-            rows.append(Row("tendons", columns_to_records(self._structured("tendons"))))
+            rows.append(Row("tendons", columns_to_records(self._convert_table("tendons"))))
         rows.append(Row("peak_time", self.peak_time, "s"))
         if body.contact is not None:
             rows.append(Row("required_friction", self.required_friction))
@@ -118,25 +118,25 @@ class Response(Simulated):
             rows.append(Row("lift_off_time", self.lift_off_time, "s"))
         if friction is not None:
             rows += [Row("friction", friction), Row("sliding_time", self.sliding_time(friction), "s")]
-        near = [self.perturbed().to_dict(), self.perturbed(*steps_within(precision)).to_dict()]
+        perturbed = [self.perturbed().to_dict(), self.perturbed(*choose_steps(precision)).to_dict()]
         return [
             *rows,
             Row("impacts_resolved", len(self.impacts)),
             Row("duration", self.duration, "s"),
             Row("time_at_rest", self.time_at_rest, "s"),
-            Row("perturbed", near),
+            Row("perturbed", perturbed),
             Row("ambiguous", self.ambiguous),
             Row("ambiguities", self.ambiguities),
-            Row("events", columns_to_records(self._structured("events"))),
-            Row("sequences", columns_to_records(self._structured("sequences"))),
+            Row("events", columns_to_records(self._convert_table("events"))),
+            Row("sequences", columns_to_records(self._convert_table("sequences"))),
         ]
 
-    def _parameters(self) -> dict[str, Any]:
-        of_body = self.block.alone().parameters().items()
+    def _list_parameters(self) -> dict[str, Any]:
+        parameters = self.block.alone().parameters().items()
         gravity = {add_unit("gravity", "m/s^2"): self.block.gravity}
-        return {add_unit(name, unit): values[0].tolist() for name, (values, unit) in of_body} | gravity
+        return {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters} | gravity
 
-    def _outcome_rows(self) -> list[Row]:
+    def _build_outcome_rows(self) -> list[Row]:
         name, unit = self.block.coordinate.name, self.block.coordinate.unit
         return [
             Row("model", self.model),
@@ -183,17 +183,19 @@ class Response(Simulated):
         import xarray as xr
 
         time, *histories = self._columns("histories", dt)
-        variables: dict[str, Any] = {each.name: ("time", each.values, {"units": each.unit}) for each in histories}
+        variables: dict[str, Any] = {
+            history.name: ("time", history.values, {"units": history.unit}) for history in histories
+        }
         for table, dimension in (("events", "event"), ("impacts", "impact"), ("sequences", "sequence")):
             for name, values, unit, _ in self._columns(table):
                 column = values.astype(object) if values.dtype.kind == "U" else values
                 variables[f"{dimension}_{name}"] = (dimension, column, {"units": unit})
         motion = self.motion
-        rows = [row for row in self._outcome_rows() if row.name != "tipping_time"]
+        rows = [row for row in self._build_outcome_rows() if row.name != "tipping_time"]
         rows += [Row("peak_time", self.peak_time, "s"), Row("ambiguous", self.ambiguous)]
         attributes = {
             "block": self.block.description,
-            **self._parameters(),
+            **self._list_parameters(),
             "motion": "none" if motion is None else motion.name,
             "vertical_motion": "none" if motion is None or motion.vertical is None else motion.vertical.name,
             "motion_history": "" if motion is None else "; ".join(motion.history),
@@ -209,36 +211,36 @@ class Response(Simulated):
         """Step of the motion, or the duration divided by 2000."""
         step = self.motion and self.motion.dt
         # A pulse of a few straight lines also has a step, but its resolution is too coarse.
-        return step if step and step <= 0.01 * self.duration else max(self.duration, 1e-3) / _POINTS
+        return step if step and step <= 0.01 * self.duration else max(self.duration, 1e-3) / _N_POINTS
 
     @property
     def times(self) -> Floats:
         """Times of the histories of `to_xarray` at its default step, s, for methods such as `rotation`."""
-        return even_times(self.duration, self._default_dt)
+        return create_times(self.duration, self._default_dt)
 
     def _columns(self, table: str, dt: float | None = None) -> list[Column]:
         checks.choice(table, "table", InvalidOption, self.TABLES)
         if table == "histories":
-            return self._histories(dt)
+            return self._build_histories(dt)
         if dt is not None:
             raise InvalidOption(f"{{}} is the step of the histories; the {table} have none", "dt")
-        return self._structured(table)
+        return self._convert_table(table)
 
-    def _structured(self, table: str) -> list[Column]:
+    def _convert_table(self, table: str) -> list[Column]:
         rows, speed = getattr(self, table), f"{self.block.coordinate.unit}/s"
         units = {"kind": "1", "side": "1", "impacts": "1", "speed_before": speed, "speed_after": speed}
         units |= {"elongation": "m", "force": "N", "plastic_elongation": "m"}
         return [Column(name, rows[name], units.get(name, "s")) for name in rows.dtype.names]
 
-    def _histories(self, dt: float | None) -> list[Column]:
+    def _build_histories(self, dt: float | None) -> list[Column]:
         motion, (name, rate, _, unit, _) = self.motion, self.block.coordinate
         if dt is None:
             dt = self._default_dt
         step = checks.positive(dt, "dt", InvalidOption, "s")
-        if self.duration > _MOST_POINTS * step:
-            most = f"more than {_MOST_POINTS:,} points of {self.duration:g} s"
-            raise InvalidOption(f"{{}} = {step:g} s makes {most}; take a longer step", "dt", value=dt)
-        times = even_times(self.duration, step)
+        if self.duration > _MAX_POINTS * step:
+            problem = f"more than {_MAX_POINTS:,} points of {self.duration:g} s"
+            raise InvalidOption(f"{{}} = {step:g} s makes {problem}; use a longer step", "dt", value=dt)
+        times = create_times(self.duration, step)
         states = self.states(times)
         columns = [
             Column("time", times, "s"),
@@ -292,8 +294,8 @@ class Response(Simulated):
         longest_sequence : bool
             Whether to show the longest chattering sequence, impact by impact, in a separate panel.
         """
-        title = title or figure.titled(self)
-        return figure.histories(
+        title = title or figure.make_title(self)
+        return figure.draw_histories(
             self, rotation_units, window, longest_sequence=longest_sequence, title=title, ax=ax, figsize=figsize
         )
 
@@ -310,7 +312,7 @@ class Response(Simulated):
         Rotations are normalised by the slenderness of their side (or the balance of a restrained block), velocities by
         p times this value. Without a balance, rotations are in rad. Raises `InvalidOption` also as `kinetic_energy`.
         """
-        return figure.phase_plane(self, window, title=title or figure.titled(self), ax=ax, figsize=figsize)
+        return figure.draw_phase_plane(self, window, title=title or figure.make_title(self), ax=ax, figsize=figsize)
 
     def plot_energy(
         self,
@@ -321,4 +323,4 @@ class Response(Simulated):
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
         """Draw kinetic, potential and total energy against time; arguments and errors as of `plot_phase_plane`."""
-        return figure.energies(self, window, title=title or figure.titled(self), ax=ax, figsize=figsize)
+        return figure.draw_energies(self, window, title=title or figure.make_title(self), ax=ax, figsize=figsize)

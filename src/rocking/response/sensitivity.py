@@ -18,7 +18,7 @@ from rocking.kernels import state
 from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
 from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
 from rocking.kernels.uplift import write_next_uplifts
-from rocking.response.history import History
+from rocking.response.history import TimeHistory
 
 #: A response is ambiguous if changes of its inputs by one unit in the last place change its peak by more than this
 #: fraction, or the time of an event or impact by more than this number of seconds.
@@ -28,10 +28,10 @@ AMBIGUITY: Final = 1e-6
 QUANTITIES: Final = ("motion", "initial_rotation", "initial_velocity", "p", "alpha", "restitution")
 
 #: Inputs for derivatives of a rotation, in the order of the kernels.
-_NAMES: Final = (*QUANTITIES, *(f"{name}_{side}" for side in ("plus", "minus") for name in QUANTITIES[3:]))
+_INPUTS: Final = (*QUANTITIES, *(f"{name}_{side}" for side in ("plus", "minus") for name in QUANTITIES[3:]))
 
 #: Field of a node that contains the initial state, by input.
-_STARTS: Final[dict[int, str]] = {Quantity.ROTATION: "u", Quantity.VELOCITY: "v"}
+_START_FIELDS: Final[dict[int, str]] = {Quantity.ROTATION: "u", Quantity.VELOCITY: "v"}
 
 _ULP: Final = 2.0**-52
 
@@ -39,7 +39,7 @@ _ULP: Final = 2.0**-52
 _TIE: Final = 2.0**-44
 
 #: Largest product of an error and the rates of balance and impacts for which its first order is used as a bound.
-_MOST_NONLINEAR: Final = 0.5
+_MAX_NONLINEARITY: Final = 0.5
 
 #: Changes of peak, impacts and events, in rows for several inputs.
 Changes = tuple[Floats, Floats, Floats]
@@ -60,7 +60,7 @@ class Sensitivity:
     def __init__(
         self,
         trail: Trail,
-        history: History,
+        history: TimeHistory,
         peak_time: float,
         sizes: tuple[int, int],
         *,
@@ -75,33 +75,33 @@ class Sensitivity:
     @cached_property
     def peak(self) -> NDArray[np.void]:
         """Derivatives of the peak rotation, rad, shape (1,); 0 if overturned."""
-        return self._table(0)
+        return self._build_table(0)
 
     @cached_property
     def impacts(self) -> NDArray[np.void]:
         """Derivatives of the times of impacts, s."""
-        return self._table(1)
+        return self._build_table(1)
 
     @cached_property
     def events(self) -> NDArray[np.void]:
         """Derivatives of the times of events, s."""
-        return self._table(2)
+        return self._build_table(2)
 
-    def _table(self, which: int) -> NDArray[np.void]:
+    def _build_table(self, index: int) -> NDArray[np.void]:
         """Return changes of peak, impacts or events, with a field for each input."""
-        values = self._all[which]
+        values = self._changes[index]
         table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
         for name, row in zip(QUANTITIES, values, strict=True):
             table[name] = row if self._is_known else np.nan
         return table
 
     @cached_property
-    def _all(self) -> Changes:
-        return self._along(QUANTITIES)
+    def _changes(self) -> Changes:
+        return self._compute_changes(QUANTITIES)
 
-    def _along(self, names: Iterable[str]) -> Changes:
+    def _compute_changes(self, names: Iterable[str]) -> Changes:
         """Return changes of peak, impacts and events, in a row for each name, computed in one pass per name."""
-        rows = [_varied(self._trail, _NAMES.index(name), self._peak_time, *self._sizes) for name in names]
+        rows = [_vary_input(self._trail, _INPUTS.index(name), self._peak_time, *self._sizes) for name in names]
         peak, impacts, events = (np.array(values) for values in zip(*rows, strict=True))
         return np.zeros_like(peak) if self._is_peak_fixed else peak, impacts, events
 
@@ -129,8 +129,8 @@ class Sensitivity:
         continuous, and its derivative jumps at each impact (see "Impacts: restitution and sensitivity" in the
         documentation).
         """
-        found = changes_along(self._history, time, of)
-        return found if self._is_known else {name: np.full_like(values, np.nan) for name, values in found.items()}
+        changes = compute_changes(self._history, time, of)
+        return changes if self._is_known else {name: np.full_like(values, np.nan) for name, values in changes.items()}
 
     def __repr__(self) -> str:
         event = np.max(np.abs(self.events["motion"]), initial=0.0)
@@ -141,55 +141,55 @@ class Sensitivity:
         )
 
 
-def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: int) -> Changes:
+def _vary_input(trail: Trail, quantity: int, times: Floats, impacts: int, events: int) -> Changes:
     """Compute derivatives by an input: of heights at given times, and of the times of impacts and events."""
-    heights, at_impacts, at_events = np.zeros(len(times)), np.zeros(impacts), np.zeros(events)
-    start = _STARTS.get(quantity)
+    heights, impact_changes, event_changes = np.zeros(len(times)), np.zeros(impacts), np.zeros(events)
+    start = _START_FIELDS.get(quantity)
     if start is None or trail.nodes[start][0] != 0.0:  # a share of zero has no effect
-        scratch, work = state.new_scratch(), state.new_record(state.VARIATION)
-        vary(copy_trail(trail), scratch, work, quantity, times, heights, at_impacts, at_events)
-    return heights, at_impacts, at_events
+        scratch, variation = state.new_scratch(), state.new_record(state.VARIATION)
+        vary(copy_trail(trail), scratch, variation, quantity, times, heights, impact_changes, event_changes)
+    return heights, impact_changes, event_changes
 
 
-def ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding_decisions: int) -> tuple[str, ...]:
+def find_ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding_decisions: int) -> tuple[str, ...]:
     """Return the results ("peak", "events", "touch") that one unit in the last place of all inputs changes visibly.
 
     ``height`` is the height of the peak above the stop, and ``rounding_decisions`` the known number of ties.
     """
-    early, late = (_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
+    early, late = (_find_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
     rounding_decisions += int(np.any(late > early + AMBIGUITY))
-    peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._all)
-    known = {
+    peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._changes)
+    unaffected = {
         "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
         "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
         "touch": rounding_decisions == 0,
     }
-    return tuple(name for name, is_known in known.items() if not is_known)
+    return tuple(name for name, is_unaffected in unaffected.items() if not is_unaffected)
 
 
-def _uplifts(trail: Trail, share: float) -> Floats:
+def _find_uplifts(trail: Trail, factor: float) -> Floats:
     """Return times of the next uplifts from all rests, with thresholds scaled by a factor."""
     block, times = trail.block.copy(), np.zeros(len(trail.nodes))
-    block["threshold"] *= share
-    block["restraint_threshold"] *= share
+    block["threshold"] *= factor
+    block["restraint_threshold"] *= factor
     write_next_uplifts(trail._replace(block=block), state.new_scratch(), times)
     return times
 
 
-def carried_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
+def bound_rest_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
     """Bound the changes of times of rest by rounding before their proofs, s; infinite if there is no bound.
 
     ``proven``: which rests are proven; ``stop``: absolute coordinate at which the body stands.
     """
     nodes = state.expose_fields(np.append(trail.nodes, trail.nodes[-1:]))
     nodes["side"][-1] = state.AT_REST
-    trail, scratch, work = (
+    trail, scratch, variation = (
         copy_trail(trail._replace(nodes=nodes)),
         state.new_scratch(),
         state.new_record(state.VARIATION),
     )
     fastest, out = np.sqrt(np.max(np.abs(trail.block["stiffness"]))), np.zeros_like(trail.ground.pieces[:, 2:])
-    last, found = np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0)), np.full(len(proven), np.inf)
+    last, errors = (np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0)), np.full(len(proven), np.inf))
     for k in np.flatnonzero(proven):
         node, following, change = nodes[last[k]], nodes[last[k] + 1], np.zeros(5)
         row, time = (last[k], 0.0) if node["v"] > 0.0 else (last[k] - 1, math.inf)
@@ -197,31 +197,31 @@ def carried_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
             continue
         if node["v"] > 0.0:  # derivatives deviate from first order at least twice as much as the time to rest
             change[:3] *= 1.0 + 4.0 * abs((following["time"] - node["time"]) / (change[1] * node["v"]) - 1.0)
-        ends = adjoint(trail, scratch, work, row, time, change, out)
+        ending = adjoint(trail, scratch, variation, row, time, change, out)
         error = change[3] + 4.0 * _ULP * stop * abs(change[0])
         nonlinear = error * max(fastest, change[4])
-        if ends in (AdjointEnd.START, AdjointEnd.REST) and nonlinear <= _MOST_NONLINEAR:
-            found[k] = error / (1.0 - nonlinear)
-    return found
+        if ending in (AdjointEnd.START, AdjointEnd.REST) and nonlinear <= _MAX_NONLINEARITY:
+            errors[k] = error / (1.0 - nonlinear)
+    return errors
 
 
-def changes_along(history: History, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:
+def compute_changes(history: TimeHistory, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:
     """Compute the derivative of the coordinate at times of any shape by each input, see `Sensitivity.rotation`."""
     times, nodes = checks.numbers(time, "time", InvalidOption), history.trail.nodes
     flat = times.ravel()
     order = np.argsort(flat, kind="stable")
-    order = order[~history.outside(flat[order])]
+    order = order[~history.is_outside(flat[order])]
     ascending = flat[order]
     ascending.flags.writeable = False
     rows = np.maximum(np.searchsorted(nodes["time"], ascending) - 1, 0)
     signs = np.where(nodes["side"][rows] == 1, -1.0, 1.0)
     rests = nodes["side"] < 0
     events = int(np.count_nonzero(rests[:-1] | rests[1:]))
-    found = {}
+    changes = {}
     for name in of:
-        if name not in _NAMES:
-            raise InvalidOption(f"{{}} must be among {', '.join(_NAMES)}, not {name!r}", "of", value=name)
+        if name not in _INPUTS:
+            raise InvalidOption(f"{{}} must be among {', '.join(_INPUTS)}, not {name!r}", "of", value=name)
         values = np.full(flat.shape, np.nan)
-        values[order] = signs * _varied(history.trail, _NAMES.index(name), ascending, len(nodes), events)[0]
-        found[name] = values.reshape(times.shape)
-    return found
+        values[order] = signs * _vary_input(history.trail, _INPUTS.index(name), ascending, len(nodes), events)[0]
+        changes[name] = values.reshape(times.shape)
+    return changes

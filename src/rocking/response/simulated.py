@@ -19,18 +19,18 @@ from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.motion.motion import Motion
-from rocking.response.history import History, Solution, with_all_impacts
+from rocking.response.history import Solution, TimeHistory, add_all_impacts
 from rocking.response.mechanics import (
     Contact,
     Energy,
-    energy_of,
-    friction_coefficient,
-    friction_demand,
-    linear_balance,
-    pull,
+    build_energy,
+    check_friction,
+    compute_friction_demand,
+    compute_pull,
+    find_linear_balance,
 )
-from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat, checked_factors
-from rocking.response.sensitivity import Sensitivity, ambiguities, carried_errors
+from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat, check_factors
+from rocking.response.sensitivity import Sensitivity, bound_rest_errors, find_ambiguities
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,34 +59,36 @@ class Simulated(Result):
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
     @cached_property
-    def _history(self) -> History:
+    def _history(self) -> TimeHistory:
         """Time history, including the impacts after the proof of a sequence."""
         trail, sequences = self.solution.trail, self.solution.sequences
         if int(trail.settings["rest_rule"]) == state.RestRule.CERTIFIED:
             closed = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration)
-            trail = with_all_impacts(trail, cut=closed and self.moves_at_end)
-        return History(trail, self.duration, self.block.stops)
+            trail = add_all_impacts(trail, cut=closed and self.moves_at_end)
+        return TimeHistory(trail, self.duration, self.block.stops)
 
     @cached_property
     def _energy(self) -> Energy:
         trail = self.solution.trail
-        return energy_of(self.block, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
+        return build_energy(self.block, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
 
     @cached_property
     def _contact(self) -> Contact:
         law = self.block.contact
         if law is None:
-            raise InvalidOption(f"the forces of the ground are not known of this body: {self.block.description}")
+            raise InvalidOption(f"the ground forces of this body are unknown: {self.block.description}")
         return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
 
     @cached_property
     def sequences(self) -> NDArray[np.void]:
         """Sequences of impacts that ended at rest: see `Response`."""
-        found = self.solution.sequences.copy()
-        error = carried_errors(self.solution.trail, np.isfinite(found["lower"]), max(map(abs, self.block.stops)))
-        found["lower"] -= error
-        found["upper"] += error
-        return found
+        sequences = self.solution.sequences.copy()
+        errors = bound_rest_errors(
+            self.solution.trail, np.isfinite(sequences["lower"]), max(map(abs, self.block.stops))
+        )
+        sequences["lower"] -= errors
+        sequences["upper"] += errors
+        return sequences
 
     @cached_property
     def balance(self) -> tuple[float, float]:
@@ -95,7 +97,7 @@ class Simulated(Result):
         For a free block it equals the slenderness in both models.
         """
         if isinstance(self.block, RestrainedBlock) and self.model == "linear":
-            plus, minus = linear_balance(self.block).tolist()
+            plus, minus = find_linear_balance(self.block).tolist()
             return plus, minus
         return self.block.balance
 
@@ -126,8 +128,8 @@ class Simulated(Result):
         """Largest elongation and force of each tendon: see `Response`."""
         rows = []
         if isinstance(self.block, RestrainedBlock):
-            plus, minus = self._history.largest()
-            if self.overturned:  # the last step ends there
+            plus, minus = self._history.find_peaks()
+            if self.overturned:  # the last step ends at the peak
                 side = int(self.solution.trail.nodes["side"][-1])
                 plus, minus = (self.peak_rotation, minus) if side == 0 else (plus, self.peak_rotation)
             rows = self.block.tendons_at((plus, minus), self.model)
@@ -173,8 +175,8 @@ class Simulated(Result):
     @property
     def stopped(self) -> bool:
         """Whether `duration` ended the simulation while the block or the ground still moved."""
-        over = self.motion is None or self.duration >= self.motion.end
-        return not (self.overturned or self.unfinished or self.leans) and (self.moves_at_end or not over)
+        motion_ended = self.motion is None or self.duration >= self.motion.end
+        return not (self.overturned or self.unfinished or self.leans) and (self.moves_at_end or not motion_ended)
 
     @cached_property
     def tipping_time(self) -> float:
@@ -182,12 +184,12 @@ class Simulated(Result):
 
         After this time an overturning block only falls.
         """
-        return self._history.tipping_time(self.balance)
+        return self._history.find_tipping_time(self.balance)
 
     @property
     def rest_intervals(self) -> Floats:
         """Start and end of each interval at rest, shape (n, 2), s."""
-        return self._history.rests()
+        return self._history.find_rests()
 
     @property
     def time_at_rest(self) -> float:
@@ -201,7 +203,7 @@ class Simulated(Result):
         trail, history = self.solution.trail, self._history
         if int(trail.block["seed"]) >= 0 and trail.block["variable_restitution"]:
             # Random restitutions depend on the number of the impact, which excludes the impacts after a proof.
-            history = History(trail, self.duration, self.block.stops)
+            history = TimeHistory(trail, self.duration, self.block.stops)
         sizes, is_fixed = (len(self.impacts), len(self.events)), self.overturned or self._reaches_second_stop
         return Sensitivity(trail, history, self.peak_time, sizes, is_fixed=is_fixed, is_known=not self.unfinished)
 
@@ -220,7 +222,7 @@ class Simulated(Result):
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
         height = abs(self.peak_rotation - self.block.stops[0])
-        return ambiguities(self.sensitivity, self.solution.trail, height, self.rounding_decisions + balanced)
+        return find_ambiguities(self.sensitivity, self.solution.trail, height, self.rounding_decisions + balanced)
 
     def perturbed(self, relative: float = RELATIVE, count: int = COUNT) -> Perturbed:
         """Repeat the simulation with the motion scaled by factors near 1.
@@ -243,25 +245,25 @@ class Simulated(Result):
         motion, or alone without a motion. An outcome that changes within a few millionths is undecided in practice. An
         outcome shared by all simulations may still change between their factors.
         """
-        if (relative, count) not in self._repeated:
-            repeats = tuple(self._repeat(factor) for factor in checked_factors(relative, count))
+        if (relative, count) not in self._perturbations:
+            repeats = tuple(self._repeat(factor) for factor in check_factors(relative, count))
             scaled = "initial states" if self.motion is None else "motions"
-            self._repeated[relative, count] = Perturbed(float(relative), repeats, self.block.coordinate, scaled)
-        return self._repeated[relative, count]
+            self._perturbations[relative, count] = Perturbed(float(relative), repeats, self.block.coordinate, scaled)
+        return self._perturbations[relative, count]
 
     @cached_property
-    def _repeated(self) -> dict[tuple[float, int], Perturbed]:
+    def _perturbations(self) -> dict[tuple[float, int], Perturbed]:
         return {}
 
     def _repeat(self, factor: float) -> Repeat:
         try:
-            again: Simulated = self if factor == 1.0 else self.solution.again(factor)
-        except InvalidOption:  # a state of balance: `simulate` requires a duration
+            repeated: Simulated = self if factor == 1.0 else self.solution.repeat(factor)
+        except InvalidOption:  # balanced: `simulate` requires a duration
             return Repeat(factor, "balances", math.nan, math.nan, math.nan, math.nan, self.events[:0])
-        rests = again.events["time"][again.events["kind"] == "rest"]
-        last_rest = float(rests[-1]) if len(rests) and not again.moves_at_end else math.nan
-        peak, peak_time = again.peak_rotation, again.peak_time
-        return Repeat(factor, again.outcome, peak, peak_time, again.overturn_time, last_rest, again.events)
+        rests = repeated.events["time"][repeated.events["kind"] == "rest"]
+        last_rest = float(rests[-1]) if len(rests) and not repeated.moves_at_end else math.nan
+        peak, peak_time = repeated.peak_rotation, repeated.peak_time
+        return Repeat(factor, repeated.outcome, peak, peak_time, repeated.overturn_time, last_rest, repeated.events)
 
     def states(self, time: ArrayLike) -> Floats:
         """Return coordinate, velocity and acceleration of the body (rotation for a block) at times, s, of any shape.
@@ -319,19 +321,19 @@ class Simulated(Result):
     @cached_property
     def impact_losses(self) -> Floats:
         """Energy loss at each of `impacts`, divided by the overturning energy, as `kinetic_energy`."""
-        return self._energy.losses(self.impacts)
+        return self._energy.compute_losses(self.impacts)
 
     def normal_force(self, time: ArrayLike) -> Floats:
         """Return the ratio of normal force to weight, without the impulses of impacts; NaN outside the response."""
-        return unwrap_scalar(self._contact.forces(time)[1])
+        return unwrap_scalar(self._contact.compute_forces(time)[1])
 
     def friction_demand(self, time: ArrayLike) -> Floats:
         """Return the friction coefficient for sticking: infinite without normal force, NaN outside the response."""
-        return unwrap_scalar(friction_demand(*self._contact.forces(time)))
+        return unwrap_scalar(compute_friction_demand(*self._contact.compute_forces(time)))
 
     @cached_property
     def _extremes(self) -> tuple[float, float]:
-        return self._contact.extremes()
+        return self._contact.find_extremes()
 
     @property
     def required_friction(self) -> float:
@@ -352,10 +354,12 @@ class Simulated(Result):
         The coefficient is positive and at most 3. The search excludes impulses at impacts and ends at `tipping_time`.
         Motion after a slip is not modelled.
         """
-        level = friction_coefficient(friction)
+        level = check_friction(friction)
         if not self.required_friction > level:
             return math.nan
-        return self._contact.first(lambda push, normal: np.abs(push) - level * normal, lambda excess: excess > 0.0)
+        return self._contact.find_first_time(
+            lambda push, normal: np.abs(push) - level * normal, lambda excess: excess > 0.0
+        )
 
     @cached_property
     def lift_off_time(self) -> float:
@@ -365,4 +369,4 @@ class Simulated(Result):
         """
         if self.minimum_normal_force > 0.0:
             return math.nan
-        return self._contact.first(pull, lambda pulled: pulled >= 0.0)
+        return self._contact.find_first_time(compute_pull, lambda pulled: pulled >= 0.0)

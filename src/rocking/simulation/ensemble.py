@@ -17,15 +17,15 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
-from rocking.engine.problem import bodies_of, settings_of
+from rocking.engine.problem import build_settings, gather_bodies
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, parts_of, simulate_tasks
+from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, simulate_tasks, split_bodies
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 from rocking.records.named import Motions, list_motion_names, list_motions
-from rocking.response import COUNT, RELATIVE, factors_near
+from rocking.response import COUNT, RELATIVE, list_factors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,7 +63,7 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = {
     "first_rest": ("s", "time at which the block first came to rest; 0 if it never did"),
     "last_rest": ("s", "time at which the block last came to rest; 0 if it never did"),
 }
-_SHARE: Final = "share of the simulation and its repeats within 3e-6 of the motion that overturn"
+_SHARE_MEANING: Final = "share of the simulation and its repeats within 3e-6 of the motion that overturn"
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +89,12 @@ class Scales:
     @classmethod
     def from_levels(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
         """Create scales from `levels` and `measure` as in `simulate_many`, or for unscaled motions."""
-        known = Measure.parse(measure, among=SCALING_MEASURES)
+        parsed = Measure.parse(measure, among=SCALING_MEASURES)
         if levels is None:
-            if known.name != "factor":
-                raise InvalidOption("{} says what {} are: give those as well", "measure", "levels")
+            if parsed.name != "factor":
+                raise InvalidOption("{} requires {}", "measure", "levels")
             return cls()
-        return cls(known, checks.positive_numbers(levels, "levels", InvalidOption))
+        return cls(parsed, checks.positive_numbers(levels, "levels", InvalidOption))
 
     @property
     def count(self) -> int:
@@ -102,7 +102,7 @@ class Scales:
         return len(self.values)
 
     @property
-    def about(self) -> dict[str, Any]:
+    def attributes(self) -> dict[str, Any]:
         """Name of the measure, units, and, for spectral accelerations, period (s) and damping."""
         measure = self.measure or FACTOR
         return {"measure": measure.name, "units": measure.units, **measure.options()}
@@ -155,7 +155,7 @@ class Product:
 
     def __post_init__(self) -> None:
         checks.choice(self.polarity, "polarity", InvalidOption, list(SIGNS))
-        settings_of(self.bodies, self.model, self.chattering, self.duration, record=False)  # raises before the work
+        build_settings(self.bodies, self.model, self.chattering, self.duration, record=False)  # raises before the work
         for motion in self.motions:
             check_components(self.bodies, motion)
 
@@ -179,11 +179,11 @@ class Product:
             If the bodies are not blocks.
         """
         if not isinstance(self.bodies, Blocks) or self.bodies.terms:
-            raise InvalidOption(f"this is known of blocks alone, not of {self.bodies.kind}")
+            raise InvalidOption(f"this result is defined for blocks only, not for {self.bodies.kind}")
         return self.bodies
 
 
-def product_of(
+def build_product(
     blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     levels: ArrayLike | None,
@@ -194,45 +194,56 @@ def product_of(
     duration: float | None,
 ) -> Product:
     """Create a product from the arguments of `simulate_many`."""
-    bodies, shaking = bodies_of(blocks), tuple(list_motions(motions))
+    bodies, ground_motions = gather_bodies(blocks), tuple(list_motions(motions))
     return Product(
-        bodies, shaking, Scales.from_levels(levels, measure), polarity, model, chattering_scheme(chattering), duration
+        bodies,
+        ground_motions,
+        Scales.from_levels(levels, measure),
+        polarity,
+        model,
+        chattering_scheme(chattering),
+        duration,
     )
 
 
-def setup_of(product: Product, bodies: slice | None = None) -> Setup:
+def build_setup(product: Product, bodies: slice | None = None) -> Setup:
     """Return the setup for all or some bodies of a product."""
-    chosen = product.bodies if bodies is None else product.bodies.select(bodies)
-    return Setup(chosen, product.model, product.chattering, product.duration)
+    selected = product.bodies if bodies is None else product.bodies.select(bodies)
+    return Setup(selected, product.model, product.chattering, product.duration)
 
 
-def _tasks(product: Product, near: float) -> Iterator[Task]:
+def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
     """Divide a product into tasks for the engine with keys (motion, scale, polarity)."""
     for m, motion in enumerate(product.motions):
         for s, factor in enumerate(product.scales.factors(motion).tolist()):
             for k, sign in enumerate(product.signs):
-                for part in parts_of(len(product.bodies), motion):
-                    yield Task(part, motion, near * (sign * factor), (m, s, k))
+                for part in split_bodies(len(product.bodies), motion):
+                    yield Task(part, motion, perturbation * (sign * factor), (m, s, k))
 
 
-def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
+def build_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     """Create a dataset from arrays named as in `VARIABLES`, without the dimensions that were not requested."""
     import xarray as xr
 
     dimensions = ("motion", "scale", "polarity", "block")
-    gone = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
-    kept = {**VARIABLES, **TIMES, "overturned_share": ("1", _SHARE)}
-    described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in kept.items()}
+    is_dropped = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
+    meanings = {**VARIABLES, **TIMES, "overturned_share": ("1", _SHARE_MEANING)}
+    variable_attributes = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in meanings.items()}
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
-        described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
-        described["residual_rotation"]["units"] = coordinate.unit
-        described["overturned"]["long_name"] = f"whether the {coordinate.name} passed its limit, where it has one"
-    variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
+        variable_attributes["peak_rotation"] = {
+            "units": coordinate.unit,
+            "long_name": f"largest {coordinate.name} in size",
+        }
+        variable_attributes["residual_rotation"]["units"] = coordinate.unit
+        variable_attributes["overturned"]["long_name"] = (
+            f"whether the {coordinate.name} passed its limit, where it has one"
+        )
+    variables = {name: (dimensions, values, variable_attributes.get(name, {})) for name, values in outcomes.items()}
     coordinates = {
         "motion": ("motion", list_motion_names(product.motions)),
-        **verticals_of(product.motions),
-        "scale": ("scale", product.scales.values, product.scales.about),
+        **collect_verticals(product.motions),
+        "scale": ("scale", product.scales.values, product.scales.attributes),
         "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in product.signs]),
         **body_coordinates(product.bodies),
     }
@@ -245,11 +256,11 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
         "motions": [f"{motion.name}: {motion.description.text}" for motion in product.motions],
         "histories": ["; ".join(motion.history) for motion in product.motions],
     }
-    whole = xr.Dataset(variables, coordinates, attributes)
-    return whole.isel({name: 0 for name, is_gone in gone.items() if is_gone}, drop=True)
+    dataset = xr.Dataset(variables, coordinates, attributes)
+    return dataset.isel({name: 0 for name, dropped in is_dropped.items() if dropped}, drop=True)
 
 
-def verticals_of(motions: Sequence[Motion]) -> dict[str, Any]:
+def collect_verticals(motions: Sequence[Motion]) -> dict[str, Any]:
     """Return the vertical components as a coordinate of ``motion``, if there are any."""
     names = ["" if motion.vertical is None else motion.vertical.name for motion in motions]
     return {"vertical": ("motion", names)} if any(motion.vertical for motion in motions) else {}
@@ -337,24 +348,26 @@ def simulate_many(
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    product = build_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
     names = (*VARIABLES, *(TIMES if checks.boolean(times, "times", InvalidOption) else ()))
-    setup = setup_of(product)
-    found = outcomes_of(product, setup, names)
+    setup = build_setup(product)
+    outcomes = simulate_product(product, setup, names)
     if checks.boolean(robust, "robust", InvalidOption):
-        near = [factor for factor in factors_near(RELATIVE, COUNT) if factor != 1.0]
-        again = [outcomes_of(product, setup, ["overturned"], factor) for factor in near]
-        found["overturned_share"] = np.mean([each["overturned"].astype(bool) for each in (found, *again)], axis=0)
-    return dataset_of(product, found)
+        factors = [factor for factor in list_factors(RELATIVE, COUNT) if factor != 1.0]
+        repeats = [simulate_product(product, setup, ["overturned"], factor) for factor in factors]
+        outcomes["overturned_share"] = np.mean(
+            [result["overturned"].astype(bool) for result in (outcomes, *repeats)], axis=0
+        )
+    return build_dataset(product, outcomes)
 
 
-def outcomes_of(
-    product: Product, setup: Setup, names: Iterable[str] = tuple(VARIABLES), near: float = 1.0
+def simulate_product(
+    product: Product, setup: Setup, names: Iterable[str] = tuple(VARIABLES), perturbation: float = 1.0
 ) -> dict[str, NDArray[np.generic]]:
     """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME`."""
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
     with Progress("simulating", math.prod(product.shape)) as bar:
-        for task, outcomes in simulate_tasks(setup, _tasks(product, near)):
+        for task, outcomes in simulate_tasks(setup, _generate_tasks(product, perturbation)):
             for name, values in results.items():
                 values[(*task.key, task.bodies)] = outcomes[name]
             bar.advance(len(outcomes))

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.engine.problem import ground_of, highest, one_body, set_start
+from rocking.engine.problem import compute_peaks, prepare_ground, require_body, set_start
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.engine.tasks import SLICE, Setup, slices
+from rocking.engine.tasks import SLICE, Setup, count_slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
@@ -22,15 +22,15 @@ from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
 from rocking.response import Response, Solution
 
-_EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
-_IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
-_CHATTERING = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
+_EVENT_DTYPE = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
+_IMPACT_DTYPE = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
+_SEQUENCE_DTYPE = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
 
 #: Event kinds by code (`rocking.kernels.state`).
-_KINDS = np.array(["uplift", "rest", "overturn"])
+_EVENT_KINDS = np.array(["uplift", "rest", "overturn"])
 
 #: Rows of the first table per piece of the motion.
-_FIRST_ROWS = 1.25
+_ROWS_PER_PIECE = 1.25
 
 
 def simulate(
@@ -95,10 +95,10 @@ def simulate(
     >>> response.overturned, len(response.impacts) > 50, f"{response.events['time'][-1]:.6f}"
     (False, True, '4.235818')
     """
-    return response_to(block, motion, model, chattering, duration, (initial_rotation, initial_velocity))
+    return compute_response(block, motion, model, chattering, duration, (initial_rotation, initial_velocity))
 
 
-def response_to(
+def compute_response(
     block: Body,
     motion: Motion | None,
     model: Model,
@@ -108,64 +108,66 @@ def response_to(
     name: str | None = None,
     factor: float = 1.0,
 ) -> Response:
-    """Compute a response like `simulate`, with `name` for the initial coordinate in messages."""
-    how, alone, motion = chattering_scheme(chattering), one_body(block).alone(), check_motion(motion)
-    setup, ground = Setup(alone, model, how, duration, initial), None
+    """Compute a response like `simulate`, with `name` for the initial coordinate in errors."""
+    scheme, bodies, motion = chattering_scheme(chattering), require_body(block).alone(), check_motion(motion)
+    setup, ground = Setup(bodies, model, scheme, duration, initial), None
     if factor != 1.0:  # repeated simulations leave the cache unchanged
-        ground = ground_of.__wrapped__(motion, block.gravity, factor)
-    run = setup.run(motion, factor, record=True, ground=ground, name=name)
+        ground = prepare_ground.__wrapped__(motion, block.gravity, factor)
+    run = setup.prepare(motion, factor, record=True, ground=ground, name=name)
     if factor != 1.0:
-        set_start(run.states, run.records, alone, *_scaled(initial, factor, run.records, alone.stops[0]), name)
+        set_start(run.states, run.records, bodies, *_scale_start(initial, factor, run.records, bodies.stops[0]), name)
     trail, start = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
-    ending, table = marched(trail, start)
+    ending, table = march_in_slices(trail, start)
     if ending == state.Ending.BALANCED:
-        raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
+        raise InvalidOption("the block remains balanced on its corner; give {} or another initial state", "duration")
     events = table["event"][: start["events"]]
     overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
     return Response(
         block=block,
         motion=motion,
         model=model,
-        chattering=how,
+        chattering=scheme,
         overturned=overturned,
         unfinished=ending == state.Ending.UNFINISHED,
         leans=ending == state.Ending.LEANS,
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
-        peak_rotation=float(highest(start, trail.block, np.array(block.stops))),
+        peak_rotation=float(compute_peaks(start, trail.block, np.array(block.stops))),
         peak_time=float(start["peak_time"]),
         duration=float(start["end_time"]),
-        events=_events(events),
-        impacts=_public(table["impact"][: start["impacts"]], _IMPACT),
+        events=_convert_events(events),
+        impacts=_convert_rows(table["impact"][: start["impacts"]], _IMPACT_DTYPE),
         rests_by_rounding=int(start["rests_by_rounding"]),
         rounding_decisions=int(start["rounding_decisions"]),
         solution=Solution(
             trail=trail._replace(nodes=state.expose_fields(np.array(table["node"][: start["nodes"]]))),
-            sequences=_public(table["sequence"][: start["sequences"]], _CHATTERING),
+            sequences=_convert_rows(table["sequence"][: start["sequences"]], _SEQUENCE_DTYPE),
             residual=float(
                 block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning_rotation"]
             ),
-            again=functools.partial(response_to, block, motion, model, how, duration, initial, name),
+            repeat=functools.partial(compute_response, block, motion, model, scheme, duration, initial, name),
         ),
     )
 
 
-def _scaled(initial: tuple[float, float], factor: float, records: state.Records, stops: Floats) -> tuple[float, float]:
-    """Scale the distance of an initial coordinate from its stop, short of the fallen body, and its rate."""
+def _scale_start(
+    initial: tuple[float, float], factor: float, records: state.Records, stops: Floats
+) -> tuple[float, float]:
+    """Scale the distance of an initial coordinate from its stop, below overturning, and its rate."""
     coordinate, rate = initial
     if coordinate in stops:
         return coordinate, factor * rate
-    fallen = math.nextafter(float(records["overturn_angle"].min()), 0.0)
+    limit = math.nextafter(float(records["overturn_angle"].min()), 0.0)
     distance = factor * (coordinate - float(stops[0]))
-    return float(stops[0]) + min(max(distance, -fallen), fallen), factor * rate
+    return float(stops[0]) + min(max(distance, -limit), limit), factor * rate
 
 
-def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
+def march_in_slices(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     """Integrate in interruptible slices, and return the end and the growing table."""
     ground, block, settings, _ = trail
-    table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
+    table = state.new_table(128 + int(_ROWS_PER_PIECE * len(ground.pieces)))
     scratch = state.new_scratch()
     ending: int = state.Ending.PAUSED
-    for _ in range(slices(ground)):
+    for _ in range(count_slices(ground)):
         start["budget"] = SLICE
         ending = march(ground, block, settings, table, scratch, start)
         while ending == state.Ending.FULL:
@@ -178,14 +180,14 @@ def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     return state.Ending.UNFINISHED, table
 
 
-def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    public = np.empty(len(rows), dtype=dtype)
+def _convert_rows(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    converted = np.empty(len(rows), dtype=dtype)
     for name in dtype.names or ():
-        public[name] = rows[name]
-    return public
+        converted[name] = rows[name]
+    return converted
 
 
-def _events(rows: state.Records) -> NDArray[np.void]:
-    events = np.empty(len(rows), dtype=_EVENT)
-    events["time"], events["side"], events["kind"] = rows["time"], rows["side"], _KINDS[rows["kind"]]
+def _convert_events(rows: state.Records) -> NDArray[np.void]:
+    events = np.empty(len(rows), dtype=_EVENT_DTYPE)
+    events["time"], events["side"], events["kind"] = rows["time"], rows["side"], _EVENT_KINDS[rows["kind"]]
     return events

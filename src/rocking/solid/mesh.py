@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.errors import InvalidBlock, InvalidOption, install, literal
+from rocking.errors import InvalidBlock, InvalidOption, describe_install, escape_braces
 from rocking.inputs.notes import density_notes, height_notes
 from rocking.motion.processing import sine_cosine
 from rocking.solid import support as polygons
@@ -127,7 +127,9 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
     try:
         import trimesh
     except ImportError:
-        raise InvalidOption(f"meshes are read with trimesh, which is not installed: {install('mesh')}") from None
+        raise InvalidOption(
+            f"meshes are read with trimesh, which is not installed: {describe_install('mesh')}"
+        ) from None
     suffix = PurePath(source.name).suffix.lower().removeprefix(".")
     # Objects and groups of OBJ files are parts, regardless of material. Corners are unchanged.
     options |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
@@ -139,7 +141,7 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
         reason = f"{message or type(error).__name__}; is it whole, and what its name says?"
         if suffix not in formats:
             reason = f"is of no format that trimesh reads ({', '.join(formats)})"
-        raise InvalidBlock(f"cannot be read: {literal(reason)}", path=path) from None
+        raise InvalidBlock(f"cannot be read: {escape_braces(reason)}", path=path) from None
 
 
 def _place_part(name: str, mesh: Any, transform: Any) -> MeshPart:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.block import Block
-from rocking.block.sides import checked_gravity, checked_mass
+from rocking.block.sides import check_gravity, check_mass
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
@@ -91,8 +91,8 @@ class Solid(Result):
             "support": polygons.check_polygon(self.support),
             "centre": _check_array(self.centre, "centre", (3,)),
             "inertia_over_mass": _check_inertia(self.inertia_over_mass),
-            "mass": None if self.mass is None else checked_mass(self.mass),
-            "gravity": checked_gravity(self.gravity),
+            "mass": None if self.mass is None else check_mass(self.mass),
+            "gravity": check_gravity(self.gravity),
             "description": checks.text(self.description, "description", InvalidBlock),
         }
         for name, value in checked_fields.items():

@@ -26,7 +26,7 @@ from rocking.errors import DamagedStudy, OutputError, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, Scales, setup_of
+from rocking.simulation.ensemble import Product, Scales, build_setup
 from rocking.studies.units import OUTCOMES, Key, UnitGrid, UnitInput, decode, format_key, identify_program, seal, unseal
 
 if sys.platform == "win32":
@@ -149,7 +149,7 @@ class Store:
         """Create the complete input of a worker for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
-        return UnitInput(setup_of(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
+        return UnitInput(build_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
 
     def _compute_factors(self, unit: int) -> Floats:
         """Return the factors on the motions of a unit, shape (motions, scales, polarities)."""

@@ -44,11 +44,11 @@ from rocking.core.tables import (
     escape_dollars,
     format_count,
 )
-from rocking.engine.problem import slenderness_of
-from rocking.engine.tasks import OUTCOME, missing_text
-from rocking.errors import InvalidOption, StudyError, Unfitted, install
+from rocking.engine.problem import compute_slenderness
+from rocking.engine.tasks import OUTCOME, describe_missing
+from rocking.errors import InvalidOption, StudyError, Unfitted, describe_install
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, body_coordinates, dataset_of, verticals_of
+from rocking.simulation.ensemble import Product, body_coordinates, build_dataset, collect_verticals
 from rocking.studies.folder import Store
 from rocking.studies.units import OUTCOMES, format_key
 
@@ -78,7 +78,7 @@ def open_results(store: Store) -> xr.Dataset:
         outcomes["done"] = np.zeros(grid.shape, dtype=bool)
         for key in done:
             outcomes["done"][grid.ranges(key)] = True
-    return _add_records(store, dataset_of(store.product, outcomes))
+    return _add_records(store, build_dataset(store.product, outcomes))
 
 
 def _add_records(store: Store, data: xr.Dataset) -> xr.Dataset:
@@ -166,7 +166,9 @@ def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise InvalidOption(f"Parquet requires pyarrow: {install('parquet')}, or write CSV or NetCDF") from None
+        raise InvalidOption(
+            f"Parquet requires pyarrow: {describe_install('parquet')}, or write CSV or NetCDF"
+        ) from None
     tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
     first = next(tables)
     with parquet.ParquetWriter(target, first.schema) as file:
@@ -199,7 +201,7 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     changed = (holds[:, 1:] != holds[:, :-1]) & (below[:, :-1] >= 0)
     motion, polarity, block, scale = np.nonzero(changed.transpose(0, 2, 3, 1))
     low = below[motion, scale, polarity, block]
-    coordinates, attributes = dataset_of(product, {}), product.scales.about
+    coordinates, attributes = build_dataset(product, {}), product.scales.attributes
     variable_name, meaning = {
         "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
         "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not below"),
@@ -247,7 +249,7 @@ def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
                 "while the block moved or the motion went on, so that their outcomes are unknown: create the study "
                 "without a duration"
             )
-        alpha = slenderness_of(store.product.bodies.select(blocks))
+        alpha = compute_slenderness(store.product.bodies.select(blocks))
         yield blocks, compute_ratios(peak, overturned != 0.0, unfinished != 0.0, alpha)
 
 
@@ -379,7 +381,7 @@ def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
             )
             bar.advance(blocks.stop - blocks.start)
     description = "peak rotation over the slenderness, infinite where that share overturns"
-    missing_note = missing_text(missing)
+    missing_note = describe_missing(missing)
     heading = (
         f"fractiles of peak rotation over slenderness, {format_count(len(product.motions), 'motion')}, {product.model} "
     )
@@ -389,7 +391,11 @@ def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
                 "fractile_over_alpha": variable(("fractile", "scale", "block"), values, description, "1"),
                 "overturned_share": variable(("scale", "block"), overturned, unit="1"),
             },
-            {"fractile": shares, "scale": ("scale", scales.values, scales.about), **body_coordinates(product.bodies)},
+            {
+                "fractile": shares,
+                "scale": ("scale", scales.values, scales.attributes),
+                **body_coordinates(product.bodies),
+            },
             {"description": f"{heading}model" + f"; {missing_note}" * bool(missing_note), "model": product.model},
         )
     )
@@ -444,10 +450,10 @@ def fit_pooled_fragility(
         product.model,
         outcomes=None,
         one_way=product.polarity != "both" and not bodies.is_symmetric,
-        with_vertical=bool(verticals_of(product.motions)),
+        with_vertical=bool(collect_verticals(product.motions)),
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
-        missing=missing_text(missing),
+        missing=describe_missing(missing),
     )
 
 
@@ -504,7 +510,11 @@ def fit_block_fragilities(
                     for values, number in zip(estimates.values(), numbers, strict=True):
                         values[i, j] = number
                     bar.advance()
-    dims, unfitted_count, missing_note = ("limit_state", "block"), np.count_nonzero(faults != ""), missing_text(missing)
+    dims, unfitted_count, missing_note = (
+        ("limit_state", "block"),
+        np.count_nonzero(faults != ""),
+        describe_missing(missing),
+    )
     text = f"fragility of {format_count(len(bodies), 'block')}; intensity: {measure.quantity}"
     text += f"; {format_count(int(unfitted_count), 'curve')} cannot be fitted (see fault)" if unfitted_count else ""
     attributes = {"confidence": confidence, "model": product.model, "measure": measure.name, **measure.options()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from typing import BinaryIO, Final
 
-from rocking.errors import UnreadableRecord, install
+from rocking.errors import UnreadableRecord, describe_install
 from rocking.motion.motion import Motion
 from rocking.records.formats import csmip, headed, table, through_obspy
 from rocking.records.formats.channel import Channel, Identification, Recognised
@@ -182,7 +182,7 @@ def _unknown_format_error(source: Source) -> UnreadableRecord:
     if source.is_binary:
         text, advice = "this is a binary file in no format known here", "unpack an archive, save a workbook as CSV"
     if not through_obspy.is_obspy_installed():
-        advice += f", or if it is MiniSEED, SAC or another format that ObsPy reads, {install('formats')}"
+        advice += f", or if it is MiniSEED, SAC or another format that ObsPy reads, {describe_install('formats')}"
     return source.error(f"{text}; {advice}")
 
 

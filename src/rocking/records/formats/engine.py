@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import UnreadableRecord, literal
+from rocking.errors import UnreadableRecord, escape_braces
 from rocking.records.formats.channel import Channel, Recognised, create_channel, missing_value_error, resolve_timing
 from rocking.records.formats.source import Line, Request, Source
 from rocking.records.units import SECOND
@@ -104,7 +104,7 @@ class Header:
         numbers = [parse_token(group.encode("latin-1")) or 0.0 for group in match.groups()] if match else [0.0]
         if not all(number > 0.0 for number in numbers):
             line = self.source.read_line(self.find_offset(key))
-            text = f"{literal(repr(line.text))} gives no positive number; correct it, or get the record again"
+            text = f"{escape_braces(repr(line.text))} gives no positive number; correct it, or get the record again"
             raise self.source.error(text, line.start)
         return numbers
 

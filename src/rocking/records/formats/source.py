@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import BinaryIO, NamedTuple
 
 from rocking.core import checks
-from rocking.errors import InvalidMotion, UnreadableRecord, literal
+from rocking.errors import InvalidMotion, UnreadableRecord, escape_braces
 from rocking.records import catalogue
 from rocking.records.units import UNIT_NAMES, Unit, choose_unit, find_unit
 
@@ -189,7 +189,7 @@ class Request:
         unit = find_unit(spelling) if isinstance(stated, str) else stated
         unit = unit or (None if spelling and self.several else self.unit)
         if unit is None:
-            unknown = f"the units {literal(repr(spelling))} are not known"
+            unknown = f"the units {escape_braces(repr(spelling))} are not known"
             fault = unknown if spelling else "the file does not say its units"
             raise source.error(f"{fault}; give {{}} as one of {', '.join(UNIT_NAMES)}", offset, "units")
         if self.unit is not None and not self.several and unit != self.unit:

@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import UnreadableRecord, literal
+from rocking.errors import UnreadableRecord, escape_braces
 from rocking.records.formats.channel import Channel, Recognised, create_channel, find_first_fault, resolve_timing
 from rocking.records.formats.engine import NUMBER, convert_tokens, invalid_number_error, parse_token
 from rocking.records.formats.heading import RULE, Heading, parse_heading
@@ -159,7 +159,7 @@ class _TextTable(NamedTuple):
         for line in itertools.takewhile(lambda line: line.start < self.start, self.source.read_lines(0, HEADING_LINES)):
             match = _STEP_STATEMENT.search(line.text)
             numbers = re.findall(NUMBER, match[1] or match[2]) if match else []
-            stated = literal(repr(line.text.strip()[:100]))
+            stated = escape_braces(repr(line.text.strip()[:100]))
             if dt is not None and numbers and not any(_is_step(number, dt) for number in numbers):
                 text = f"the heading says {stated}, not {{}} {dt:g} s; correct one of them"
                 raise self.source.error(text, line.start, "dt", value=dt)
