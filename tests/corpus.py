@@ -602,7 +602,7 @@ def incremental() -> Iterator[Item]:
 
 @group(digits=6, fast=False)
 def overturning_maps() -> Iterator[Item]:
-    axes = {"amplitudes": np.arange(1.0, 9.0, 1.0), "frequencies": [1.0, 2.0, 4.0], "tolerance": 1e-7}
+    axes = {"amplitudes": np.arange(1.0, 9.0, 1.0), "frequencies": [1.0, 2.0, 4.0], "rtol": 1e-7}
     for pulse, options in (("one_sine", {}), ("sine", {"cycles": 1.5}), (lambda a, f: lobes(a, f), {})):
         yield from of_result(rocking.overturning_map(SLENDER, pulse, **axes, **options, **QUIET))
 
@@ -611,7 +611,7 @@ def overturning_maps() -> Iterator[Item]:
 def critical_scales() -> Iterator[Item]:
     for block in (STATUE, SLENDER, UNEVEN[0], HELD["tendon"][0]):
         for motion in (lobes(1.0, 0.8), lobes(1.0, 1.3, 1.0, -1.0, 0.5)):
-            found = attempt(rocking.critical_scale, block, motion, 0.5, 60.0)
+            found = attempt(rocking.critical_scale, block, motion, (0.5, 60.0))
             names = ("scale", "p", "alpha", "restitution")
             yield "scale", found if isinstance(found, str) else [getattr(found, name) for name in names]
 
@@ -682,7 +682,7 @@ def observed() -> tuple[list[rocking.Motion], list[bool]]:
 @functools.cache
 def calibrated() -> Any:
     motions, overturned = observed()
-    options = {"candidates": 128, "ensemble": 60, "p": 3.0, "two_sided": False, "seed": 5}
+    options = {"candidates": 128, "max_blocks": 60, "p": 3.0, "two_sided": False, "seed": 5}
     return rocking.calibrate(motions, overturned, model="linear", **options, **QUIET)
 
 

@@ -120,7 +120,7 @@ LEVELS = ["--levels", "0.1g:1.2g:12"]
         (["fragility", RECORD, OTHER, *SIZES, *LEVELS, "--taxonomy", "a block", "--out", "out"], "--taxonomy of NRML"),
         (["fragility", RECORD, *SIZES, *LEVELS, "--limit-states", "a half=0.5", "--out", "out"], "limit state of NRML"),
         (["fragility", RECORD, OTHER, *SIZES, *STRIPES, "--hazard", "site.csv"], "fit the one against the other's"),
-        (["fragility", RECORD, OTHER, *SIZES, "--levels", "0.5g"], "--levels that differ"),
+        (["fragility", RECORD, OTHER, *SIZES, "--levels", "0.5g"], "--levels must contain two levels or more"),
         (["measures", RECORD, OTHER, *SIZES, "--damping", "1.5"], "--damping must be a fraction"),
         (["check", RECORD, OTHER, *SIZES, "--rules", "west,east"], "--rules must be one of"),
     ],

@@ -48,7 +48,7 @@ simulate {P} {W} --tendon prestress=1 | --tendon needs stiffness
 simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon must be NAME=VALUE pairs separated by commas
 simulate {P} {W} --tendon stiffness=-1 | --tendon: stiffness of a tendon must be at least 0 N/m, not -1
 simulate {P} {W} --load mass=1,height=2,follows=maybe | --load must contain follows=yes or follows=no; got 'maybe'
-simulate {P} {W} --lean 40deg | whose --lean is 0.698132 rad falls
+simulate {P} {W} --lean 40deg | --lean must be between -0.1244 and 0.1244 rad
 spectrum {R} --p 1 | a spectrum requires --alpha, or the --ensemble of a calibration
 spectrum {R} --alpha 0.2 | one of --p
 spectrum {R} --alpha 0.2 --p 1 --size 1 | give not both of --p (rad/s) and --size (half diagonals, m)

@@ -190,7 +190,7 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
         (lambda: Restitution(0.9, 0.95, seed=1), "minimum must be above 0 and at most maximum"),
         (lambda: Restitution(1.1, 0.9, seed=1), "maximum must be in"),
         (lambda: Restitution((0.95, 0.4), (0.9, 0.5), seed=1), "minimum must be above 0 and at most maximum, 0.4"),
-        (lambda: Restitution(0.9, 0.5), "a restitution that varies needs a slope or a seed"),
+        (lambda: Restitution(0.9, 0.5), "a law of restitution requires a slope or a seed"),
         (lambda: Restitution(0.95, 0.9, seed=1.5), "seed must be a whole number"),
         (lambda: Restitution(0.95, 0.9, slope=0.1, seed=1), "has either a slope or a seed"),
         (lambda: impact_restitution(), "either alpha of a rectangular block, or"),
@@ -216,7 +216,7 @@ def test_an_error_keeps_the_bound_that_is_wrong(given):
 def test_what_needs_the_same_factor_each_time_refuses_a_law():
     shaking = rocking.pulses.sine(6.0, 0.8, cycles=1)
     random = RestrainedBlock(COLUMN, restitution=Restitution(0.95, 0.9, seed=1))
-    with pytest.raises(InvalidOption, match="draws its restitution at each impact"):
+    with pytest.raises(InvalidOption, match="restitution drawn at random at each impact"):
         dynamics.stroboscopic_map(random, shaking)
 
 

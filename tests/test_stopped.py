@@ -92,7 +92,7 @@ def test_a_block_that_still_rocks_when_the_motion_ends_is_stopped_there_and_not_
     study = rocking.create_study(tmp_path, Blocks(p=2.0, alpha=[0.2, 0.4], restitution=0.9), motion, **options)
     with rocking.set_options(threads=1):
         study.run()
-    with pytest.raises(errors.StudyError, match="their outcomes are not known: make the study without a duration"):
+    with pytest.raises(errors.StudyError, match="their outcomes are unknown: create the study without a duration"):
         study.fragility()
 
 

@@ -130,7 +130,7 @@ def test_a_treatment_is_made_of_its_name_and_parameter():
     assert chattering_scheme("interval=1e-6") == rocking.IntervalThreshold(1e-6)
     for wrong, sentence in (
         ("time=eq78", "eq76, eq77, exact"),
-        ("velocity=x", "one number"),
+        ("velocity=x", "must be a number"),
     ):
         with pytest.raises(rocking.errors.InvalidOption, match=sentence):
             chattering_scheme(wrong)
