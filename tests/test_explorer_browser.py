@@ -34,7 +34,7 @@ from rocking.explorer.launch import start_listening
 from rocking.explorer.studies import StudyView
 from rocking.inputs import quantities
 from rocking.plot.canvas import find_cell_edges
-from rocking.response import round_ratio
+from rocking.response.summary import round_ratio
 
 pytestmark = pytest.mark.browser
 

@@ -11,7 +11,7 @@ import pytest
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, dynamics, simulate
 from rocking.errors import InvalidOption
-from rocking.response import choose_steps, list_factors
+from rocking.response.perturbed import choose_steps, list_factors
 
 FREE = Block(width=0.24, height=1.1)
 LEANING = Block.from_parameters(p=(2.0, 2.5), alpha=(0.15, 0.25), restitution=(0.9, 0.8))

@@ -24,7 +24,7 @@ from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, compose_label
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.response import COUNT, RELATIVE, format_percent, list_factors
+from rocking.response.perturbed import COUNT, RELATIVE, format_percent, list_factors
 from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
 
 if TYPE_CHECKING:

@@ -366,6 +366,7 @@ def _create_pulse_function(
             raise InvalidOption(
                 f"{{}} is a function, so no parameters are accepted; got {', '.join(parameters)}: bind them to it",
                 "pulse",
+                value=parameters,
             )
         return pulse
     family = find_family(pulse)

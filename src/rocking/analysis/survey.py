@@ -19,8 +19,10 @@ from rocking.engine.problem import require_body
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
-from rocking.response import PRECISION, Response, choose_steps, format_brief_outcome, format_ratio, round_ratio
+from rocking.response import Response
 from rocking.response.mechanics import check_friction
+from rocking.response.perturbed import PRECISION, choose_steps
+from rocking.response.summary import format_brief_outcome, format_ratio, round_ratio
 from rocking.simulation.ensemble import body_coordinates, collect_verticals
 from rocking.simulation.simulate import simulate
 

@@ -1,6 +1,7 @@
 """Rocking blocks, single or as arrays, free or restrained."""
 
 from rocking.block.bodies import Blocks
+from rocking.block.body import Bodies, Body, Coordinate
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Damper, Load, Restitution, Restraint, Spring, Tendon, Thrust
 from rocking.block.sides import Side, housner_restitution, impact_restitution, one_sided_restitution
@@ -12,6 +13,9 @@ RestrainedBlocks = Blocks
 __all__ = [
     "Block",
     "Blocks",
+    "Bodies",
+    "Body",
+    "Coordinate",
     "Damper",
     "Load",
     "Restitution",

@@ -28,7 +28,8 @@ from rocking.core.result import Result
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.response import Response, choose_times
+from rocking.response import Response
+from rocking.response.figure import choose_times
 from rocking.response.sensitivity import compute_changes
 from rocking.simulation.simulate import simulate
 

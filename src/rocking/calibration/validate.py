@@ -384,6 +384,7 @@ def _average_left_out(source: Validation, count: int, weights: object, outlier_p
             f"the predictions are of {format_count(predicted_count, 'test')}; got {format_count(count, 'test')}: "
             "{} must be those of the calibration, in their order",
             "tests",
+            value=count,
         )
     return np.asarray(source.probabilities.mean(axis=0))
 

@@ -439,7 +439,9 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     """
     if not isinstance(response, Response):
         raise InvalidOption(
-            f"{{}} must be a Response of simulate(block, motion); got {type(response).__name__}", "response"
+            f"{{}} must be a Response of simulate(block, motion); got {type(response).__name__}",
+            "response",
+            value=response,
         )
     sequences = response.sequences[np.isfinite(response.sequences["upper"])]
     uplifts = response.events["time"][response.events["kind"] == "uplift"]

@@ -48,8 +48,9 @@ from rocking.records.named import (
     reject_redundant_arguments,
     shipped,
 )
-from rocking.response import PRECISION, Response, choose_steps
+from rocking.response import Response
 from rocking.response.mechanics import check_friction
+from rocking.response.perturbed import PRECISION, choose_steps
 from rocking.rules import check as apply_rules
 from rocking.simulation.simulate import simulate as run_simulation
 

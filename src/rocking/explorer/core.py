@@ -29,7 +29,7 @@ from rocking.explorer.simulated import (
     widen_empty_window,
 )
 from rocking.explorer.uploads import RecentCache, UploadStore
-from rocking.response import find_active_span
+from rocking.response.figure import find_active_span
 
 #: Number of stored responses, and maximum size of their steps and motions, some hundreds of MB.
 _MAX_RESPONSES: Final = 48

@@ -14,8 +14,8 @@ from rocking.explorer.core import Explorer
 from rocking.explorer.parameters import READING, Texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.simulated import SimulatedCase, check_window, describe_outcome, thin_line
-from rocking.response import Response, find_active_span
-from rocking.response.figure import compute_boundary, compute_course, find_event_times
+from rocking.response import Response
+from rocking.response.figure import compute_boundary, compute_course, find_active_span, find_event_times
 
 
 def sample_phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payload:

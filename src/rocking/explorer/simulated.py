@@ -19,7 +19,8 @@ from rocking.explorer.inputs import Case
 from rocking.explorer.payload import phrase
 from rocking.inputs.notes import block_notes, motion_notes
 from rocking.motion.motion import Motion
-from rocking.response import Response, format_outcome, round_ratio
+from rocking.response import Response
+from rocking.response.summary import format_outcome, round_ratio
 
 #: Evaluation times of a rotation in a window, and points of a line in a payload.
 _MAX_TIMES: Final = 12_000

@@ -25,7 +25,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 from rocking.records.named import Motions, list_motion_names, list_motions
-from rocking.response import COUNT, RELATIVE, list_factors
+from rocking.response.perturbed import COUNT, RELATIVE, list_factors
 
 if TYPE_CHECKING:
     import xarray as xr

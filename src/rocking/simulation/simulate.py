@@ -20,7 +20,8 @@ from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
-from rocking.response import Response, Solution
+from rocking.response import Response
+from rocking.response.history import Solution
 
 _EVENT_DTYPE = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
 _IMPACT_DTYPE = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
