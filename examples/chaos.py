@@ -71,7 +71,11 @@ print(f"dimension of the boundary {dimension:.2f}")
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 4.0), layout="constrained")
 dynamics.bifurcation_diagram(
-    shaken, np.linspace(1.4, 1.78, 153), [0.05, 0.5], transient=300, parameter="peak acceleration of the table over g"
+    shaken,
+    np.linspace(1.4, 1.78, 153),
+    [0.05, 0.5],
+    transient_periods=300,
+    parameter="peak acceleration of the table over g",
 ).plot(left, title="a ball on a table")
 left.axvline(doubling, color="C3", linestyle="--", linewidth=0.8)
 basins.plot(right, title="a block under a sine")

@@ -45,7 +45,7 @@ print(f"overturns {rate.in_words()}")
 # curve lets the rock stand for so long.
 
 stood = fragility.survival(10_000.0, site)
-never, chance = stood.unlikely, stood.probability
+never, chance = stood.never_reached_intensity, stood.probability
 print(f"most likely never a PGV of {never:.2f} m/s or more")
 print(f"the chance to stand for 10,000 years under this hazard is {chance:.2f}")
 

@@ -80,7 +80,7 @@ def ratings(blocks, motions):
     """Demand over capacity by every rule under a PGA of 1 g, shape (motion, block)."""
     found: dict[str, list[np.ndarray]] = {name: [] for name in rules.RULES}
     for motion in motions:
-        for name, rating in rules.rate(blocks, motion).items():
+        for name, rating in rules.apply_rules(blocks, motion).items():
             found[name].append(rating.ratio)
         sys.stdout.write(f"{motion.name}\n")
         sys.stdout.flush()

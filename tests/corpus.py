@@ -655,10 +655,10 @@ def efficiencies() -> Iterator[Item]:
 @group(digits=6)
 def rules_of_thumb() -> Iterator[Item]:
     blocks = [STATUE, *RECTANGLES]
-    for name, rating in rocking.rules.rate(blocks, record()).items():
+    for name, rating in rocking.rules.apply_rules(blocks, record()).items():
         yield name, [rating.demand, rating.capacity, rating.ratio, rating.overturns, rating.unit]
     motions = dict(list(suite().items())[-3:])
-    yield from of_result(rocking.rules.check(STATUE, motions, **QUIET))
+    yield from of_result(rocking.rules.compare_rules(STATUE, motions, **QUIET))
 
 
 @group(digits=6, fast=False)
@@ -766,7 +766,7 @@ def continuations() -> Iterator[Item]:
 @group(digits=6)
 def bifurcation_diagrams() -> Iterator[Item]:
     ball, one = dynamics.BouncingBall(0.5, gravity=10.0), steady(pulses.sine(10.0, 5.0, cycles=1))
-    options = {"transient": 300, "recorded": 8, "direction": "both"}
+    options = {"transient_periods": 300, "recorded_periods": 8, "direction": "both"}
     found = dynamics.bifurcation_diagram(
         lambda q: (ball, one.scaled(q)), [1.1, 1.3, 1.45, 1.6], [0.0, 0.8], **options, **QUIET
     )
@@ -785,7 +785,7 @@ def basins() -> Iterator[Item]:
 @group(digits=5)
 def exponents() -> Iterator[Item]:
     for body, motion, (positions, velocities) in PERIODIC.values():
-        found = dynamics.lyapunov_exponents(body, motion, (positions[1], velocities[2]), 40, transient=5)
+        found = dynamics.lyapunov_exponents(body, motion, (positions[1], velocities[2]), 40, transient_periods=5)
         yield "exponents", [found.largest, found.smallest, found.impacts, found.resting, int(found.outcome)]
         yield "summary", found.summary()
 

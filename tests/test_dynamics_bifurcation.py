@@ -26,7 +26,7 @@ def test_the_period_of_a_ball_doubles_where_its_closed_form_says(e, about):
     assert at == pytest.approx(about, abs=5e-5)
     values = at + np.array([-0.02, -0.002, 0.002, 0.004])
     found = dynamics.bifurcation_diagram(
-        ball_case(e), values, start_of_one_bounce(e, values[0])[0], transient=6000, recorded=16
+        ball_case(e), values, start_of_one_bounce(e, values[0])[0], transient_periods=6000, recorded_periods=16
     )
     assert found.data.period.values[0, :, 0].tolist() == [1, 1, 2, 2]
     assert found.data.impacts.values[0, :, 0].tolist() == [1, 1, 2, 2]
@@ -40,7 +40,7 @@ def test_an_orbit_that_is_still_settling_has_no_period():
     """Near the doubling it comes nearer from both sides in turn, and every second state is almost the same."""
     at = first_doubling(0.5)
     found = dynamics.bifurcation_diagram(
-        ball_case(0.5), at - np.array([0.002, 0.0008]), start_of_one_bounce(0.5, at - 0.1)[0], transient=1500
+        ball_case(0.5), at - np.array([0.002, 0.0008]), start_of_one_bounce(0.5, at - 0.1)[0], transient_periods=1500
     )
     states = found.data.velocity.values[0, 1, 0]
     assert abs(states[-1] - states[-3]) < 1e-6 * abs(states[-1]) < abs(states[-1] - states[-2])
@@ -63,9 +63,9 @@ def test_going_up_and_down_keep_what_they_are_on():
 def test_kept_states_are_those_of_the_map_after_its_transient():
     values = [1.2, 1.7, 2.5]
     afresh = dynamics.bifurcation_diagram(
-        ball_case(0.5), values, [0.1, 0.5], direction="afresh", transient=30, recorded=7
+        ball_case(0.5), values, [0.1, 0.5], direction="afresh", transient_periods=30, recorded_periods=7
     )
-    up = dynamics.bifurcation_diagram(ball_case(0.5), values, [0.1, 0.5], transient=30, recorded=7)
+    up = dynamics.bifurcation_diagram(ball_case(0.5), values, [0.1, 0.5], transient_periods=30, recorded_periods=7)
     state = np.array([0.1, 0.5])
     for k, value in enumerate(values):
         strobe = dynamics.stroboscopic_map(*ball_case(0.5)(value))
@@ -91,7 +91,7 @@ def test_a_velocity_that_is_zero_but_for_rounding_has_no_period_of_its_own():
     oscillator = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.2, stop=0.5)
     found = dynamics.bifurcation_diagram(
         lambda frequency: (oscillator, pulses.sine(1.0, frequency, cycles=1)),
-        [0.8, 0.9, 1.0, 1.1, 1.2], [0.0, 0.1], transient=800,
+        [0.8, 0.9, 1.0, 1.1, 1.2], [0.0, 0.1], transient_periods=800,
     )  # fmt: skip
     assert np.abs(found.data.velocity.values[0, 2]).max() < 1e-14
     assert found.data.period.values[0, :, 0].tolist() == [1] * 5
@@ -121,7 +121,11 @@ def test_impacts_are_those_of_the_orbit_infinite_where_chattering_is_complete(re
 def test_what_takes_too_many_steps_is_not_said_to_overturn(transient):
     lively, start = dynamics.BouncingBall(1.0, gravity=10.0), [0.0, 1e-5]
     found = dynamics.bifurcation_diagram(
-        lambda level: (lively, pulses.sine(level, 0.5, cycles=1)), [0.1], start, transient=transient, recorded=2
+        lambda level: (lively, pulses.sine(level, 0.5, cycles=1)),
+        [0.1],
+        start,
+        transient_periods=transient,
+        recorded_periods=2,
     )
     _, fate, _ = dynamics.stroboscopic_map(lively, pulses.sine(0.1, 0.5, cycles=1)).advance(start)
     assert fate == dynamics.PeriodOutcome.UNFINISHED and np.isnan(found.data.coordinate.values).all()
@@ -134,6 +138,6 @@ def test_what_takes_too_many_steps_is_not_said_to_overturn(transient):
 def test_a_stop_that_moves_takes_the_body_with_it():
     found = dynamics.bifurcation_diagram(
         lambda stop: (dynamics.ImpactOscillator(1.0, 0.7, stop=stop), pulses.sine(1.0, 0.7, cycles=1)),
-        [-0.3, -0.2, 0.0], [0.4, 0.0], direction="down", transient=50,
+        [-0.3, -0.2, 0.0], [0.4, 0.0], direction="down", transient_periods=50,
     )  # fmt: skip
     assert np.all(found.data.coordinate.values[0, :, 0].min(axis=-1) >= np.array([0.3, 0.2, 0.0]))

@@ -85,5 +85,5 @@ def test_the_doubled_orbits_of_a_ball_are_those_of_its_own_equations(once, twice
 
 def test_a_period_doubles_again_where_a_long_simulation_says(twice):
     flip = twice.bifurcations[1].value
-    found = dynamics.bifurcation_diagram(table, [flip - 0.004, flip + 0.004], twice.states[-1], transient=1500)
+    found = dynamics.bifurcation_diagram(table, [flip - 0.004, flip + 0.004], twice.states[-1], transient_periods=1500)
     assert found.data.period.values[0, :, 0].tolist() == [2, 4]

@@ -363,7 +363,7 @@ def test_dollars_in_names_begin_no_formula():
         return dataclasses.replace(oscillator, stop=damping), named[0]
 
     diagram = dynamics.bifurcation_diagram(
-        case, [0.1, 0.2], (0.0, 0.0), transient=3, recorded=2, parameter="first_stop"
+        case, [0.1, 0.2], (0.0, 0.0), transient_periods=3, recorded_periods=2, parameter="first_stop"
     )
     figures = {
         "response": rocking.simulate(block, named[0]).plot(),

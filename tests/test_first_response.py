@@ -84,7 +84,7 @@ ball, table = dynamics.BouncingBall(0.5), rocking.pulses.sine(15.0, 2.0, cycles=
 rock = dynamics.stroboscopic_map(ball, table)
 rock([0.1, 0.5])
 rock.derivative([0.1, 0.5])
-dynamics.lyapunov_exponents(ball, table, [0.1, 0.5], 20, transient=5)
+dynamics.lyapunov_exponents(ball, table, [0.1, 0.5], 20, transient_periods=5)
 dynamics.basins(ball, table, [0.01, 0.05], [0.0, 0.1], n_periods=10)
 mirrored = rocking.Block.from_parameters(p=2.0, alpha=0.6, restitution=0.55)
 def swing(amplitude):

@@ -133,7 +133,7 @@ def repeated(model: str) -> Numbers:
     with rocking.set_options(threads=1):
         found = dynamics.basins(block, slow, [-0.1, 0.1], [-0.3, 0.3], 4, model=model)
     yield from np.ravel(found.data.multiplier.values)
-    exponents = dynamics.lyapunov_exponents(block, motion, (0.05, 0.1), 20, transient=1, model=model)
+    exponents = dynamics.lyapunov_exponents(block, motion, (0.05, 0.1), 20, transient_periods=1, model=model)
     yield from (exponents.largest, exponents.smallest)
 
 
@@ -154,7 +154,9 @@ def oscillators(model: str) -> Numbers:
     for motion in (pulses.sine(1.0, 1.0, cycles=3), pulses.sine(6.0, 1.0, cycles=2), shaken(3.0, seed=10)):
         yield from told(dynamics.simulate(pressed, motion, duration=3.0))
     for body in (dynamics.BouncingBall(0.2), pressed):
-        exponents = dynamics.lyapunov_exponents(body, pulses.sine(12.0, 2.0, cycles=1), (0.03, 0.1), 20, transient=0)
+        exponents = dynamics.lyapunov_exponents(
+            body, pulses.sine(12.0, 2.0, cycles=1), (0.03, 0.1), 20, transient_periods=0
+        )
         yield from (exponents.largest, exponents.smallest, exponents.resting)
 
 
@@ -198,7 +200,7 @@ def mapped(model: str) -> Numbers:
             for state in ((0.0, 0.0), (0.01, 0.0), (0.1, 1.5), (0.2, 3.0)):
                 yield from np.ravel(section.orbit([state], 2))
                 yield from np.ravel(section.derivative([state], 1)[1])
-    fallen = dynamics.lyapunov_exponents(STATUE, push.scaled(3.0), (0.0, 0.0), 20, transient=0, model=model)
+    fallen = dynamics.lyapunov_exponents(STATUE, push.scaled(3.0), (0.0, 0.0), 20, transient_periods=0, model=model)
     yield from (fallen.outcome, fallen.forcing_period)
     ball = dynamics.BouncingBall(0.6)
     states = np.stack(np.meshgrid(np.linspace(0.005, 0.4, 12), [-1.0, 0.1, 1.5]), axis=-1).reshape(-1, 2)

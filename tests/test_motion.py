@@ -312,7 +312,7 @@ def test_adding_something_else_is_a_type_error():
 @pytest.mark.parametrize(
     "statement",
     ["from rocking.pulses import ricker", "import rocking.records", "from rocking.records import load, read",
-     "from rocking.rules import rate", "import rocking; rocking.pulses.ricker, rocking.rules.rate"],
+     "from rocking.rules import apply_rules", "import rocking; rocking.pulses.ricker, rocking.rules.apply_rules"],
 )  # fmt: skip
 def test_public_modules_can_be_imported(statement):
     subprocess.run([sys.executable, "-c", statement], check=True)

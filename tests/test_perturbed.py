@@ -128,7 +128,7 @@ def test_a_summary_counts_outcomes_in_both_ranges_and_takes_the_precision_that_i
     assert re.search(r"^outcome +(undecided: )?\w+ in \d of 5 motions within 3e-6", response.summary(), re.MULTILINE)
     for precision, text in ((1e-3, "0.1 %"), (0.05, "5 %"), (2e-6, "2e-6")):
         found = response.perturbed(*choose_steps(precision))
-        assert found.within == pytest.approx(precision, rel=1e-12)
+        assert found.max_deviation == pytest.approx(precision, rel=1e-12)
         last = response.summary(precision=precision).splitlines()[-1]
         assert last == f"{'':20}{found.share()}" and last.endswith(f" of 11 motions within {text}")
     released = simulate(FREE, None, initial_rotation=0.1)

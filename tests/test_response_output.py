@@ -16,7 +16,7 @@ from rocking.core.tables import add_unit
 from rocking.errors import InvalidOption, OutputError
 from rocking.explorer.simulated import describe_outcome
 from rocking.response.summary import format_time, round_ratio
-from rocking.rules import Check
+from rocking.rules import RuleComparison
 
 TABLES = {
     "events": ["time_s", "kind", "side"],
@@ -269,5 +269,5 @@ def test_one_case_has_one_peak_in_every_output(pga):
         assert told["values"]["share"]["values"]["value"] == 100.0 * round_ratio(response)
     else:
         assert told["phrase"] == "verdict.undecided"
-    checked = Check(block, ("x",), (response,), ({},), (0.5,)).summary()
+    checked = RuleComparison(block, ("x",), (response,), ({},), (0.5,)).summary()
     assert f"{float(shown):.3g}" in checked.splitlines()[4].split()

@@ -122,14 +122,14 @@ def test_a_survey_is_of_walls_too():
 
 
 def test_columns_are_one_where_sides_are_equal_and_two_where_they_differ():
-    assert {"p", "one_sided", "yields"} <= body_coordinates(FACADE.alone()).keys()
-    assert not FACADE.alone().is_symmetric
-    assert {"alpha_plus", "alpha_minus"} <= body_coordinates(LEANING.alone()).keys()
-    oscillator = dynamics.ImpactOscillator(1.0, 0.8).alone()
+    assert {"p", "one_sided", "yields"} <= body_coordinates(FACADE.to_bodies()).keys()
+    assert not FACADE.to_bodies().is_symmetric
+    assert {"alpha_plus", "alpha_minus"} <= body_coordinates(LEANING.to_bodies()).keys()
+    oscillator = dynamics.ImpactOscillator(1.0, 0.8).to_bodies()
     assert {"frequency", "second_stop"} <= body_coordinates(oscillator).keys()
     assert not oscillator.is_symmetric
-    assert dynamics.InvertedPendulum(3.0, 0.1, 0.5).alone().is_symmetric
-    assert dynamics.ImpactOscillator(1.0, 0.8, stop=0.1, second_stop=0.1).alone().is_symmetric
+    assert dynamics.InvertedPendulum(3.0, 0.1, 0.5).to_bodies().is_symmetric
+    assert dynamics.ImpactOscillator(1.0, 0.8, stop=0.1, second_stop=0.1).to_bodies().is_symmetric
 
 
 @pytest.mark.parametrize("another", [False, pytest.param(True, marks=pytest.mark.thorough)])
@@ -168,7 +168,7 @@ def test_what_needs_a_free_block_or_any_block_says_so_in_one_sentence():
         assert "\n" not in str(refused.value)
     for analysis in (
         lambda: rocking.overturning_map(FACADE, "one-sine", amplitudes=[2.0, 3.0], frequencies=[1.0, 2.0]),
-        lambda: rocking.rules.check(FACADE, pulse),
+        lambda: rocking.rules.compare_rules(FACADE, pulse),
         lambda: rocking.rules.west(FACADE, pulse),
     ):
         with pytest.raises(InvalidBlock, match="a free Block is needed, not a RestrainedBlock"):

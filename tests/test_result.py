@@ -171,13 +171,17 @@ def results(bars, spectrum, study):
         "OverturningMap": rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
         "IncrementalDynamicAnalysis": rocking.incremental_dynamic_analysis(BLOCK, PULSE),
         "MeasureComparison": rocking.compare_measures(BLOCK, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
-        "Rose": statue.rose(),
+        "ResistanceRose": statue.rose(),
         "ResponseRose": rocking.response_rose(statue, [(PULSE, PULSE)], azimuths=[0.0, 90.0], recorded=(0.0, 90.0)),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
         "BlockTable": study.block_fragilities(),
         "Basins": dynamics.basins(BLOCK, ONE_PERIOD, np.linspace(-0.2, 0.2, 5), np.linspace(-0.4, 0.4, 5)),
         "BifurcationDiagram": dynamics.bifurcation_diagram(
-            lambda factor: (BLOCK, ONE_PERIOD.scaled(factor)), [0.5, 1.0], [0.01, 0.1], recorded=4, direction="both"
+            lambda factor: (BLOCK, ONE_PERIOD.scaled(factor)),
+            [0.5, 1.0],
+            [0.01, 0.1],
+            recorded_periods=4,
+            direction="both",
         ),
     }
 
@@ -249,8 +253,11 @@ HEADERS = {
     ("Basins", "orbits"): "attractor,phase,orbit_coordinate_rad,orbit_velocity_rad_s",
     ("BifurcationDiagram", "states"): "direction,value,start,iterate,coordinate_rad,velocity_rad_s",
     ("BifurcationDiagram", "orbits"): "direction,value,start,period,impacts",
-    ("Rose", "rose"): "azimuth_deg,acceleration_g,alpha_rad,p_rad_s,restitution,radius_m,rise_m,coupling,aside_m,gap_m",
-    ("Rose", "support"): "east_m,north_m",
+    (
+        "ResistanceRose",
+        "rose",
+    ): "azimuth_deg,acceleration_g,alpha_rad,p_rad_s,restitution,radius_m,rise_m,coupling,aside_m,gap_m",
+    ("ResistanceRose", "support"): "east_m,north_m",
     ("ResponseRose", "responses"): "pair,level,azimuth_deg,overturned,peak_over_slenderness",
     ("ResponseRose", "shares"): "level,azimuth_deg,overturned_share",
     ("ResponseRose", "levels"): "level,anywhere",
@@ -349,7 +356,7 @@ NOT_POOLED = {
     "RockingSpectrum": {"fractile"},
     "RockingSpectrum of several": {"fractile"},
     "OverturningMap": {"amplitude", "frequency"},
-    "Rose": {"azimuth", "corner"},
+    "ResistanceRose": {"azimuth", "corner"},
     "BifurcationDiagram": {"direction", "value", "iterate"},
 }
 

@@ -307,15 +307,15 @@ def test_survival_is_what_the_rate_and_the_curve_say() -> None:
     rate = fitted.annual_rate(hazard).rates[0]
     long, short = fitted.survival(10_000.0, hazard), fitted.survival(10.0, hazard)
     assert long.probability == pytest.approx(math.exp(-10_000.0 * rate.annual_rate))
-    assert long.contradicts
-    assert not short.contradicts
+    assert long.contradicts_hazard
+    assert not short.contradicts_hazard
     assert "so they contradict each other" in long.summary()
     assert "do not contradict" in short.summary()
     chances = fitted.curves[0].probability(long.intensity)
     assert chances == pytest.approx([0.05, 0.16, 0.5, 0.84, 0.95])
     # At the largest rate the limit would have been exceeded with the confidence asked for.
     assert np.exp(-10_000.0 * chances * long.largest_rate) == pytest.approx(0.05)
-    assert float(fitted.curves[0].probability(long.unlikely)) == pytest.approx(0.95)
+    assert float(fitted.curves[0].probability(long.never_reached_intensity)) == pytest.approx(0.95)
     alone = fitted.survival(10_000.0)
     assert math.isnan(alone.probability)
     assert "hazard" not in alone.summary()
@@ -366,13 +366,15 @@ def test_a_survival_of_one_block_of_several_is_the_mean_of_their_own() -> None:
     expected = np.average([own(block) for block in blocks], weights=weights)
     assert 0.05 < expected < 0.95
     assert both.mean_probability == pytest.approx(expected, rel=1e-5)
-    assert both.probability < 0.05 < both.mean_probability < both.most_probable
+    assert both.probability < 0.05 < both.mean_probability < both.max_probability
     assert both.to_dict()["mean_probability"] == both.mean_probability
-    assert not both.contradicts
-    said = f"is {expected:.2g} in the mean and at most {both.most_probable:.2g} if one of the blocks has stood all the"
+    assert not both.contradicts_hazard
+    said = (
+        f"is {expected:.2g} in the mean and at most {both.max_probability:.2g} if one of the blocks has stood all the"
+    )
     assert said in both.summary()
     alone = rocking.fragility(blocks[0], pulses, levels=levels).survival(years, hazard)
-    assert alone.contradicts
+    assert alone.contradicts_hazard
     assert math.isnan(alone.mean_probability)
     assert "if one of the blocks" not in alone.summary()
 
@@ -584,8 +586,8 @@ def test_the_largest_probability_of_standing_has_the_least_rate_within_the_curve
     boundary = fitted.curves[0].region
     rates = [_rate_within(each, curve) for each in zip(boundary.intercept, boundary.slope, strict=True)]
     assert len(rates) > 100
-    assert found.most_probable == pytest.approx(math.exp(-min(rates) * years), rel=1e-3)
-    assert found.contradicts == (found.most_probable < 0.05)
+    assert found.max_probability == pytest.approx(math.exp(-min(rates) * years), rel=1e-3)
+    assert found.contradicts_hazard == (found.max_probability < 0.05)
 
 
 def test_a_measure_that_is_not_that_of_observed_outcomes_is_refused(tmp_path):

@@ -113,7 +113,7 @@ def test_an_intensity_of_openquake_is_in_its_own_units(kind, factor, tmp_path):
 def test_every_measure_is_labelled_in_the_unit_in_which_it_is_shown(name, column, label, scale):
     measure = Measure(name, *[1.0] * (name == "sa"))
     assert (measure.column, measure.label) == (column, label)
-    assert measure.scale == pytest.approx(scale, rel=1e-15)
+    assert measure.display_factor == pytest.approx(scale, rel=1e-15)
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.2])
@@ -121,7 +121,7 @@ def test_every_measure_is_labelled_in_the_unit_in_which_it_is_shown(name, column
 def test_a_spectral_acceleration_is_labelled_with_its_oscillator(period, damping):
     measure = Measure("sa", period, damping)
     assert measure.options() == {"period": period, "damping": damping}
-    assert measure.alone == Measure.parse(measure) == measure
+    assert measure.motion_measure == Measure.parse(measure) == measure
     assert (
         (f"damping {damping:g}" in measure.label) == (f"damping {damping:g}" in measure.short_name) == (damping != 0.05)
     )

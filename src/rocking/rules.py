@@ -16,7 +16,7 @@ import numpy as np
 
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import compute_intensities
-from rocking.analysis.survey import Check
+from rocking.analysis.survey import RuleComparison
 from rocking.block import Block, Blocks, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -30,7 +30,18 @@ from rocking.records.named import Motions, index_motions, list_motions
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
-__all__ = ["RULES", "Check", "Rating", "asce_43_05", "check", "housner", "ishiyama", "priestley", "rate", "west"]
+__all__ = [
+    "RULES",
+    "Rating",
+    "RuleComparison",
+    "apply_rules",
+    "asce_43_05",
+    "compare_rules",
+    "housner",
+    "ishiyama",
+    "priestley",
+    "west",
+]
 
 #: Ratios of rotation to slenderness for the comparison with a spectrum, from stiff oscillators to a rocking period of
 #: 30/p.
@@ -58,7 +69,7 @@ class Rating:
 
     See Also
     --------
-    rocking.rules.rate : Apply several rules.
+    rocking.rules.apply_rules : Apply several rules.
     """
 
     rule: str
@@ -214,7 +225,7 @@ def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
 
     See Also
     --------
-    rocking.rules.check : Compare rules of thumb with simulations.
+    rocking.rules.compare_rules : Compare rules of thumb with simulations.
 
     Notes
     -----
@@ -321,7 +332,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     return _find_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 
 
-def rate(
+def apply_rules(
     blocks: Blocks | Block | Iterable[Block], motion: Motion, rules: Iterable[str] | None = None
 ) -> dict[str, Rating]:
     """Apply several rules to blocks under a motion.
@@ -342,13 +353,13 @@ def rate(
 
     See Also
     --------
-    rocking.rules.check : Compare rules of thumb with simulations.
+    rocking.rules.compare_rules : Compare rules of thumb with simulations.
 
     Examples
     --------
     >>> import rocking
     >>> record = rocking.records.load("el-centro-meloland-270")
-    >>> [*rate(rocking.Block(width=0.3, height=0.9), record, ["west", "ishiyama"])]
+    >>> [*apply_rules(rocking.Block(width=0.3, height=0.9), record, ["west", "ishiyama"])]
     ['west', 'ishiyama']
     """
     requested = [*RULES] if rules is None else checks.items(rules, "rules", InvalidOption)
@@ -403,7 +414,9 @@ def _find_min_ratio(
     return demand, capacity
 
 
-def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None, model: Model = "nonlinear") -> Check:
+def compare_rules(
+    block: Block, motions: Motions, *, rules: Iterable[str] | None = None, model: Model = "nonlinear"
+) -> RuleComparison:
     """Apply rules of thumb to a block under motions, and compare with simulations.
 
     Parameters
@@ -419,7 +432,7 @@ def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None,
 
     Returns
     -------
-    Check
+    RuleComparison
         Ratio of demand to capacity by each rule, and the simulated margin.
 
     Raises
@@ -429,7 +442,7 @@ def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None,
 
     See Also
     --------
-    rocking.rules.rate : Apply several rules without simulations.
+    rocking.rules.apply_rules : Apply several rules without simulations.
     rocking.incremental_dynamic_analysis : Find the levels that overturn each block.
 
     Notes
@@ -442,7 +455,7 @@ def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None,
     >>> import rocking
     >>> tombstone = rocking.Block(width=0.3, height=0.9)
     >>> records = {name: rocking.records.load(name) for name in ["el-centro-meloland-270", "el-centro-meloland-360"]}
-    >>> comparison = check(tombstone, records, rules=["west", "ishiyama"])
+    >>> comparison = compare_rules(tombstone, records, rules=["west", "ishiyama"])
     >>> for row in comparison.rows():
     ...     print(f"{row['west']:.2f} {row['ishiyama']:.2f} {row['simulated']:.2f} {row['verdict']}")
     0.90 0.90 0.71 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
@@ -453,7 +466,7 @@ def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None,
     # Raise errors before the simulations.
     compute_intensities([*named_motions.values()], Measure("pga"))
     ratios = [
-        {name: float(rating.ratio[0]) for name, rating in rate(block, motion, names).items()}
+        {name: float(rating.ratio[0]) for name, rating in apply_rules(block, motion, names).items()}
         for motion in named_motions.values()
     ]
     responses, margins = [], []
@@ -462,7 +475,7 @@ def check(block: Block, motions: Motions, *, rules: Iterable[str] | None = None,
             responses.append(simulate(block, motion, model=model))
             margins.append(_compute_margin(responses[-1], block, motion, model))
             bar.advance()
-    return Check(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
+    return RuleComparison(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
 
 
 def _compute_margin(response: Response, block: Block, motion: Motion, model: Model) -> float:

@@ -211,7 +211,7 @@ def fit_curve(
     exceeded = np.where(np.abs(trials - exceeded) <= 1e-12 * trials, trials, exceeded)
     z = np.log(intensity)
     outcomes = Outcomes(z, exceeded, trials)
-    reason = probit.explain_missing_fit(outcomes, measure.shown)
+    reason = probit.explain_missing_fit(outcomes, measure.format_value)
     if reason is not None:
         raise Unfitted(f"no lognormal can be fitted to {name!r}: {reason}")
     fitted = probit.fit(outcomes.alone())
@@ -254,7 +254,7 @@ def create_fragility_line(curve: FragilityCurve, intensity: Floats, measure: Mea
     limit_text = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
     parameters = f"median {format_intensity(curve.median, measure)}, dispersion {curve.dispersion:.3g}"
     probability = curve.probability(intensity)
-    band, scale = curve.band(intensity) if curve.bounded else (probability, probability), measure.scale
+    band, scale = curve.band(intensity) if curve.bounded else (probability, probability), measure.display_factor
     label = f"{curve.limit_state}{limit_text}: {parameters}"
     return FragilityLine(label, scale * intensity, probability, *band, scale * mean_intensity, observed)
 
@@ -282,7 +282,7 @@ def find_extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple
 
 def format_intensity(intensity: float, measure: Measure) -> str:
     """Format an intensity (SI) with its unit."""
-    return f"{measure.scale * intensity:.4g} {measure.shown_in}".rstrip()
+    return f"{measure.display_factor * intensity:.4g} {measure.display_unit}".rstrip()
 
 
 def format_interval(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
@@ -383,12 +383,12 @@ def find_openquake_measure(measure: Measure, block: Body | None, model: Model) -
 
     SA(T) does not state its damping, which is the damping of ground-motion models.
     """
-    if measure.in_block_units and block is None:
+    if measure.has_block_units and block is None:
         raise InvalidOption(
             f"{measure.name} counts in a block's own unit; give {{}} to write it as PGA or PGV", "block"
         )
-    unit = 1.0 if block is None else float(compute_units(block.alone(), measure, model)[0])
-    if measure.of_motion == "pgv":
+    unit = 1.0 if block is None else float(compute_units(block.to_bodies(), measure, model)[0])
+    if measure.motion_measure_name == "pgv":
         return "PGV", 100.0 * unit
     if measure.damping != DAMPING:
         raise InvalidOption(
@@ -397,4 +397,4 @@ def find_openquake_measure(measure: Measure, block: Body | None, model: Model) -
             "damping",
             value=measure.damping,
         )
-    return "PGA" if measure.of_motion == "pga" else f"SA({measure.period:g})", unit / STANDARD_GRAVITY
+    return "PGA" if measure.motion_measure_name == "pga" else f"SA({measure.period:g})", unit / STANDARD_GRAVITY

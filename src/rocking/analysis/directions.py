@@ -258,5 +258,5 @@ def _compute_pair_factors(scales: Scales, pair: Pair) -> Any:
     """Compute factors that scale the geometric mean of the measures of both components to the levels."""
     if scales.measure is None:
         return scales.values
-    first, second = (scales.measure.positive(motion, motion.name) for motion in pair)
+    first, second = (scales.measure.require_positive_value(motion, motion.name) for motion in pair)
     return scales.values / np.sqrt(first * second)

@@ -125,7 +125,7 @@ class Fragility(Result):
     missing: str = ""
 
     def summary(self) -> str:
-        scale = self.measure.scale
+        scale = self.measure.display_factor
         rows = [
             [
                 curve.limit_state,

@@ -172,7 +172,10 @@ class HazardCurve(Result):
         }
 
     def summary(self) -> str:
-        rows = [[self.measure.scale * x, rate, 1.0 / rate] for x, rate in zip(self.intensity, self.rate, strict=True)]
+        rows = [
+            [self.measure.display_factor * x, rate, 1.0 / rate]
+            for x, rate in zip(self.intensity, self.rate, strict=True)
+        ]
         return format_table([self.measure.label, "annual rate", "return period (years)"], rows)
 
     def _headline(self) -> str:
@@ -192,7 +195,7 @@ def compute_power_laws(hazard: HazardCurve) -> tuple[Floats, Floats]:
 
 def convert_range(hazard: HazardCurve) -> tuple[float, float]:
     """Convert the first and the last intensity to the unit of texts and figures."""
-    low, high = hazard.measure.scale * hazard.intensity[[0, -1]]
+    low, high = hazard.measure.display_factor * hazard.intensity[[0, -1]]
     return float(low), float(high)
 
 

@@ -338,7 +338,12 @@ def _combine_bands(
     lowest = np.full((table.sizes["motion"], len(alpha)), np.inf)
     np.minimum.at(lowest, (motion, block), np.array(starts, dtype=float))
     lowest[np.isinf(lowest)] = np.nan
-    attributes = {"units": measure.units, "long_name": measure.quantity, "label": measure.label, "scale": measure.scale}
+    attributes = {
+        "units": measure.units,
+        "long_name": measure.quantity,
+        "label": measure.label,
+        "scale": measure.display_factor,
+    }
     attributes |= measure.options()
     table = table.assign_coords(level=("level", table.level.values, attributes))
     slenderness = xr.DataArray(alpha, dims="block")

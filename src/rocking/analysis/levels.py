@@ -133,7 +133,7 @@ def _format_sides(sides: Floats) -> str:
 
 def compute_intensities(motions: Sequence[Motion], measure: Measure) -> Floats:
     """Compute the measure of each motion, in SI units."""
-    return np.array([measure.positive(motion, motion.name) for motion in motions])
+    return np.array([measure.require_positive_value(motion, motion.name) for motion in motions])
 
 
 def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integers:
@@ -187,7 +187,7 @@ def number_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> 
 
 def compute_units(blocks: Bodies, measure: Measure, model: Model) -> Floats:
     """Compute the unit of the measure for each block (SI): the block's own unit, or 1."""
-    if not measure.in_block_units:
+    if not measure.has_block_units:
         return np.ones(len(blocks))
     uplift_thresholds = [min(blocks[k].uplift_thresholds(model)) for k in range(len(blocks))]
     return measure.unit(np.array(uplift_thresholds), blocks.parameters()["p"][0].min(axis=1))
@@ -203,7 +203,7 @@ def simulate_levels(
     groups = [np.flatnonzero(units == unit) for unit in np.unique(units)]
     parts = []
     for group in groups:
-        scaled = {"levels": levels * units[group[0]], "measure": measure.alone}
+        scaled = {"levels": levels * units[group[0]], "measure": measure.motion_measure}
         part = simulate_many(blocks.select(group), motions, model=model, **scaled, **options)
         part = part.drop_vars(body_coordinates(blocks.select(group)))  # added to the full table
         parts.append(part.assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units})))

@@ -206,7 +206,7 @@ class Risk(Result):
         low, high = self.hazard.intensity[[0, -1]]
         intensity = np.geomspace(1e-2 * low, 1e2 * high, 800)
         return draw_risk(
-            intensity=self.hazard.measure.scale * intensity,
+            intensity=self.hazard.measure.display_factor * intensity,
             hazard=create_hazard_line(self.hazard, intensity),
             lines=[
                 RiskLine(
@@ -326,7 +326,7 @@ class Survival(Result):
         return np.array([self.curve.intensity_of(probability) for probability in _PROBABILITIES])
 
     @property
-    def unlikely(self) -> float:
+    def never_reached_intensity(self) -> float:
         """Intensity (SI) of one motion that would have exceeded the limit with the requested confidence."""
         return self.curve.intensity_of(self.confidence)
 
@@ -355,7 +355,7 @@ class Survival(Result):
         return math.exp(-high * self.years), math.exp(-low * self.years)
 
     @property
-    def most_probable(self) -> float:
+    def max_probability(self) -> float:
         """Largest `probability` consistent with its interval, the hazard curve and the blocks.
 
         This is the upper end of the interval, without the extrapolations of the hazard curve below its first and above
@@ -372,15 +372,18 @@ class Survival(Result):
         return math.exp(-math.exp(float(low[0])) * years)
 
     @property
-    def contradicts(self) -> bool:
+    def contradicts_hazard(self) -> bool:
         """Whether the survival, at its `most_probable`, is less probable than 1 - confidence."""
-        return self.most_probable < 1.0 - self.confidence
+        return self.max_probability < 1.0 - self.confidence
 
     def summary(self) -> str:
         measure, percent = self.measure, f"{100.0 * self.confidence:g} %"
         header = [measure.label, "probability", "at most a year", "at most once in (years)"]
         columns: list[list[Any]] = [
-            [format_within(x, self._known_range, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
+            [
+                format_within(x, self._known_range, lambda end: f"{measure.display_factor * end:.5g}")
+                for x in self.intensity
+            ],
             [*_PROBABILITIES],
             [f"{rate:.2g}" for rate in self.largest_rate],
             [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
@@ -418,10 +421,10 @@ class Survival(Result):
 
     @property
     def _never_text(self) -> str:
-        text = format_intensity(min(self.unlikely, self._known_range[1]), self.measure)
+        text = format_intensity(min(self.never_reached_intensity, self._known_range[1]), self.measure)
         return (
             f"some intensity above {text}, beyond the data"
-            if self.unlikely > self._known_range[1]
+            if self.never_reached_intensity > self._known_range[1]
             else f"{text} or more"
         )
 
@@ -433,7 +436,7 @@ class Survival(Result):
         estimate, likeliest = (f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})", self.probability)
         if self.several_blocks:
             estimate = (
-                f"at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {estimate} if each "
+                f"at most {self.max_probability:.2g} if one of the blocks has stood all the time, and {estimate} if each "
                 "motion met another of them"
             )
         if not math.isnan(self.mean_probability):
@@ -445,7 +448,7 @@ class Survival(Result):
         threshold = f"{1.0 - self.confidence:.3g}"
         if likeliest >= 1.0 - self.confidence:
             return f"{text}, so they do not contradict each other"
-        if not self.contradicts:
+        if not self.contradicts_hazard:
             return f"{text}; below {threshold} they would contradict each other, which is not settled"
         return (
             f"{text}; all of that is below {threshold}, so they contradict each other: the hazard curve is "
@@ -458,7 +461,7 @@ class Survival(Result):
             "limit_state": self.curve.limit_state,
             "years": self.years,
             "confidence": self.confidence,
-            f"most_likely_never_{column}": self.unlikely,
+            f"most_likely_never_{column}": self.never_reached_intensity,
             "probability_of_exceedance": [*_PROBABILITIES],
             column: self.intensity,
             "largest_annual_rate": self.largest_rate,
@@ -469,11 +472,11 @@ class Survival(Result):
             "hazard_annual_rate": self.hazard.rate_of(self.intensity),
             "probability": self.probability,
             "probability_interval": [*self.interval],
-            "most_probable": self.most_probable,
+            "most_probable": self.max_probability,
             "mean_probability": self.mean_probability,
             "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
             "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
-            "contradicts": self.contradicts,
+            "contradicts": self.contradicts_hazard,
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -487,7 +490,7 @@ class Survival(Result):
         intensity = np.geomspace(min(ends), max(ends), 200)
         intensity = intensity[self.curve.probability(intensity) > _FIGURE_RANGE[0] * 0.1]
         return draw_survival(
-            intensity=self.measure.scale * intensity,
+            intensity=self.measure.display_factor * intensity,
             largest=self.curve.largest_rate(intensity, self.years, self.confidence),
             largest_label=f"at most, with {format_count(self.years, 'year')} without {self.curve.limit_state} "
             f"({100.0 * self.confidence:g} %)",

@@ -62,7 +62,7 @@ class BlockUnderRecords(Result):
 
     def _create_labels(self) -> list[dict[str, Any]]:
         """Create the first columns of each row: record, motion, block."""
-        columns = body_coordinates(self.block.alone())
+        columns = body_coordinates(self.block.to_bodies())
         numbers = {
             add_unit(name, attributes["units"]): float(values[0]) for name, (_, values, attributes) in columns.items()
         }
@@ -123,7 +123,7 @@ class Survey(BlockUnderRecords):
         return super()._headline() + undecided_text + skipped_text
 
     def to_dict(self) -> dict[str, Any]:
-        numbers = self.block.alone().parameters().items()
+        numbers = self.block.to_bodies().parameters().items()
         block = {
             "description": self.block.description,
             **{add_unit(name, unit): values[0].tolist() for name, (values, unit) in numbers},
@@ -133,7 +133,7 @@ class Survey(BlockUnderRecords):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Check(BlockUnderRecords):
+class RuleComparison(BlockUnderRecords):
     """Comparison of rules of thumb with simulations for a block under several motions, computed by `check`.
 
     Attributes
@@ -147,14 +147,14 @@ class Check(BlockUnderRecords):
 
     See Also
     --------
-    rocking.rules.check : Run the comparison.
+    rocking.rules.compare_rules : Run the comparison.
     """
 
     ratios: tuple[Mapping[str, float], ...]
     margins: tuple[float, ...]
 
     @property
-    def falls_under_less(self) -> tuple[bool, ...]:
+    def overturns_when_scaled_down(self) -> tuple[bool, ...]:
         """Whether the block stands under each motion, but overturns under the same motion scaled down."""
         pairs = zip(self.responses, self.margins, strict=True)
         return tuple(margin > 1.0 and not (response.overturned or response.unfinished) for response, margin in pairs)
@@ -170,12 +170,17 @@ class Check(BlockUnderRecords):
                 "lowest_factor": 1.0 / margin,
                 "peak_over_slenderness": response.peak_over_slenderness,
                 "overturned": response.overturned,
-                "falls_under_less": overturns_under_less,
+                "overturns_when_scaled_down": overturns_under_less,
                 "verdict": format_brief_outcome(response, PRECISION)
                 + (f"; overturns at x {_format_factor(1.0 / margin)}" if overturns_under_less else ""),
             }
             for label, response, ratios, margin, overturns_under_less in zip(
-                self._create_labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
+                self._create_labels(),
+                self.responses,
+                self.ratios,
+                self.margins,
+                self.overturns_when_scaled_down,
+                strict=True,
             )
         ]
 
@@ -205,14 +210,14 @@ class Check(BlockUnderRecords):
         return super().to_dict() | {"notes": self._list_notes()}
 
     def _list_notes(self) -> list[str]:
-        return [] if self.block.alone().is_symmetric else [MIRROR_NOTE]
+        return [] if self.block.to_bodies().is_symmetric else [MIRROR_NOTE]
 
     def _headline(self) -> str:
         return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
 
     def _count_disagreements(self, rules: list[str]) -> list[str]:
         """Count the errors of each rule, without records for which no single number can be right."""
-        lines, excluded = [], self.falls_under_less
+        lines, excluded = [], self.overturns_when_scaled_down
         compared = [
             (ratios, response.overturned)
             for ratios, response, is_ambiguous in zip(self.ratios, self.responses, excluded, strict=True)
@@ -278,7 +283,7 @@ def survey(
     See Also
     --------
     rocking.simulate_many : Simulate many blocks under many motions.
-    rocking.rules.check : Compare rules of thumb with simulations.
+    rocking.rules.compare_rules : Compare rules of thumb with simulations.
 
     Examples
     --------

@@ -80,7 +80,7 @@ class Body(Protocol):
         exist.
         """
 
-    def alone(self) -> Bodies:
+    def to_bodies(self) -> Bodies:
         """Return bodies that contain only this one, for a block `rocking.Blocks`."""
 
 

@@ -294,7 +294,7 @@ def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[
 
 
 def _pair_with_motions(table: _Table, measure: Measure, **metadata: Any) -> dict[str, Any]:
-    if measure.in_block_units:
+    if measure.has_block_units:
         raise InvalidOption(f"{measure.name} is in units of the block, which is unknown for observed outcomes; use pga")
     motions = _load_row_motions(table, **metadata)
     motions_by_name = {

@@ -51,7 +51,7 @@ from rocking.records.named import (
 from rocking.response import Response
 from rocking.response.mechanics import check_friction
 from rocking.response.perturbed import PRECISION, choose_steps
-from rocking.rules import check as apply_rules
+from rocking.rules import compare_rules
 from rocking.simulation.simulate import simulate as run_simulation
 
 
@@ -168,7 +168,7 @@ def check(
     with output.folder() as folder:
         loaded = motion.read_all(names)
         comparison = replace(
-            apply_rules(body, loaded.motions, rules=rule_names, model=model.model), skipped=loaded.skipped
+            compare_rules(body, loaded.motions, rules=rule_names, model=model.model), skipped=loaded.skipped
         )
         result = comparison.to_dict()
         if folder is not None:

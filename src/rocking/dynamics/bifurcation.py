@@ -117,7 +117,7 @@ class BifurcationDiagram(DatasetResult):
         return {
             "parameter": data.parameter,
             "cases": data.cases,
-            "transient": data.transient,
+            "transient_periods": data.transient,
             "kept": data.sizes["iterate"],
             "direction": data.direction.values.tolist(),
             "value": data.value.values,
@@ -157,8 +157,8 @@ def bifurcation_diagram(
     starts: ArrayLike,
     *,
     direction: Direction = "up",
-    transient: int = 200,
-    recorded: int = 64,
+    transient_periods: int = 200,
+    recorded_periods: int = 64,
     parameter: str = "parameter",
     model: Model | None = None,
     chattering: str | ChatteringScheme = "certified",
@@ -176,7 +176,7 @@ def bifurcation_diagram(
     direction : {"up", "down", "both", "afresh"}
         Order of the values. Up or down: orbits continue from the last state at the previous value, or from the initial
         state if this is unknown (for example after overturning). Afresh: every value starts from the initial states.
-    transient, recorded : int
+    transient_periods, recorded_periods : int
         Numbers of discarded and of recorded periods at each value. Near a bifurcation orbits settle slowly. After a
         short transient, no period may be found, or the previous one.
     parameter : str
@@ -218,8 +218,8 @@ def bifurcation_diagram(
     if initial_states.ndim not in (1, 2) or initial_states.shape[-1] != 2 or initial_states.size == 0:
         raise InvalidOption("{} must be one pair (coordinate, velocity) or several", "starts")
     initial_states = initial_states.reshape(-1, 2)
-    n_transient = checks.integer(transient, "transient", InvalidOption, minimum=0)
-    n_recorded = checks.integer(recorded, "recorded", InvalidOption, minimum=2)
+    n_transient = checks.integer(transient_periods, "transient_periods", InvalidOption, minimum=0)
+    n_recorded = checks.integer(recorded_periods, "recorded_periods", InvalidOption, minimum=2)
     parameter_name = checks.text(parameter, "parameter", InvalidOption)
     checks.grid_size({"values": parameters.size, "starts": len(initial_states), "recorded": n_recorded}, InvalidOption)
 
@@ -286,7 +286,7 @@ def bifurcation_diagram(
             "parameter": parameter_name,
             "cases": " under ".join(texts),
             "model": end_maps[0].model,
-            "transient": n_transient,
+            "transient_periods": n_transient,
         },
     )
     return BifurcationDiagram(dataset)
@@ -308,21 +308,23 @@ def _move_before_stops(strobe: StroboscopicMap, states: Floats) -> Floats:
     return np.stack([clipped, np.where(is_stopped, 0.0, states[:, 1])], axis=-1)
 
 
-def record_states(strobe: StroboscopicMap, starts: Floats, transient: int, recorded: int) -> tuple[Floats, Integers]:
+def record_states(
+    strobe: StroboscopicMap, starts: Floats, transient_periods: int, recorded_periods: int
+) -> tuple[Floats, Integers]:
     """Compute states at the starts of periods after a transient, shape (n, recorded, 2), and each `PeriodOutcome`."""
     states, current, outcomes = (
-        np.full((len(starts), recorded, 2), np.nan),
+        np.full((len(starts), recorded_periods, 2), np.nan),
         starts,
         np.full(len(starts), PeriodOutcome.MOVES.value),
     )
-    if transient:
-        current, outcomes, _ = strobe.advance(starts, transient)
+    if transient_periods:
+        current, outcomes, _ = strobe.advance(starts, transient_periods)
     moves = ~np.isnan(current[:, 0])
     if moves.any():
-        states[moves] = strobe.orbit(current[moves], recorded)[:, 1:]
+        states[moves] = strobe.orbit(current[moves], recorded_periods)[:, 1:]
     lost = moves & np.isnan(states[:, -1, 0])
     if lost.any():
-        outcomes[lost] = strobe.advance(current[lost], recorded)[1]
+        outcomes[lost] = strobe.advance(current[lost], recorded_periods)[1]
     return states, outcomes
 
 
@@ -437,7 +439,7 @@ def lyapunov_exponents(
     state: ArrayLike,
     n_periods: int = 1000,
     *,
-    transient: int = 200,
+    transient_periods: int = 200,
     model: Model | None = None,
     chattering: str | ChatteringScheme = "certified",
 ) -> LyapunovExponents:
@@ -451,7 +453,7 @@ def lyapunov_exponents(
         Coordinate and velocity at the start of a period.
     n_periods : int
         Number of averaged periods.
-    transient : int
+    transient_periods : int
         Number of preceding periods, in which the direction aligns with the fastest growth.
     model, chattering : str, optional
         As in `stroboscopic_map`.
@@ -496,7 +498,7 @@ def lyapunov_exponents(
         )
     strobe._check_starts(initial_state, "state")
     count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=_N_BATCHES)
-    n_transient = checks.integer(transient, "transient", InvalidOption, minimum=0)
+    n_transient = checks.integer(transient_periods, "transient_periods", InvalidOption, minimum=0)
     record, arguments = strobe._to_records(initial_state[None])[1][0], strobe._create_derivative_arguments()
     frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((n_transient + count, 2), np.nan), 0
     for start, stop in pairwise(

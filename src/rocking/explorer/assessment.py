@@ -26,7 +26,7 @@ from rocking.inputs.quantities import read_number
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.response.mechanics import check_friction
-from rocking.rules import overturning_velocity, rate
+from rocking.rules import apply_rules, overturning_velocity
 from rocking.simulation.simulate import simulate
 
 #: Minimum and maximum number of levels of a fragility.
@@ -237,7 +237,7 @@ def _describe_record(assessment: Assessment, motion: Motion) -> dict[str, Any]:
 
 def _rate_motion(case: Case, motion: Motion) -> dict[str, Any]:
     """Return measures of a motion, and demand divided by capacity by every rule."""
-    ratings = rate(case.block, motion, ["west", "ishiyama"])
+    ratings = apply_rules(case.block, motion, ["west", "ishiyama"])
     ratios = {name: float(rating.ratio[0]) for name, rating in ratings.items()}
     uplift = motion.pga / min(case.block.uplift_thresholds(case.model))
     return {"pga": motion.pga, "pgv": motion.pgv, "ratios": {"uplift": uplift, **ratios}}

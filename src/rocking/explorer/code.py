@@ -86,7 +86,7 @@ print(rock.orbit(({rotation!r}, {velocity!r}), {last})[-{recorded}:])
 
 found = dynamics.bifurcation_diagram(
     case, {values}, (0.0, 0.0), direction="both",
-    transient={transient}, recorded={recorded}, parameter={name!r}{options}
+    transient_periods={transient}, recorded_periods={recorded}, parameter={name!r}{options}
 )
 print(found.summary())
 """

@@ -16,7 +16,7 @@ from rocking.errors import RockingError
 from rocking.explorer.apart import read_mesh, read_mesh_in_process
 from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.quantities import read_densities, read_number
-from rocking.solid import Rose, Solid
+from rocking.solid import ResistanceRose, Solid
 from rocking.solid.solid import Plane, compute_plane
 from rocking.solid.support import compute_directions
 
@@ -52,7 +52,7 @@ class MeshBody:
     call: str
 
     @cached_property
-    def rose(self) -> Rose:
+    def rose(self) -> ResistanceRose:
         """Resistance of the body in every direction."""
         return self.solid.rose(_AZIMUTHS)
 

@@ -129,7 +129,9 @@ def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
     )
     for kind, value, is_odd in (("weakest", weakest, weakest > highest), ("strongest", strongest, strongest < lowest)):
         if is_odd:
-            return (f"even the {kind} motions of the hazard curve have {measure.shown(value)}: are its units right?",)
+            return (
+                f"even the {kind} motions of the hazard curve have {measure.format_value(value)}: are its units right?",
+            )
     return ()
 
 

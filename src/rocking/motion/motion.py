@@ -183,7 +183,7 @@ class Motion(Processable):
         the scaled motion would exceed the supported range.
         """
         multiplier = checks.finite(factor, "factor", InvalidMotion)
-        return self._multiply(multiplier, FACTOR.scaling(multiplier, multiplier))
+        return self._multiply(multiplier, FACTOR.describe_scaling(multiplier, multiplier))
 
     def scaled_to(self, level: float, measure: MeasureName | Measure = "pga") -> Motion:
         """Return the motion scaled to a level of an intensity measure.
@@ -216,8 +216,8 @@ class Motion(Processable):
         if intensity_measure.name == "factor":
             return self.scaled(level)
         target = checks.positive(level, "level", InvalidMotion, intensity_measure.units)
-        factor = target / intensity_measure.positive(self, self.name)
-        return self._multiply(factor, intensity_measure.scaling(target, factor))
+        factor = target / intensity_measure.require_positive_value(self, self.name)
+        return self._multiply(factor, intensity_measure.describe_scaling(target, factor))
 
     def with_vertical(self, vertical: Motion | None) -> Motion:
         """Return the motion with a vertical component, which changes the effective gravity.

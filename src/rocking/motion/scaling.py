@@ -106,7 +106,7 @@ class Measure:
         return add_unit(self.name, self.units)
 
     @property
-    def scale(self) -> float:
+    def display_factor(self) -> float:
         """Factor from SI units to display units: accelerations in g."""
         return 1.0 / STANDARD_GRAVITY if self.units == "m/s^2" else 1.0
 
@@ -129,38 +129,42 @@ class Measure:
     @property
     def label(self) -> str:
         """Name and units for display."""
-        return self.quantity + (f" ({self.shown_in})" if self.shown_in else "")
+        return self.quantity + (f" ({self.display_unit})" if self.display_unit else "")
 
     @property
-    def shown_in(self) -> str:
+    def display_unit(self) -> str:
         """Units for display, empty for a dimensionless measure."""
         return {"m/s^2": "g", "m/s": "m/s", "1": ""}[self.units]
 
-    def shown(self, value: float) -> str:
+    def format_value(self, value: float) -> str:
         """Return a value with its unit, to six digits, and accelerations also in g."""
         if self.units == "m/s^2":
             return f"{value:.6g} m/s^2 ({value / STANDARD_GRAVITY:.4g} g)"
         return f"{value:.6g}" if self.units == "1" else f"{value:.6g} {self.units}"
 
     @property
-    def of_motion(self) -> Literal["factor", "pga", "pgv", "sa"]:
+    def motion_measure_name(self) -> Literal["factor", "pga", "pgv", "sa"]:
         """Name of the underlying measure of the motion alone."""
         return {"pga_ratio": "pga", "pgv_ratio": "pgv"}.get(self.name, self.name)  # type: ignore[return-value]
 
     @property
-    def alone(self) -> Measure:
+    def motion_measure(self) -> Measure:
         """Underlying measure of the motion alone."""
-        return self if self.of_motion == self.name else Measure(self.of_motion, self.period, self.damping)
+        return (
+            self
+            if self.motion_measure_name == self.name
+            else Measure(self.motion_measure_name, self.period, self.damping)
+        )
 
     def value(self, motion: MotionMeasures) -> float:
         """Return the measure of a motion alone, in SI units, or 1 if levels are factors."""
         if self.period is not None:
             return float(motion.spectral_acceleration(self.period, self.damping))
-        if self.of_motion == "factor":
+        if self.motion_measure_name == "factor":
             return 1.0
-        return motion.pga if self.of_motion == "pga" else motion.pgv
+        return motion.pga if self.motion_measure_name == "pga" else motion.pgv
 
-    def positive(self, motion: MotionMeasures, name: str) -> float:
+    def require_positive_value(self, motion: MotionMeasures, name: str) -> float:
         """Return `value`, or raise an error for a motion `name` that is zero throughout."""
         value = self.value(motion)
         if not value > 0.0:
@@ -168,7 +172,7 @@ class Measure:
         return value
 
     @property
-    def in_block_units(self) -> bool:
+    def has_block_units(self) -> bool:
         """Whether the measure has a separate unit for each block."""
         return self.name in ("pga_ratio", "pgv_ratio")
 
@@ -183,12 +187,12 @@ class Measure:
         """Return period (s) and damping of "sa", or nothing for other measures."""
         return {} if self.period is None else {"period": self.period, "damping": self.damping}
 
-    def scaling(self, level: float, factor: float) -> str:
+    def describe_scaling(self, level: float, factor: float) -> str:
         """Return the history sentence of a motion that was scaled to a level (SI units)."""
         if self.name == "factor":
             return f"scaled by {factor:.6g}"
         oscillator = "" if self.period is None else f" at {self.period:.6g} s, damping {self.damping:.6g}"
-        return f"scaled by {factor:.6g} to a {_UNITS_AND_NAMES[self.name][1]} of {self.shown(level)}{oscillator}"
+        return f"scaled by {factor:.6g} to a {_UNITS_AND_NAMES[self.name][1]} of {self.format_value(level)}{oscillator}"
 
 
 #: Factor on unscaled motions.

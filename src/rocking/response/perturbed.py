@@ -69,14 +69,14 @@ class Perturbed(Result):
     scaled: str
 
     @property
-    def within(self) -> float:
+    def max_deviation(self) -> float:
         """Largest relative distance of a factor from 1."""
         return self.relative * max(1, len(self.repeats) - 2)
 
     @property
-    def sample(self) -> str:
+    def sample_text(self) -> str:
         """Text with the number of simulations, the scaled input and the range of factors."""
-        return f"{len(self.repeats)} {self.scaled} within {format_percent(self.within)}"
+        return f"{len(self.repeats)} {self.scaled} within {format_percent(self.max_deviation)}"
 
     @property
     def factors(self) -> Floats:
@@ -96,17 +96,17 @@ class Perturbed(Result):
     @property
     def peak_range(self) -> tuple[float, float]:
         """Smallest and largest peak among the simulations with the outcome of factor 1, rad."""
-        return _find_range([repeat.peak for repeat in self.alike])
+        return _find_range([repeat.peak for repeat in self.agreeing_repeats])
 
     @property
     def peak_time_range(self) -> tuple[float, float]:
         """Earliest and latest time of the peak among the simulations with the outcome of factor 1, s."""
-        return _find_range([repeat.peak_time for repeat in self.alike])
+        return _find_range([repeat.peak_time for repeat in self.agreeing_repeats])
 
     @property
     def overturn_range(self) -> tuple[float, float]:
         """Earliest and latest time of overturning, s; NaN if the block does not overturn at factor 1."""
-        return _find_range([repeat.overturn_time for repeat in self.alike])
+        return _find_range([repeat.overturn_time for repeat in self.agreeing_repeats])
 
     @property
     def event_ranges(self) -> Floats:
@@ -134,26 +134,26 @@ class Perturbed(Result):
         return self.repeats[len(self.repeats) // 2]
 
     @property
-    def alike(self) -> list[Repeat]:
+    def agreeing_repeats(self) -> list[Repeat]:
         """Simulations with the outcome of factor 1."""
         return [repeat for repeat in self.repeats if _merge(repeat.outcome) == _merge(self._middle.outcome)]
 
     @property
     def outcome(self) -> str:
         """Outcome at factor 1, as a verb. A block that moves only for other factors "stands"."""
-        outcomes = [self._middle.outcome, *(repeat.outcome for repeat in self.alike)]
+        outcomes = [self._middle.outcome, *(repeat.outcome for repeat in self.agreeing_repeats)]
         return next((outcome for outcome in outcomes if outcome != UNMOVED), UNMOVED)
 
-    def share(self) -> str:
+    def describe_agreement(self) -> str:
         """Return as text the number of simulations with the outcome of factor 1, and the range of factors."""
-        return f"{self.outcome} in {len(self.alike)} of {self.sample}"
+        return f"{self.outcome} in {len(self.agreeing_repeats)} of {self.sample_text}"
 
-    def sentence(self) -> str:
+    def describe_outcome(self) -> str:
         """Return the outcome as text: `share`, or "undecided" and the number of overturnings if outcomes differ."""
         if self.is_decided:
-            return self.share()
+            return self.describe_agreement()
         overturned = int(np.count_nonzero(self.overturned))
-        return f"undecided: {f'{OVERTURNS} in {overturned} of {self.sample}' if overturned else self.share()}"
+        return f"undecided: {f'{OVERTURNS} in {overturned} of {self.sample_text}' if overturned else self.describe_agreement()}"
 
     def _columns(self, table: str) -> list[Column]:
         (name, _, _, unit, _), columns = self.coordinate, list(zip(*self.repeats, strict=True))
@@ -172,12 +172,12 @@ class Perturbed(Result):
 
     def summary(self) -> str:
         differences = Column("away", [f"{factor - 1.0:+.2g}" for factor in self.factors], label="factor - 1")
-        return f"{self.sentence()}\n\n{format_columns([differences, *self._columns('repeats')])}"
+        return f"{self.describe_outcome()}\n\n{format_columns([differences, *self._columns('repeats')])}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
             "relative": self.relative,
-            "within": self.within,
+            "within": self.max_deviation,
             "decided": self.is_decided,
             "overturned": int(np.count_nonzero(self.overturned)),
             "count": len(self.repeats),

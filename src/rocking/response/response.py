@@ -132,7 +132,7 @@ class Response(Simulated):
         ]
 
     def _list_parameters(self) -> dict[str, Any]:
-        parameters = self.block.alone().parameters().items()
+        parameters = self.block.to_bodies().parameters().items()
         gravity = {add_unit("gravity", "m/s^2"): self.block.gravity}
         return {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters} | gravity
 

@@ -79,12 +79,12 @@ def build_rows(response: Simulated, friction: float | None, precision: float) ->
         np.max(np.nan_to_num(perturbed.event_spreads, nan=math.inf), initial=0.0) >= _MIN_RANGE
         or _count_peak_digits(response) < _MIN_DIGITS
     ):
-        rows.append(Row("ranges", f"those of the {perturbed.sample}; other factors can lead beyond them"))
+        rows.append(Row("ranges", f"those of the {perturbed.sample_text}; other factors can lead beyond them"))
     without_sliding = "" if math.isnan(sliding) else " (as if it did not slide)"
     return [
         *rows,
         Row("outcome", _describe_outcome(response), note=without_sliding),
-        Row("", response.perturbed(*choose_steps(precision)).share()),
+        Row("", response.perturbed(*choose_steps(precision)).describe_agreement()),
     ]
 
 
@@ -127,7 +127,7 @@ def format_brief_outcome(response: Simulated, precision: float) -> str:
         shares = [int(repeats.overturned.sum()) for repeats in (perturbed, within_precision)]
         text = "undecided: overturns"
     else:
-        shares = [len(repeats.alike) for repeats in (perturbed, within_precision)]
+        shares = [len(repeats.agreeing_repeats) for repeats in (perturbed, within_precision)]
         text = perturbed.outcome if perturbed.is_decided else f"undecided: {perturbed.outcome}"
     if response.overturned and perturbed.is_decided:
         text += (
@@ -138,7 +138,7 @@ def format_brief_outcome(response: Simulated, precision: float) -> str:
     elif response.stopped:
         text = _describe_stop(response) if perturbed.is_decided else text
     parts = [
-        f"{share} of {len(repeats.repeats)} ({format_percent(repeats.within)})"
+        f"{share} of {len(repeats.repeats)} ({format_percent(repeats.max_deviation)})"
         for share, repeats in zip(shares, (perturbed, within_precision), strict=True)
     ]
     return f"{text} in {', '.join(parts)}{', AMBIGUOUS' if response.ambiguous else ''}"
@@ -195,7 +195,7 @@ def _summarize_motion(response: Simulated) -> str:
 def _describe_thresholds(response: Simulated) -> str:
     """Return the uplift thresholds, which vary with the weight under vertical motion."""
     motion = response.motion
-    (pair,), (weight_part,) = compute_thresholds(response.block.alone(), response.model)
+    (pair,), (weight_part,) = compute_thresholds(response.block.to_bodies(), response.model)
     plus, minus = (pair / STANDARD_GRAVITY).tolist()
     is_single = plus == minus or math.isinf(minus)
     text = f"{plus:.4f} g" if is_single else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"
@@ -260,7 +260,7 @@ def _build_peak_rows(response: Simulated) -> list[Row]:
         ratios = f"{low / balance:.3g} to {high / balance:.3g}" if shows_range else format_ratio(response)
         note += f", {ratios} of the {limit}"
     if not perturbed.is_decided:
-        note += f", in {len(perturbed.alike)} of {len(perturbed.repeats)} {perturbed.scaled}"
+        note += f", in {len(perturbed.agreeing_repeats)} of {len(perturbed.repeats)} {perturbed.scaled}"
     return [Row(f"peak {name}", value, unit, note)]
 
 
@@ -273,7 +273,7 @@ def _describe_balance(response: Simulated) -> str:
 
 
 def _describe_outcome(response: Simulated) -> str:
-    text = response.perturbed().sentence()
+    text = response.perturbed().describe_outcome()
     if response.overturned:
         text += f", at {format_time(response.overturn_time, *response.perturbed().overturn_range)}"
     elif response.unfinished or response.stopped:

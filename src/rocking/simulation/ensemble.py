@@ -110,7 +110,7 @@ class Scales:
     def factors(self, motion: Motion) -> Floats:
         """Return the factor that scales a motion to each level."""
         with np.errstate(over="ignore"):
-            factors = self.values / (self.measure or FACTOR).positive(motion, motion.name)
+            factors = self.values / (self.measure or FACTOR).require_positive_value(motion, motion.name)
             largest = factors.max() * np.abs(motion.coefficients).max()
         if not largest <= MAX_ACCELERATION:
             motion.scaled(float(factors.max()))  # raises for too strong motions, not only steep ones

@@ -1,5 +1,5 @@
 from .mesh import Region
-from .rose import Rose
+from .rose import ResistanceRose
 from .solid import Solid
 
-__all__ = ["Region", "Rose", "Solid"]
+__all__ = ["Region", "ResistanceRose", "Solid"]

@@ -25,7 +25,7 @@ DEFAULT_AZIMUTHS: Final = np.arange(0.0, 360.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rose(DatasetResult):
+class ResistanceRose(DatasetResult):
     """Resistance of a body to rocking in every direction, returned by `Solid.rose`.
 
     The figure shows the uplift acceleration in each direction. Inside is the support polygon about the centre of mass,
@@ -125,7 +125,7 @@ def check_azimuths(azimuths: ArrayLike | None) -> Floats:
 
 def compute_rose(
     polygon: Floats, height: float, inertia: Floats, gravity: float, azimuths: Floats, description: str
-) -> Rose:
+) -> ResistanceRose:
     """Return the rose from the support about the centre of mass, its height, m, and `inertia_over_mass`, m^2."""
     import xarray as xr
 
@@ -153,7 +153,7 @@ def compute_rose(
             "m",
         ),
     }
-    return Rose(
+    return ResistanceRose(
         xr.Dataset(
             {
                 **{name: variable("azimuth", values, label, unit) for name, (values, label, unit) in columns.items()},

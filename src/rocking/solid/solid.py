@@ -20,7 +20,7 @@ from rocking.core.tables import format_count
 from rocking.errors import InvalidBlock
 from rocking.solid import support as polygons
 from rocking.solid.mesh import Region, compute_properties
-from rocking.solid.rose import Rose, check_azimuths, compute_axis_moments, compute_rose
+from rocking.solid.rose import ResistanceRose, check_azimuths, compute_axis_moments, compute_rose
 
 if TYPE_CHECKING:
     from rocking.solid.mesh import Mesh
@@ -57,7 +57,7 @@ class Solid(Result):
 
     See Also
     --------
-    rocking.solid.Rose : Resistance to rocking in every direction.
+    rocking.solid.ResistanceRose : Resistance to rocking in every direction.
     Block : Block that rocks in a plane.
 
     Notes
@@ -236,8 +236,8 @@ class Solid(Result):
             description=f"{self.description} in the plane of {plane.azimuth:.5g} deg",
         )
 
-    def rose(self, azimuths: ArrayLike | None = None) -> Rose:
-        """Return the resistance at azimuths (degrees clockwise from north; by default every five) as a `Rose`."""
+    def rose(self, azimuths: ArrayLike | None = None) -> ResistanceRose:
+        """Return the resistance at azimuths (degrees clockwise from north; by default every five) as a `ResistanceRose`."""
         angles = check_azimuths(azimuths)
         height = float(self.centre[2])
         return compute_rose(

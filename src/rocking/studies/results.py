@@ -308,13 +308,16 @@ class BlockTable(DatasetResult):
             plotted = plotted.isel(fractile=int(np.argmin(np.abs(plotted.fractile.values - 0.5))))
             measure = _parse_measure(plotted.scale.attrs)
             is_factor = measure.name == "factor"
-            name, unit = "factor" if is_factor else measure.short_name, measure.shown_in
-            names = [f"{name} {measure.scale * value:.4g} {unit}".rstrip() for value in plotted.scale.values]
+            name, unit = "factor" if is_factor else measure.short_name, measure.display_unit
+            names = [
+                f"{name} {measure.display_factor * value:.4g} {unit}".rstrip()
+                for value in plotted.display_factor.values
+            ]
             panels, missing = plotted.values, "overturns"
             label = f"{100.0 * float(plotted.fractile):g} % fractile of peak rotation over slenderness"
         else:
             measure, names = _parse_measure(self.data.attrs), [str(name) for name in plotted.limit_state.values]
-            panels, missing, label = measure.scale * plotted.values, "no curve fits", f"median {measure.label}"
+            panels, missing, label = measure.display_factor * plotted.values, "no curve fits", f"median {measure.label}"
         p, alpha = (
             np.mean([parameters[key] for key in (name, f"{name}_plus", f"{name}_minus") if key in parameters], axis=0)
             for name in ("p", "alpha")
@@ -537,7 +540,7 @@ def _compute_intensities(product: Product, measure: Measure) -> Floats:
     """Compute the intensity of every motion at every scale, shape (motions, scales)."""
     scales = product.scales
     values = compute_intensities(product.motions, measure)
-    if scales.measure == measure.alone:
+    if scales.measure == measure.motion_measure:
         return np.tile(scales.values, (len(values), 1))  # the input values, bit for bit
     factors = np.array([scales.factors(motion) for motion in product.motions])
     return np.asarray(np.abs(factors) * values[:, None])
