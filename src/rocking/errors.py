@@ -94,6 +94,11 @@ class RockingError(Exception):
     path, line, value
         As above.
 
+    See Also
+    --------
+    rocking.errors.InvalidOption : Report an invalid argument of an analysis.
+    rocking.errors.InvalidBlock : Report an invalid block.
+
     Examples
     --------
     >>> error = InvalidMotion("{} must be positive, in s, not -1", "dt", path="a.csv", line=3, value=-1)
@@ -126,26 +131,99 @@ class RockingError(Exception):
 
 
 class InvalidBlock(RockingError):
-    """Sizes or parameters do not describe a block that stands and rocks."""
+    """Sizes or parameters do not describe a block that stands and rocks.
+
+    See Also
+    --------
+    rocking.Block : Create a block.
+    rocking.RockingError : Catch all errors of the package.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> rocking.Block(width=-0.4, height=2.0)
+    Traceback (most recent call last):
+        ...
+    rocking.errors.InvalidBlock: width must be a positive number, in m, not -0.4
+    """
 
 
 class UnequalSides(InvalidBlock, AttributeError):
     """A property of one value was requested for a block with unequal sides (see `Block.sides`).
 
     It is also an AttributeError, so that tools that inspect all attributes of an object skip the property.
+
+    See Also
+    --------
+    rocking.block.Side : Describe one side of a block.
+    rocking.errors.InvalidBlock : Report an invalid block.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0, offset=0.05)
+    >>> block.alpha
+    Traceback (most recent call last):
+        ...
+    rocking.errors.UnequalSides: alpha is 0.14889 on side + and 0.244979 on side - of this block: ...
+    >>> f"{block.sides[0].alpha:.4f}"
+    '0.1489'
     """
 
 
 class InvalidMotion(RockingError):
-    """Samples, step or parameters of a ground motion are invalid."""
+    """Samples, step or parameters of a ground motion are invalid.
+
+    See Also
+    --------
+    rocking.Motion : Create a ground motion.
+    rocking.errors.UnreadableRecord : Report an unreadable record file.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> rocking.Motion.from_samples([0.0, 1.0, 0.0], dt=-0.01)
+    Traceback (most recent call last):
+        ...
+    rocking.errors.InvalidMotion: dt must be a positive number, in s, not -0.01
+    """
 
 
 class UnreadableRecord(RockingError):
-    """A record file could not be read. The message names the file and, if known, the line."""
+    """A record file could not be read. The message names the file and, if known, the line.
+
+    See Also
+    --------
+    rocking.read : Read a motion from a record file.
+    rocking.errors.InvalidMotion : Report invalid samples.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> rocking.read("missing.at2")
+    Traceback (most recent call last):
+        ...
+    rocking.errors.UnreadableRecord: missing.at2: there is no such file; check the name and the folder
+    """
 
 
 class InvalidOption(RockingError):
-    """An argument of an analysis (model, chattering scheme, duration, ...) is invalid."""
+    """An argument of an analysis (model, chattering scheme, duration, ...) is invalid.
+
+    See Also
+    --------
+    rocking.RockingError : Catch all errors of the package.
+    rocking.errors.Unfitted : Report outcomes that determine no curve.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0)
+    >>> rocking.simulate(block, None, model="exact")
+    Traceback (most recent call last):
+        ...
+    rocking.errors.InvalidOption: model must be one of nonlinear, linear, not 'exact'
+    """
 
 
 class Unfitted(InvalidOption):
@@ -155,21 +233,84 @@ class Unfitted(InvalidOption):
     ----------
     outcomes : pandas.DataFrame or None
         All simulations, as in `Fragility.outcomes`, or None.
+
+    See Also
+    --------
+    rocking.fragility : Simulate the outcomes and fit the curves.
+    rocking.fit_fragility : Fit curves to given outcomes.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0)
+    >>> try:
+    ...     rocking.fragility(block, [rocking.pulses.one_sine(4.0, 1.0)], levels=[0.1, 5.0])
+    ... except rocking.errors.Unfitted as error:
+    ...     print(error.outcomes["overturned"].tolist())
+    [False, True]
     """
 
     outcomes: pd.DataFrame | None = None
 
 
 class Unfinished(RockingError):
-    """An analysis has no result because a simulation was abandoned after too many steps."""
+    """An analysis has no result because a simulation was abandoned after too many steps.
+
+    See Also
+    --------
+    rocking.critical_scale : Find one critical scale with its derivatives.
+    rocking.simulate : Simulate one block and keep a partial response.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block, pulse = rocking.Block(width=0.4, height=2.0), rocking.pulses.one_sine(4.0, 1.0)
+    >>> try:
+    ...     print(f"{rocking.critical_scale(block, pulse, (0.1, 2.0)).scale:.4f}")
+    ... except rocking.errors.Unfinished as error:
+    ...     print(error)
+    0.6203
+    """
 
 
 class StudyError(RockingError):
-    """A study is damaged, locked by another process, or not the intended one."""
+    """A study is damaged, locked by another process, or not the intended one.
+
+    See Also
+    --------
+    rocking.create_study : Create a study in a folder.
+    rocking.errors.DamagedStudy : Report a damaged unit of a study.
+
+    Examples
+    --------
+    >>> import rocking, tempfile
+    >>> rocking.Study(tempfile.mkdtemp())
+    Traceback (most recent call last):
+        ...
+    rocking.errors.StudyError: ...: the folder contains no study: create it first
+    """
 
 
 class DamagedStudy(StudyError):
-    """A unit of a study is damaged and can be recomputed. The message names the unit and the fault."""
+    """A unit of a study is damaged and can be recomputed. The message names the unit and the fault.
+
+    See Also
+    --------
+    rocking.Study.verify : Check and repair a study.
+    rocking.errors.StudyError : Report any other fault of a study.
+
+    Examples
+    --------
+    >>> import pathlib, rocking, tempfile
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> block, pulse = rocking.Block(width=0.4, height=2.0), rocking.pulses.one_sine(4.0, 1.0)
+    >>> _ = rocking.create_study(folder, block, pulse).run()
+    >>> _ = (folder / "units" / "unit.0.0.0.0").write_bytes(b"damaged")
+    >>> rocking.Study(folder).results().load()
+    Traceback (most recent call last):
+        ...
+    rocking.errors.DamagedStudy: unit unit.0.0.0.0 is damaged: the study's verify(repair=True) computes it again
+    """
 
     def __str__(self) -> str:
         return f"{self.text()}: the study's verify(repair=True) computes it again"
@@ -180,8 +321,39 @@ class KernelsError(RockingError):
 
 
 class OutsideFit(UserWarning):
-    """A fitted formula was evaluated beyond the range of its data."""
+    """A fitted formula was evaluated beyond the range of its data.
+
+    See Also
+    --------
+    rocking.chattering.critical_amplitude : Compute the critical amplitude.
+    rocking.AsymptoticTime : Let the block rest after the asymptotic chattering time.
+
+    Examples
+    --------
+    >>> import rocking, warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", rocking.errors.OutsideFit)
+    ...     rocking.chattering.critical_amplitude(10.0, 0.9, method="eq76")
+    Traceback (most recent call last):
+        ...
+    rocking.errors.OutsideFit: Eq. 76 was fitted for omega from 0.5 to 8 and eta from 0.5 to 0.97, ...
+    """
 
 
 class OutputError(RockingError):
-    """Results could not be written to the requested location."""
+    """Results could not be written to the requested location.
+
+    See Also
+    --------
+    rocking.Result.to_json : Write a result to a JSON file.
+    rocking.RockingError : Catch all errors of the package.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> response = rocking.simulate(rocking.Block(width=0.4, height=2.0), None, initial_rotation=0.1)
+    >>> response.to_json("missing/response.json")
+    Traceback (most recent call last):
+        ...
+    rocking.errors.OutputError: missing/response.json: cannot be written: there is no folder ...
+    """

@@ -26,6 +26,18 @@ class Coordinate(NamedTuple):
         Unit of the coordinate.
     limit : str
         Name of the coordinate of the unstable balance, for example "slenderness"; empty if there is none.
+
+    See Also
+    --------
+    rocking.block.body.Body : Describe a single body.
+    rocking.Block : Create a block.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> coordinate = rocking.Block(width=0.4, height=2.0).coordinate
+    >>> coordinate.name, coordinate.unit, coordinate.limit
+    ('rotation', 'rad', 'slenderness')
     """
 
     name: str
@@ -43,7 +55,20 @@ ContactLaw = Callable[[tuple[Floats, Floats, Floats], tuple[Floats, Floats], Int
 
 @runtime_checkable
 class Body(Protocol):
-    """Single body, as used by simulations and responses."""
+    """Single body, as used by simulations and responses.
+
+    See Also
+    --------
+    rocking.block.body.Bodies : Describe many bodies of one kind.
+    rocking.Block : Create a block.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0)
+    >>> isinstance(block, rocking.block.body.Body), f"{block.uplift_thresholds()[0]:.4f} m/s^2"
+    (True, '1.9613 m/s^2')
+    """
 
     @property
     def description(self) -> str:
@@ -86,7 +111,20 @@ class Body(Protocol):
 
 @runtime_checkable
 class Bodies(Protocol):
-    """Any number n of bodies of one kind with the same gravity."""
+    """Any number n of bodies of one kind with the same gravity.
+
+    See Also
+    --------
+    rocking.block.body.Body : Describe a single body.
+    rocking.Blocks : Create many blocks.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+    >>> isinstance(blocks, rocking.block.body.Bodies), len(blocks), blocks.kind
+    (True, 4, 'blocks')
+    """
 
     @property
     def kind(self) -> str:

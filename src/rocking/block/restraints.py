@@ -80,7 +80,21 @@ class Pivot(NamedTuple):
 
 
 class Restraint(ABC):
-    """Force or moment on a block, as terms for each side."""
+    """Force or moment on a block, as terms for each side.
+
+    See Also
+    --------
+    rocking.RestrainedBlock : Add restraints to a block.
+    rocking.Tendon : Restrain a block by a vertical tendon.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0, mass=800.0)
+    >>> restrained = rocking.RestrainedBlock(block, rocking.Spring(1e3), rocking.Damper(200.0))
+    >>> isinstance(restrained.restraints[0], rocking.Restraint), restrained.restraints
+    (True, (Spring(stiffness=1000.0), Damper(coefficient=200.0)))
+    """
 
     @abstractmethod
     def _compute_terms(self, pivot: Pivot) -> Terms:

@@ -228,6 +228,18 @@ class Side:
     arm : float or None
         Momentum divided by mass and angular speed, m, which determines the ground forces. None if it equals the
         radius, as for all blocks except frames.
+
+    See Also
+    --------
+    rocking.Block : Create a block with two sides.
+    rocking.impact_restitution : Compute the restitution of both sides.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0, offset=0.05)
+    >>> [f"{side.alpha:.4f} rad" for side in block.sides]
+    ['0.1489 rad', '0.2450 rad']
     """
 
     p: float

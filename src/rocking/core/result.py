@@ -52,6 +52,11 @@ class Row(NamedTuple):
     note : str
         Addition in a summary, with the mark that separates it from the value.
 
+    See Also
+    --------
+    rocking.Response.summary_rows : Return the lines of a summary as rows.
+    rocking.Response.facts : Return the entries of a dictionary as rows.
+
     Examples
     --------
     >>> Row("peak rotation", "0.05", "rad", " at 1.2 s").text
@@ -86,6 +91,18 @@ class Result(ABC):
     ----------
     TABLES : collection of str
         Names of the tables, the default one first.
+
+    See Also
+    --------
+    rocking.Response : Describe the response of one body.
+    rocking.core.result.DatasetResult : Describe a result with a labelled dataset.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> response = rocking.simulate(rocking.Block(width=0.4, height=2.0), None, initial_rotation=0.1)
+    >>> isinstance(response, rocking.Result), response.to_dataframe("events").columns.tolist()
+    (True, ['time_s', 'kind', 'side'])
     """
 
     TABLES: ClassVar[Collection[str]] = ()
@@ -181,6 +198,19 @@ class DatasetResult(Result):
         Tables, the default one first, and the variables of each.
     POOLED : tuple of str
         Dimensions over which some numbers are aggregated. These numbers do not apply to a part of a dimension.
+
+    See Also
+    --------
+    rocking.Result : Summarise, tabulate or plot any result.
+    rocking.rocking_spectrum : Compute a rocking spectrum.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.2], restitution=[0.9])
+    >>> spectrum = rocking.rocking_spectrum(blocks, rocking.pulses.one_sine(5.0, 1.0))
+    >>> spectrum.select(p=2.0).data.sizes["p"]
+    1
     """
 
     TABLES: ClassVar[Mapping[str, tuple[str, ...]]]

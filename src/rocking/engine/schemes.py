@@ -43,6 +43,14 @@ class ChatteringScheme(ABC):
     Certified : Rest proven by a certificate (default).
     VelocityThreshold : Rest below a threshold of speed.
     IntervalThreshold : Rest below a threshold of the interval between impacts.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0)
+    >>> response = rocking.simulate(block, None, chattering="velocity=1e-6", initial_rotation=0.1)
+    >>> isinstance(response.chattering, rocking.ChatteringScheme), response.chattering.label
+    (True, 'velocity 1e-06')
     """
 
     #: Name in ``chattering=`` and on the command line.
@@ -129,6 +137,15 @@ class AsymptoticTime(ChatteringScheme):
     -----
     Amplitudes are normalised by the uplift acceleration: g alpha in the linear model, as in the paper, and g tan(alpha)
     in the nonlinear model.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> sine = rocking.pulses.sine(amplitude=2.0, frequency=1.0, cycles=1)
+    >>> response = rocking.simulate(block, sine, model="linear", chattering=rocking.AsymptoticTime("exact"))
+    >>> response.events["kind"][1].item(), f"{response.events['time'][1]:.4f} s"
+    ('rest', '0.4593 s')
     """
 
     name: ClassVar[str] = "time"
@@ -223,6 +240,14 @@ class VelocityThreshold(ChatteringScheme):
     --------
     GeometricBypass : Rest at the end of the remaining geometric sequence.
     Certified : Rest proven by a certificate (default).
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> response = rocking.simulate(block, None, chattering=rocking.VelocityThreshold(1e-3), initial_rotation=0.1)
+    >>> f"{response.events['time'][-1]:.4f} s", len(response.impacts)
+    ('9.2823 s', 65)
     """
 
     name: ClassVar[str] = "velocity"
@@ -256,6 +281,14 @@ class GeometricBypass(VelocityThreshold):
     Notes
     -----
     The method is the one of :cite:t:`nordmark2009`, to first order in the speed.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> response = rocking.simulate(block, None, chattering=rocking.GeometricBypass(1e-3), initial_rotation=0.1)
+    >>> f"{response.events['time'][-1]:.4f} s", len(response.impacts)
+    ('9.2915 s', 65)
     """
 
     name: ClassVar[str] = "bypass"
@@ -276,6 +309,14 @@ class IntervalThreshold(ChatteringScheme):
     See Also
     --------
     Certified : Rest proven by a certificate (default).
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> response = rocking.simulate(block, None, chattering=rocking.IntervalThreshold(1e-3), initial_rotation=0.1)
+    >>> f"{response.events['time'][-1]:.4f} s", len(response.impacts)
+    ('9.2832 s', 66)
     """
 
     name: ClassVar[str] = "interval"

@@ -166,6 +166,14 @@ class Frame:
     See Also
     --------
     rocking.explore : Create a frame from a response.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> response = rocking.simulate(rocking.Block(width=0.4, height=2.0), rocking.pulses.one_sine(3.0, 1.0))
+    >>> frame = rocking.explore(response, height=600)
+    >>> frame.texts["motion"], frame.height
+    ('one-sine:amplitude=3.0,frequency=1.0', 600)
     """
 
     texts: dict[str, str]

@@ -56,7 +56,21 @@ _MIN_DURATION_RATIO: Final = 0.75
 
 
 def motion_notes(motion: Motion) -> tuple[str, ...]:
-    """Return likely mistakes in a ground motion; empty if there are none."""
+    """Return likely mistakes in a ground motion; empty if there are none.
+
+    See Also
+    --------
+    rocking.inputs.notes.block_notes : Return likely mistakes in a block.
+    rocking.read : Read a motion from a record file.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> from rocking.inputs.notes import motion_notes
+    >>> motion = rocking.Motion.from_samples([0.0, 80.0, -60.0, 0.0], dt=0.01)
+    >>> motion_notes(motion)
+    ('the peak acceleration is 8.16 g, more than any ground motion has: are the units right?',)
+    """
     notes = reading_notes(motion)
     direction = _find_origin(motion).channel
     if _VERTICAL.fullmatch(direction):
@@ -136,7 +150,20 @@ def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
 
 
 def block_notes(block: Block) -> tuple[str, ...]:
-    """Return likely mistakes in the dimensions of a block; empty if there are none."""
+    """Return likely mistakes in the dimensions of a block; empty if there are none.
+
+    See Also
+    --------
+    rocking.inputs.notes.motion_notes : Return likely mistakes in a ground motion.
+    rocking.Block : Create a block.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> from rocking.inputs.notes import block_notes
+    >>> block_notes(rocking.Block(width=2.0, height=1.0, restitution=0.9))
+    ('the block is wider, 2 m, than it is high, 1 m: are the sizes swapped?',)
+    """
     notes = []
     largest = max(2.0 * side.radius for side in block.sides)
     if largest > _MAX_LENGTH:

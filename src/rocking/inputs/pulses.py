@@ -124,6 +124,11 @@ def named_pulse(text: str) -> Motion:
     InvalidOption
         If there is no such family or parameter, a parameter is missing or repeated, or a value cannot be read.
 
+    See Also
+    --------
+    rocking.pulses : Create pulses by functions.
+    rocking.simulate : Simulate one block under one motion.
+
     Examples
     --------
     >>> named_pulse("sine:amplitude=0.2g,frequency=2Hz,cycles=5").description

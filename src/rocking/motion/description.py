@@ -35,6 +35,18 @@ class Origin:
         Instant of the first sample by the file's clock, s, or None if unknown, delayed or cut.
     reversed : bool
         Whether the motion (and `azimuth`) is opposite to `channel`.
+
+    See Also
+    --------
+    rocking.motion.Description : Describe a motion.
+    rocking.read : Read a motion from a record file.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> origin = rocking.records.load("ridgecrest-clc-090").description.origin
+    >>> origin.station, origin.azimuth, origin.units
+    ('CI.CLC China Lake, G2 Tower Rd.', 90.0, 'g')
     """
 
     format: str = ""

@@ -48,6 +48,13 @@ class Record:
     See Also
     --------
     rocking.records.load : load a shipped record as a motion.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> record = rocking.records.info("ridgecrest-clc-090")
+    >>> record.title, record.dt
+    ('Ridgecrest 2019, China Lake, 090', 0.01)
     """
 
     name: str

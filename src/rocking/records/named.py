@@ -185,6 +185,18 @@ class Contents:
         Entries with the same names, including units, in the same order.
     motions : tuple of Motion
         Motions of a file's channels.
+
+    See Also
+    --------
+    rocking.records.contents : List the channels of a file.
+    rocking.records.shipped : List the shipped records.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> contents = rocking.records.shipped("ridgecrest-clc-090")
+    >>> contents.kind, contents.entries[0]["step_s"]
+    ('records', 0.01)
     """
 
     title: str

@@ -62,6 +62,20 @@ class Gradient:
         Reason for NaN values, one sentence; empty if there are none.
     motion : Motion or None
         The motion.
+
+    See Also
+    --------
+    rocking.gradient : Differentiate a result of a response.
+    rocking.response.Sensitivity : Differentiate by relative changes of the inputs.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
+    >>> gradient = rocking.gradient(rocking.simulate(block, record), "impact", 0)
+    >>> f"{gradient.value:.4f} s", gradient.samples.round(4).tolist()
+    ('0.5071 s', [0.021, 0.1668, 0.0212, 0.0, 0.0])
     """
 
     value: float

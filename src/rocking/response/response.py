@@ -82,6 +82,14 @@ class Response(Simulated):
     --------
     rocking.simulate : Simulate a body under a motion.
     rocking.gradient : Differentiate a result of a response.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0)
+    >>> response = rocking.simulate(block, rocking.pulses.one_sine(amplitude=3.0, frequency=2.0))
+    >>> response.events["kind"].tolist(), f"{response.peak_rotation:.4f} rad"
+    (['uplift', 'rest'], '0.0667 rad')
     """
 
     TABLES = ("histories", "events", "impacts", "sequences")

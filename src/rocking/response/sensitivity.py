@@ -55,6 +55,14 @@ class Sensitivity:
     See Also
     --------
     rocking.gradient : Derivatives by each sample of the motion.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.4, height=2.0)
+    >>> response = rocking.simulate(block, rocking.pulses.one_sine(amplitude=3.0, frequency=2.0))
+    >>> f"{response.sensitivity.peak['motion'][0]:.3f} rad"
+    '0.237 rad'
     """
 
     def __init__(

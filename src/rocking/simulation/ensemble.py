@@ -81,6 +81,14 @@ class Scales:
     --------
     rocking.Measure : Measure of a ground motion.
     rocking.simulation.ensemble.Product : Combination of bodies, motions, scales and polarities.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> from rocking.simulation.ensemble import Scales
+    >>> scales = Scales.from_levels([2.0, 4.0], "pga")
+    >>> scales.factors(rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)).tolist()
+    [0.5, 1.0]
     """
 
     measure: Measure | None = None
@@ -143,6 +151,14 @@ class Product:
     --------
     rocking.simulation.ensemble.Scales : Levels of the motions.
     rocking.simulate_many : Simulate all combinations.
+
+    Examples
+    --------
+    >>> import rocking, tempfile
+    >>> block, pulse = rocking.Block(width=0.4, height=2.0), rocking.pulses.one_sine(4.0, 1.0)
+    >>> study = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], polarity="both")
+    >>> study.product.shape
+    (1, 2, 2, 1)
     """
 
     bodies: Bodies

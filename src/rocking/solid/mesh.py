@@ -190,6 +190,13 @@ class Region(NamedTuple):
     See Also
     --------
     rocking.Solid : Rigid body in space.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> statue = rocking.Solid.from_mesh("statue", density=2650.0)
+    >>> [f"{region.name}: {region.volume:.3f} m^3" for region in statue.regions]
+    ['figure: 0.123 m^3', 'head: 0.009 m^3', 'plinth: 0.039 m^3']
     """
 
     name: str

@@ -46,6 +46,13 @@ class ResistanceRose(DatasetResult):
     See Also
     --------
     rocking.Solid : Rigid body in space.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> rose = rocking.Solid.from_mesh("statue", density=2650.0).rose([0.0, 90.0])
+    >>> rose.data.acceleration.values.round(3).tolist()
+    [0.307, 0.282]
     """
 
     TABLES = MappingProxyType(

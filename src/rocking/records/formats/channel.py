@@ -111,7 +111,21 @@ def resolve_timing(
 
 
 class Identification(NamedTuple):
-    """Format of a file, and the reason for its identification."""
+    r"""Format of a file, and the reason for its identification.
+
+    See Also
+    --------
+    rocking.records.identify : Identify the format of a file.
+    rocking.records.contents : List the channels of a file.
+
+    Examples
+    --------
+    >>> import pathlib, rocking, tempfile
+    >>> file = pathlib.Path(tempfile.mkdtemp(), "samples.dat")
+    >>> _ = file.write_text("# cm/s2 at 100 Hz\n0.1\n0.3\n-0.2\n")
+    >>> rocking.records.identify(file).format
+    'text table'
+    """
 
     format: str
     reason: str
