@@ -43,6 +43,15 @@ class ChatteringScheme(ABC):
     Certified : Rest proven by a certificate (default).
     VelocityThreshold : Rest below a threshold of speed.
     IntervalThreshold : Rest below a threshold of the interval between impacts.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> schemes = [rocking.Certified(), rocking.VelocityThreshold(1e-6), rocking.IntervalThreshold(1e-6)]
+    >>> [scheme.label for scheme in schemes]
+    ['certified 1e-12 s', 'velocity 1e-06', 'interval 1e-06 s']
+    >>> isinstance(schemes[0], rocking.ChatteringScheme)
+    True
     """
 
     #: Name in ``chattering=`` and on the command line.
@@ -129,6 +138,15 @@ class AsymptoticTime(ChatteringScheme):
     -----
     Amplitudes are normalised by the uplift acceleration: g alpha in the linear model, as in the paper, and g tan(alpha)
     in the nonlinear model.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> shaking = rocking.pulses.sine(1.02 * block.uplift_thresholds("linear")[0], 1.0, cycles=1)
+    >>> response = rocking.simulate(block, shaking, model="linear", chattering=rocking.AsymptoticTime("exact"))
+    >>> f"first rest at {response.rest_intervals[1, 0]:.4f} s"
+    'first rest at 0.4612 s'
     """
 
     name: ClassVar[str] = "time"
@@ -223,6 +241,14 @@ class VelocityThreshold(ChatteringScheme):
     --------
     GeometricBypass : Rest at the end of the remaining geometric sequence.
     Certified : Rest proven by a certificate (default).
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block, shaking = rocking.Block.from_parameters(2.0, 0.2, 0.9), rocking.pulses.one_sine(2.1, 1.0)
+    >>> response = rocking.simulate(block, shaking, chattering=rocking.VelocityThreshold(threshold=1e-3))
+    >>> f"rest at {response.rest_intervals[-1, 0]:.4f} s"
+    'rest at 1.2370 s'
     """
 
     name: ClassVar[str] = "velocity"
@@ -256,6 +282,14 @@ class GeometricBypass(VelocityThreshold):
     Notes
     -----
     The method is the one of :cite:t:`nordmark2009`, to first order in the speed.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block, shaking = rocking.Block.from_parameters(2.0, 0.2, 0.9), rocking.pulses.one_sine(2.1, 1.0)
+    >>> response = rocking.simulate(block, shaking, chattering=rocking.GeometricBypass(threshold=1e-4))
+    >>> f"rest at {response.rest_intervals[-1, 0]:.4f} s"
+    'rest at 1.2463 s'
     """
 
     name: ClassVar[str] = "bypass"
@@ -276,6 +310,14 @@ class IntervalThreshold(ChatteringScheme):
     See Also
     --------
     Certified : Rest proven by a certificate (default).
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block, shaking = rocking.Block.from_parameters(2.0, 0.2, 0.9), rocking.pulses.one_sine(2.1, 1.0)
+    >>> response = rocking.simulate(block, shaking, chattering=rocking.IntervalThreshold(threshold=1e-3))
+    >>> f"rest at {response.rest_intervals[-1, 0]:.4f} s"
+    'rest at 1.2379 s'
     """
 
     name: ClassVar[str] = "interval"
