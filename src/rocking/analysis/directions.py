@@ -170,6 +170,14 @@ class ResponseRose(DatasetResult):
     See Also
     --------
     rocking.response_rose : Run the simulations.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> pair = tuple(rocking.records.load(f"ridgecrest-tow2-{azimuth}") for azimuth in ("090", "360"))
+    >>> rose = rocking.response_rose(rocking.Solid.from_mesh("statue"), [pair], azimuths=[0.0, 90.0])
+    >>> rose.data.overturned_share.values[0].tolist()
+    [0.0, 0.0]
     """
 
     TABLES = MappingProxyType(

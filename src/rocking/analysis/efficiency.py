@@ -154,6 +154,15 @@ class MeasureComparison(DatasetResult):
     See Also
     --------
     rocking.compare_measures : Run the comparison.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=0.5, alpha=0.1, restitution=0.5)
+    >>> pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.05, 0.2)]
+    >>> comparison = rocking.compare_measures(block, pulses)
+    >>> f"PGV {float(comparison.data.dispersion.sel(measure='PGV')):.2f}"
+    'PGV 0.03'
     """
 
     TABLES = MappingProxyType(

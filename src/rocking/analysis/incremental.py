@@ -176,6 +176,15 @@ class IncrementalDynamicAnalysis(DatasetResult):
     See Also
     --------
     rocking.incremental_dynamic_analysis : Run the analysis.
+
+    Examples
+    --------
+    >>> import numpy as np, rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> pulse = rocking.pulses.one_sine(1.0, 5.0 / np.pi)
+    >>> analysis = rocking.incremental_dynamic_analysis(block, pulse, measure="pga_ratio", levels=[1.0, 2.0, 4.0])
+    >>> analysis.data.overturned.values[0, :, 0].tolist()
+    [False, False, True]
     """
 
     TABLES = MappingProxyType(
@@ -423,6 +432,15 @@ class CriticalScale:
     See Also
     --------
     rocking.gradient : Compute derivatives of a response.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
+    >>> critical = rocking.critical_scale(block, record, (2.0, 6.0))
+    >>> f"scale {critical.scale:.4f}, +0.1 % of p {1e-3 * critical.p:+.4f}"
+    'scale 3.2561, +0.1 % of p -0.0023'
     """
 
     scale: float

@@ -52,6 +52,14 @@ class OverturningMode(IntEnum):
     See Also
     --------
     rocking.analysis.mode_name : Describe a mode in words.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> result = rocking.overturning_map(block, "half-sine", amplitudes=[0.5, 1.5], frequencies=[2.0])
+    >>> [rocking.analysis.OverturningMode(mode).name for mode in result.data.mode.values[:, 0]]
+    ['NO_UPLIFT', 'ROCKS']
     """
 
     UNFINISHED = -5
@@ -224,6 +232,11 @@ def mode_name(mode: int) -> str:
     str
         Description, for example "rocks until the pulse is over" or "overturns after 2 impacts".
 
+    See Also
+    --------
+    rocking.analysis.OverturningMode : Identify the outcome of a block under a pulse.
+    rocking.overturning_map : Compute the modes of a block under a pulse.
+
     Examples
     --------
     >>> mode_name(-2), mode_name(0), mode_name(1)
@@ -268,6 +281,14 @@ class OverturningMap(DatasetResult):
     See Also
     --------
     rocking.overturning_map : Compute the map.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> result = rocking.overturning_map(block, "half-sine", amplitudes=[0.5, 1.5, 2.5], frequencies=[2.0])
+    >>> [rocking.analysis.mode_name(mode) for mode in result.data.mode.values[:, 0]]
+    ['no uplift', 'rocks until the pulse is over', 'overturns without impact']
     """
 
     TABLES = MappingProxyType(

@@ -59,6 +59,18 @@ class Probit(NamedTuple):
     ----------
     intercept, slope : ndarray, shape (fits,)
         Parameters, with one entry for a single fit.
+
+    See Also
+    --------
+    rocking.analysis.FragilityCurve : Evaluate the fitted probabilities.
+    rocking.fit_fragility : Fit fragility curves to observed outcomes.
+
+    Examples
+    --------
+    >>> from rocking import fit_fragility
+    >>> fitted = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10).curves[0].fitted
+    >>> f"intercept {fitted.intercept[0]:.3f}, slope {fitted.slope[0]:.3f}"
+    'intercept -3.773, slope 3.287'
     """
 
     intercept: Floats
@@ -105,6 +117,18 @@ class Goodness:
     p_value : float
         Probability of a larger statistic if the lognormal is right, or NaN for fewer than three groups or dependent
         outcomes.
+
+    See Also
+    --------
+    rocking.analysis.FragilityCurve : Evaluate the fitted probabilities.
+    rocking.fit_fragility : Fit fragility curves to observed outcomes.
+
+    Examples
+    --------
+    >>> from rocking import fit_fragility
+    >>> goodness = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10).curves[0].goodness
+    >>> f"{goodness.degrees_of_freedom} degrees of freedom, p-value {goodness.p_value:.2f}"
+    '2 degrees of freedom, p-value 0.52'
     """
 
     statistic: float

@@ -304,6 +304,14 @@ class Survival(Result):
     --------
     rocking.Fragility.survival : Compute the constraints.
     rocking.HazardCurve : Rates of exceeding an intensity at a site.
+
+    Examples
+    --------
+    >>> from rocking import HazardCurve, fit_fragility
+    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+    >>> survival = fitted.survival(1000.0, HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+    >>> f"probability of survival {survival.probability:.3f}"
+    'probability of survival 0.648'
     """
 
     curve: FragilityCurve
@@ -436,8 +444,8 @@ class Survival(Result):
         estimate, likeliest = (f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})", self.probability)
         if self.several_blocks:
             estimate = (
-                f"at most {self.max_probability:.2g} if one of the blocks has stood all the time, and {estimate} if each "
-                "motion met another of them"
+                f"at most {self.max_probability:.2g} if one of the blocks has stood all the time, and {estimate} "
+                "if each motion met another of them"
             )
         if not math.isnan(self.mean_probability):
             likeliest = self.mean_probability

@@ -213,6 +213,14 @@ class RockingSpectrum(DatasetResult):
     See Also
     --------
     rocking.rocking_spectrum : Compute the spectrum.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0], alpha=[0.2], restitution=[0.9])
+    >>> spectrum = rocking.rocking_spectrum(blocks, rocking.pulses.one_sine(5.0, 1.0))
+    >>> spectrum.data.overturned.values.ravel().tolist()
+    [False, True, True]
     """
 
     TABLES = MappingProxyType(

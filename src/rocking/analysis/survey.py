@@ -89,6 +89,15 @@ class Survey(BlockUnderRecords):
     See Also
     --------
     rocking.survey : Run the simulations.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> motions = {"weak": rocking.pulses.one_sine(1.0, 1.0), "strong": rocking.pulses.one_sine(9.0, 1.0)}
+    >>> survey = rocking.survey(block, motions)
+    >>> [response.overturned for response in survey.responses]
+    [False, True]
     """
 
     friction: float | None = None

@@ -89,6 +89,18 @@ class BoundReached:
         Bound and suggested wider bound, in the parameter's unit.
     share : float
         Share of the posterior in the outermost 5 % of the range.
+
+    See Also
+    --------
+    rocking.calibration.Diagnostics : Assess the reliability of a calibration.
+    rocking.calibrate : Fit blocks to the outcomes of tests.
+
+    Examples
+    --------
+    >>> from rocking.calibration import BoundReached
+    >>> reached = BoundReached("alpha", "upper", bound=0.3, wider=0.6, share=0.4)
+    >>> f"{reached.name}: widen the {reached.end} bound from {reached.bound} to {reached.wider} rad"
+    'alpha: widen the upper bound from 0.3 to 0.6 rad'
     """
 
     name: str
@@ -122,6 +134,17 @@ class Diagnostics:
         R-hat of each estimate between independent runs: 1 if they agree, above 1.1 if they disagree.
     bounds_reached : tuple of BoundReached
         Estimates whose interval ends at a bound.
+
+    See Also
+    --------
+    rocking.calibrate : Fit blocks to the outcomes of tests.
+    rocking.Calibration : Inspect the fitted ensemble and its diagnostics.
+
+    Examples
+    --------
+    >>> from rocking.calibration import Diagnostics
+    >>> Diagnostics(candidates=256, effective=12.0, agreement={"alpha": 1.02}, bounds_reached=()).notes
+    ('only 12 candidates represent a typical population: double the candidates, or narrow the bounds',)
     """
 
     candidates: int

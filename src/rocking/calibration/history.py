@@ -68,6 +68,18 @@ class Measured:
         Standard error.
     at_bound : bool
         Whether the fit reached a bound, which should then be widened.
+
+    See Also
+    --------
+    rocking.calibrate_history : Fit a block to a rotation history.
+    rocking.calibration.HistoryCalibration : Inspect the fitted block and its parameters.
+
+    Examples
+    --------
+    >>> from rocking.calibration import Measured
+    >>> p = Measured(value=2.5, deviation=0.05, at_bound=False)
+    >>> f"p = {p.value:.2f} rad/s, coefficient of variation {p.deviation / p.value:.0%}"
+    'p = 2.50 rad/s, coefficient of variation 2%'
     """
 
     value: float
@@ -97,7 +109,16 @@ class HistoryCalibration(Result):
 
     See Also
     --------
-    rocking.calibrate_history : fit a block to a rotation history.
+    rocking.calibrate_history : Fit a block to a rotation history.
+
+    Examples
+    --------
+    >>> import numpy as np, rocking
+    >>> block, times = rocking.Block.from_parameters(p=2.5, alpha=0.2, restitution=0.9), np.arange(0.0, 4.0, 0.1)
+    >>> rotation = rocking.simulate(block, None, initial_rotation=0.12, duration=4.0).rotation(times)
+    >>> fitted = rocking.calibrate_history(times, rotation, alpha=0.2, restitution=0.9, initial_rotation=0.12)
+    >>> f"p = {fitted.block.p:.3f} rad/s"
+    'p = 2.500 rad/s'
     """
 
     block: Block
@@ -213,7 +234,7 @@ def calibrate_history(
 
     See Also
     --------
-    rocking.calibrate : fit blocks to the outcomes of tests.
+    rocking.calibrate : Fit blocks to the outcomes of tests.
 
     Notes
     -----

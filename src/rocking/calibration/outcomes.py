@@ -58,6 +58,18 @@ class Estimate:
         Median and central 90 % interval of the population's centre, in the parameter's unit.
     dispersion : float
         Standard deviation of the parameter's logarithm from test to test.
+
+    See Also
+    --------
+    rocking.calibrate : Fit blocks to the outcomes of tests.
+    rocking.Calibration : Inspect the estimates of all parameters.
+
+    Examples
+    --------
+    >>> from rocking.calibration import Estimate
+    >>> alpha = Estimate(median=0.2, lower=0.18, upper=0.23, dispersion=0.1)
+    >>> f"alpha = {alpha.median} rad, 90 % interval {alpha.lower} to {alpha.upper} rad"
+    'alpha = 0.2 rad, 90 % interval 0.18 to 0.23 rad'
     """
 
     median: float
@@ -79,7 +91,15 @@ class Validation:
 
     See Also
     --------
-    rocking.validate : compute standard errors and the reliability diagram of the predictions.
+    rocking.validate : Compute standard errors and the reliability diagram of the predictions.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rocking.calibration import Scores, Validation
+    >>> scores = Scores.from_predictions([0.9, 0.2, 0.6], [True, False, False])
+    >>> Validation(np.array([[0.9, 0.2, 0.6]]), (scores,))
+    <Validation: 3 tests, each left out once: accuracy 66.7 %, log loss 0.415, Brier score 0.137>
     """
 
     probabilities: Floats
@@ -124,8 +144,16 @@ class Calibration(Result):
 
     See Also
     --------
-    rocking.calibrate : fit blocks to the outcomes of tests.
-    rocking.validate : compare predictions with tests.
+    rocking.calibrate : Fit blocks to the outcomes of tests.
+    rocking.validate : Compare predictions with tests.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> pulses = [rocking.pulses.one_sine(amplitude, 1.0) for amplitude in (2.0, 5.0)]
+    >>> fitted = rocking.calibrate(pulses, [0, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+    >>> list(fitted.estimates), f"{fitted.weights.sum():.2f}"
+    (['alpha'], '1.00')
     """
 
     TABLES = ("ensemble",)
@@ -363,9 +391,9 @@ def calibrate(
 
     See Also
     --------
-    rocking.calibrate_history : fit a block to a rotation history.
+    rocking.calibrate_history : Fit a block to a rotation history.
     rocking.read_tests : read tests from a table.
-    rocking.validate : compare predictions with tests.
+    rocking.validate : Compare predictions with tests.
 
     Notes
     -----

@@ -52,7 +52,7 @@ class ShakeTest:
     See Also
     --------
     rocking.read_tests : read tests from a table.
-    rocking.validate : compare predictions with tests.
+    rocking.validate : Compare predictions with tests.
 
     Examples
     --------
@@ -95,6 +95,20 @@ class JudgedTest:
         Whether the specimen overturned.
     probability : float
         Predicted probability of overturning.
+
+    See Also
+    --------
+    rocking.validate : Compare predictions with tests.
+    rocking.ShakeTest : Create a test with its observed outcome.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (1.0, 2.0, 3.0, 4.0)]
+    >>> tests = [rocking.ShakeTest(pulse, a) for pulse, a in zip(pulses, (False, False, True, True))]
+    >>> result = rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9))
+    >>> [(test.probability, test.overturned) for test in result.tests]
+    [(0.0, False), (1.0, False), (1.0, True), (1.0, True)]
     """
 
     name: str
@@ -116,6 +130,20 @@ class Score:
         1 for perfect predictions, 0 for the base rate, and NaN if the base rate is perfect.
     tests, clusters : int
         Number of tests, and of clusters of tests that belong together.
+
+    See Also
+    --------
+    rocking.validate : Compare predictions with tests.
+    rocking.calibration.ModelValidation : Inspect the scores of the predictions.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (1.0, 2.0, 3.0, 4.0)]
+    >>> tests = [rocking.ShakeTest(pulse, a) for pulse, a in zip(pulses, (False, False, True, True))]
+    >>> result = rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9))
+    >>> result.brier.value, result.brier.tests
+    (0.25, 4)
     """
 
     value: float
@@ -140,6 +168,20 @@ class ShareInBin:
         Predicted and observed shares that overturn.
     band_lower, band_upper : float
         Ends of the central 90 % of the shares in simulations from the predictions :cite:p:`broecker2007`.
+
+    See Also
+    --------
+    rocking.validate : Compare predictions with tests.
+    rocking.calibration.ModelValidation : Inspect the reliability of the predictions.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (1.0, 2.0, 3.0, 4.0)]
+    >>> tests = [rocking.ShakeTest(pulse, a) for pulse, a in zip(pulses, (False, False, True, True))]
+    >>> result = rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9))
+    >>> [(share.tests, round(share.observed, 2)) for share in result.reliability]
+    [(1, 0.0), (3, 0.67)]
     """
 
     lower: float
@@ -172,7 +214,16 @@ class ModelValidation(Result):
 
     See Also
     --------
-    rocking.validate : compare predictions with tests.
+    rocking.validate : Compare predictions with tests.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (1.0, 2.0, 3.0, 4.0)]
+    >>> tests = [rocking.ShakeTest(pulse, a) for pulse, a in zip(pulses, (False, False, True, True))]
+    >>> result = rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9))
+    >>> f"Brier score {result.brier.value:.2f}"
+    'Brier score 0.25'
     """
 
     TABLES = ("tests",)
@@ -293,7 +344,7 @@ def validate(
     See Also
     --------
     rocking.read_tests : read tests from a table.
-    rocking.calibrate : fit blocks to the outcomes of tests.
+    rocking.calibrate : Fit blocks to the outcomes of tests.
 
     Notes
     -----

@@ -177,6 +177,13 @@ class ChatteringSequence:
     See Also
     --------
     sequence : Resolve one sequence impact by impact.
+
+    Examples
+    --------
+    >>> from rocking import chattering
+    >>> sequence = chattering.sequence(1.03, 2.0, 0.92)
+    >>> f"rest at {sequence.time:.6f}, complete: {sequence.complete}"
+    'rest at 1.125948, complete: True'
     """
 
     impacts: NDArray[np.void]

@@ -57,6 +57,16 @@ class UpliftOutcome(IntEnum):
     See Also
     --------
     chattering_map : Compute a map of outcomes.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> from rocking import chattering
+    >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
+    >>> family = chattering.families.sine(block, model="linear")
+    >>> result = chattering.chattering_map(family, {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
+    >>> [chattering.UpliftOutcome(code).name for code in result.data.outcome.sel(omega=2.0).values]
+    ['NO_UPLIFT', 'COMPLETE', 'RESTS_AT_LAST']
     """
 
     NO_UPLIFT = 0
@@ -203,6 +213,16 @@ class ChatteringMap(DatasetResult):
     See Also
     --------
     chattering_map : Compute the map.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> from rocking import chattering
+    >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
+    >>> family = chattering.families.sine(block, model="linear")
+    >>> result = chattering.chattering_map(family, {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
+    >>> result.data.complete.sel(omega=2.0).values.tolist()
+    [False, True, False]
     """
 
     TABLES = MappingProxyType(
@@ -350,6 +370,14 @@ class ChatteringEpisodes(Result):
     See Also
     --------
     chattering_episodes : List the episodes of a response.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090"))
+    >>> episodes = rocking.chattering.chattering_episodes(response)
+    >>> f"{len(episodes.episodes)} episodes, at rest for {100 * episodes.share_at_rest:.0f} % of the shaking"
+    '6 episodes, at rest for 50 % of the shaking'
     """
 
     episodes: NDArray[np.void]

@@ -46,6 +46,13 @@ class ChatteringReport(Result):
     See Also
     --------
     chattering_report : Create the report.
+
+    Examples
+    --------
+    >>> from rocking import chattering
+    >>> report = chattering.chattering_report(1.03, 2.0, 0.92)
+    >>> {method: round(time, 3) for method, time in report.values["chattering_time"].items()}
+    {'exact': 1.126, 'asymptotic': 1.104, 'semianalytical': 1.126, 'series': 1.1}
     """
 
     TABLES = ("impacts", "cycles")
@@ -225,6 +232,13 @@ class CriticalReport(Result):
     See Also
     --------
     critical_report : Create the report.
+
+    Examples
+    --------
+    >>> from rocking import chattering
+    >>> report = chattering.critical_report(2.0, 0.92)
+    >>> {method: round(a, 4) for method, a in report.amplitudes.items()}
+    {'exact': 1.038, 'eq76': 1.0373, 'eq77': 1.0379}
     """
 
     omega: float

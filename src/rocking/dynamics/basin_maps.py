@@ -54,6 +54,14 @@ class Basins(DatasetResult):
     See Also
     --------
     basins : Compute the basins.
+
+    Examples
+    --------
+    >>> from rocking import dynamics, pulses
+    >>> ball, shaking = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(12.0, 5.0, cycles=1)
+    >>> result = dynamics.basins(ball, shaking, [0.05, 0.1, 0.15], [-0.5, 0.0, 0.5])
+    >>> result.data.attractor.values.tolist()
+    ['period 1, rest', 'period 1, 1 impact']
     """
 
     TABLES = MappingProxyType(

@@ -68,6 +68,15 @@ class BifurcationDiagram(DatasetResult):
     See Also
     --------
     bifurcation_diagram : Compute the diagram.
+
+    Examples
+    --------
+    >>> from rocking import dynamics, pulses
+    >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
+    >>> def case(amplitude):
+    ...     return ball, pulses.sine(amplitude, 5.0, cycles=1)
+    >>> dynamics.bifurcation_diagram(case, [14.0, 16.0], [0.1, 0.5]).data.period.values[0, :, 0].tolist()
+    [1, 2]
     """
 
     TABLES = MappingProxyType({"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")})
@@ -396,6 +405,14 @@ class LyapunovExponents(Result):
     See Also
     --------
     lyapunov_exponents : Compute the exponents.
+
+    Examples
+    --------
+    >>> from rocking import dynamics, pulses
+    >>> ball, shaking = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(13.0, 5.0, cycles=1)
+    >>> exponents = dynamics.lyapunov_exponents(ball, shaking, [0.1, 0.5])
+    >>> f"largest exponent {exponents.largest:.4f}, impacts per period {exponents.impacts:.0f}"
+    'largest exponent -0.6931, impacts per period 1'
     """
 
     largest: float

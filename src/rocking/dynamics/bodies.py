@@ -30,7 +30,19 @@ from rocking.simulation.simulate import compute_response
 
 
 class Law(NamedTuple):
-    """Equation of motion: stiffness (1/s^2), damping (1/s), pull (m/s^2) and stops (m; the second may be infinite)."""
+    """Equation of motion: stiffness (1/s^2), damping (1/s), pull (m/s^2) and stops (m; the second may be infinite).
+
+    See Also
+    --------
+    rocking.dynamics.BouncingBall : Create a ball on a table.
+    rocking.dynamics.ImpactOscillator : Create an oscillator with stops.
+
+    Examples
+    --------
+    >>> from rocking import dynamics
+    >>> dynamics.BouncingBall(0.8, gravity=10.0).law
+    Law(stiffness=0.0, damping=0.0, pull=10.0, low=0.0, high=inf)
+    """
 
     stiffness: float
     damping: float
@@ -407,6 +419,13 @@ class Response(rocking.response.Response):
     See Also
     --------
     simulate : Simulate the response of a body between stops.
+
+    Examples
+    --------
+    >>> from rocking import dynamics
+    >>> response = dynamics.simulate(dynamics.BouncingBall(0.5, gravity=10.0), None, initial_position=0.2)
+    >>> f"position {response.position(0.1):.2f} m, velocity {response.velocity(0.1):.2f} m/s"
+    'position 0.15 m, velocity -1.00 m/s'
     """
 
     @property

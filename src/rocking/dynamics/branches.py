@@ -63,6 +63,16 @@ class Bifurcation(NamedTuple):
     See Also
     --------
     Branch : Branch of periodic orbits.
+
+    Examples
+    --------
+    >>> from rocking import dynamics, pulses
+    >>> def family(amplitude):
+    ...     return dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(amplitude, 5.0, cycles=1)
+    >>> stable = next(orbit for orbit in dynamics.periodic_orbits(*family(15.0)) if orbit.is_stable)
+    >>> bifurcation = dynamics.continue_orbit(stable, family, 15.0, (15.0, 15.5), step=0.5).bifurcations[0]
+    >>> f"{bifurcation.kind} at {bifurcation.value:.4f} m/s^2"
+    'flip at 15.2682 m/s^2'
     """
 
     kind: str
@@ -104,6 +114,16 @@ class Branch(Result):
     See Also
     --------
     continue_orbit : Follow a periodic orbit as a parameter changes.
+
+    Examples
+    --------
+    >>> from rocking import dynamics, pulses
+    >>> def family(amplitude):
+    ...     return dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(amplitude, 5.0, cycles=1)
+    >>> stable = next(orbit for orbit in dynamics.periodic_orbits(*family(12.0)) if orbit.is_stable)
+    >>> branch = dynamics.continue_orbit(stable, family, 12.0, (12.0, 13.0), step=0.5)
+    >>> bool(branch.is_stable.all()), branch.ends
+    (True, ('limit of the parameter', 'limit of the parameter'))
     """
 
     TABLES: ClassVar[tuple[str, ...]] = ("points", "bifurcations")

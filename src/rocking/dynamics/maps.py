@@ -241,6 +241,14 @@ class StroboscopicMap(PeriodicForcing):
     --------
     stroboscopic_map : Create the map of a body under periodic motion.
     periodic_orbits : Find the periodic orbits of the map.
+
+    Examples
+    --------
+    >>> from rocking import dynamics, pulses
+    >>> ball, shaking = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(12.0, 5.0, cycles=1)
+    >>> strobe = dynamics.stroboscopic_map(ball, shaking)
+    >>> strobe.forcing_period, strobe([0.1, 0.0]).round(6).tolist()
+    (0.2, [0.07887, 0.732401])
     """
 
     def __call__(self, states: ArrayLike, n_periods: int = 1) -> Floats:

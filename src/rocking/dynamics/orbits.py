@@ -66,6 +66,14 @@ class PeriodicOrbit(Result):
     --------
     periodic_orbits : Find the periodic orbits of a body.
     continue_orbit : Follow a periodic orbit as a parameter changes.
+
+    Examples
+    --------
+    >>> from rocking import dynamics, pulses
+    >>> ball, shaking = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(12.0, 5.0, cycles=1)
+    >>> orbit = next(orbit for orbit in dynamics.periodic_orbits(ball, shaking) if orbit.is_stable)
+    >>> orbit.period, orbit.impacts, orbit.state.round(6).tolist()
+    (1, 1.0, [0.054619, 0.544362])
     """
 
     TABLES: ClassVar[tuple[str, ...]] = ("states", "impacts", "histories")

@@ -29,7 +29,20 @@ MAX_STATE = 1e100
 
 
 class PeriodOutcome(IntEnum):
-    """Outcome of a state after some periods or after an impact."""
+    """Outcome of a state after some periods or after an impact.
+
+    See Also
+    --------
+    rocking.dynamics.StroboscopicMap : Advance a state by one period.
+    rocking.dynamics.lyapunov_exponents : Compute the exponents and the outcome of an orbit.
+
+    Examples
+    --------
+    >>> from rocking import dynamics, pulses
+    >>> ball, shaking = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(13.0, 5.0, cycles=1)
+    >>> dynamics.lyapunov_exponents(ball, shaking, [0.1, 0.5]).outcome == dynamics.PeriodOutcome.MOVES
+    True
+    """
 
     MOVES = 0
     RESTS = 1

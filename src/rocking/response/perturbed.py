@@ -181,7 +181,8 @@ class Perturbed(Result):
         if self.is_decided:
             return self.describe_agreement()
         overturned = int(np.count_nonzero(self.overturned))
-        return f"undecided: {f'{OVERTURNS} in {overturned} of {self.sample_text}' if overturned else self.describe_agreement()}"
+        agreement = f"{OVERTURNS} in {overturned} of {self.sample_text}" if overturned else self.describe_agreement()
+        return f"undecided: {agreement}"
 
     def _columns(self, table: str) -> list[Column]:
         (name, _, _, unit, _), columns = self.coordinate, list(zip(*self.repeats, strict=True))

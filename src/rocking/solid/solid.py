@@ -237,7 +237,7 @@ class Solid(Result):
         )
 
     def rose(self, azimuths: ArrayLike | None = None) -> ResistanceRose:
-        """Return the resistance at azimuths (degrees clockwise from north; by default every five) as a `ResistanceRose`."""
+        """Compute the resistance at azimuths, in degrees clockwise from north; by default every five."""
         angles = check_azimuths(azimuths)
         height = float(self.centre[2])
         return compute_rose(

@@ -83,6 +83,20 @@ class StudyFile:
         A sentence for each record that could not be read, if the file allows skipping.
     records : tuple of str
         Name of the record of each motion, relative to the file; empty for a pulse.
+
+    See Also
+    --------
+    rocking.studies.read_study : Read the description from a TOML file.
+    rocking.create_study : Create a study from blocks and motions.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from rocking import studies
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "study.toml")
+    >>> _ = path.write_text(studies.TEMPLATE)
+    >>> len(studies.read_study(path).product.motions)
+    2
     """
 
     product: Product
@@ -109,6 +123,11 @@ def read_study(path: str | Path) -> StudyFile:
         If the file or one of its lines is invalid; `path`, `line` and `argument` (the key) locate the error.
     UnreadableRecord
         If a record cannot be read.
+
+    See Also
+    --------
+    rocking.create_study : Create a study from blocks and motions.
+    rocking.studies.StudyFile : Inspect the description of a study.
 
     Examples
     --------

@@ -270,6 +270,20 @@ class BlockTable(DatasetResult):
     data : xarray.Dataset
         Variables over ``block`` and other dimensions; ``plot`` draws the first one. Parameters of the blocks are
         coordinates.
+
+    See Also
+    --------
+    rocking.Study.spectrum : Compute fractiles of the peak rotation of each block.
+    rocking.Study.block_fragilities : Fit a fragility curve to each block.
+
+    Examples
+    --------
+    >>> import rocking, tempfile
+    >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1], restitution=[0.9])
+    >>> study = rocking.create_study(tempfile.mkdtemp(), blocks, rocking.pulses.one_sine(4.0, 1.0), levels=[0.4, 1.0])
+    >>> _ = study.run()
+    >>> list(study.spectrum().data)
+    ['fractile_over_alpha', 'overturned_share']
     """
 
     TABLES = MappingProxyType({"blocks": ()})

@@ -61,6 +61,19 @@ class Status:
     ----------
     done, units, simulations : int
         Number of finished units, of all units, and of simulations.
+
+    See Also
+    --------
+    rocking.Study.status : Return the progress of a study.
+    rocking.studies.RunReport : Report the outcome of one run.
+
+    Examples
+    --------
+    >>> import rocking, tempfile
+    >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+    >>> status = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0]).status
+    >>> status.done, status.units, status.complete
+    (0, 2, False)
     """
 
     done: int
@@ -92,6 +105,19 @@ class RunReport:
         Sentence for each unit that could not be computed, by its name.
     stopped : bool
         Whether SIGTERM stopped the run before all units were done.
+
+    See Also
+    --------
+    rocking.Study.run : Simulate the units that are not done.
+    rocking.studies.Status : Report the progress of a study.
+
+    Examples
+    --------
+    >>> import rocking, tempfile
+    >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+    >>> report = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0]).run()
+    >>> report.units, report.simulations, report.stopped
+    (2, 2, False)
     """
 
     units: int
