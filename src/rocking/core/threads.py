@@ -59,10 +59,11 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
     Examples
     --------
     >>> import rocking
+    >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.2])
     >>> with rocking.set_options(threads=1, progress=False):
-    ...     table = rocking.simulate_many(rocking.Block(width=0.4, height=2.0), rocking.records.load("el-centro-ns"))
-    >>> table.overturned.item()
-    False
+    ...     table = rocking.simulate_many(blocks, rocking.pulses.one_sine(amplitude=3.0, frequency=1.0))
+    >>> table.sizes["block"]
+    2
     """
 
     def __init__(self, *, threads: int | None = None, progress: bool | None = None) -> None:

@@ -85,7 +85,7 @@ class Perturbed(Result):
     >>> import rocking
     >>> block = rocking.Block(width=0.4, height=2.0)
     >>> perturbed = rocking.simulate(block, rocking.pulses.one_sine(amplitude=3.0, frequency=2.0)).perturbed()
-    >>> perturbed.is_decided, perturbed.sentence()
+    >>> perturbed.is_decided, perturbed.describe_outcome()
     (True, 'stands in 5 of 5 motions within 3e-6')
     """
 
