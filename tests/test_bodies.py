@@ -21,8 +21,8 @@ BALL = dynamics.BouncingBall(0.6, gravity=G)
 def test_balls_and_blocks_are_bodies():
     block = rocking.Block(width=0.4, height=2.0)
     for body in (BALL, block):
-        assert isinstance(body, Body) and isinstance(body.to_bodies(), Bodies)
-        assert not isinstance(body, Bodies) and not isinstance(body.to_bodies(), Body)
+        assert isinstance(body, Body) and isinstance(body.as_bodies(), Bodies)
+        assert not isinstance(body, Bodies) and not isinstance(body.as_bodies(), Body)
     for other in (0.4, "block", rocking.Block, [block]):
         with pytest.raises(InvalidBlock, match="a Block or another body is needed"):
             simulate(other, None)
@@ -34,9 +34,9 @@ def test_balls_and_blocks_are_bodies():
     "simulated",
     [
         lambda body, motion: simulate(body, motion, model="linear", duration=1.0),
-        lambda body, motion: simulate_many(body.to_bodies(), motion, model="linear", duration=1.0),
+        lambda body, motion: simulate_many(body.as_bodies(), motion, model="linear", duration=1.0),
         lambda body, motion: [
-            *simulate_tasks(Setup(body.to_bodies(), "linear", Certified(), 1.0), [Task(slice(1), motion)])
+            *simulate_tasks(Setup(body.as_bodies(), "linear", Certified(), 1.0), [Task(slice(1), motion)])
         ],
         lambda body, motion: dynamics.simulate(body, motion, duration=1.0),
     ],

@@ -128,7 +128,7 @@ def test_nothing_to_simulate_is_refused(records):
 
 def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
     setup, task = (
-        engine.Setup(Block.from_parameters(2.0, 0.2).to_bodies(), "linear", Certified()),
+        engine.Setup(Block.from_parameters(2.0, 0.2).as_bodies(), "linear", Certified()),
         engine.Task(slice(None), rocking.pulses.one_sine(1.0, 1.0)),
     )
     begun, told = threading.Event(), []

@@ -38,7 +38,7 @@ def leaning(body, model="nonlinear", sign=1.0, **options):
 
 def turning(body, response):
     """Return the moment that brings a body back at a rotation from zero, over inertia, written anew."""
-    parameters = {name: values[0] for name, (values, _) in body.to_bodies().parameters().items()}
+    parameters = {name: values[0] for name, (values, _) in body.as_bodies().parameters().items()}
     side = 1 if response.residual_rotation < 0.0 else 0
     of = {name: float(values[side]) for name, values in parameters.items()}
     plastic = float(response.tendons["plastic_elongation"].max(initial=0.0))

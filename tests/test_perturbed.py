@@ -100,7 +100,7 @@ def test_an_outcome_that_changes_within_three_millionths_is_undecided(level):
     found = response.perturbed()
     assert not response.overturned and not found.is_decided
     text = f"undecided: overturns in {np.count_nonzero(found.overturned)} of 5 motions within 3e-6"
-    assert found.sentence() == text and text in response.summary() and text in found.summary()
+    assert found.describe_outcome() == text and text in response.summary() and text in found.summary()
     (row,) = rocking.survey(FREE, response.motion).rows()
     assert row["decided"] is False and row["overturned_share"] == found.overturned.mean()
     assert row["verdict"].startswith(f"undecided: overturns in {np.count_nonzero(found.overturned)} of 5 (3e-6), ")
@@ -130,7 +130,7 @@ def test_a_summary_counts_outcomes_in_both_ranges_and_takes_the_precision_that_i
         found = response.perturbed(*choose_steps(precision))
         assert found.max_deviation == pytest.approx(precision, rel=1e-12)
         last = response.summary(precision=precision).splitlines()[-1]
-        assert last == f"{'':20}{found.share()}" and last.endswith(f" of 11 motions within {text}")
+        assert last == f"{'':20}{found.describe_agreement()}" and last.endswith(f" of 11 motions within {text}")
     released = simulate(FREE, None, initial_rotation=0.1)
     assert "stands in 5 of 5 initial states within 3e-6" in released.summary()
     assert "does not move in 5 of 5 motions" in simulate(FREE, RECORD.scaled(0.1)).summary()

@@ -50,7 +50,7 @@ RESULTS = {
     "motion": lambda path: RECORD.scaled_to(5.0).with_vertical(RECORD),
     "wall": lambda path: WALL,
     "column with a tendon": lambda path: COLUMN,
-    "restrained blocks": lambda path: COLUMN.to_bodies(),
+    "restrained blocks": lambda path: COLUMN.as_bodies(),
     "response": lambda path: rocking.simulate(BLOCK, RECORD),
     "response of a wall": lambda path: rocking.simulate(WALL, RECORD),
     "gradient": lambda path: rocking.gradient(rocking.simulate(WALL, RECORD)),

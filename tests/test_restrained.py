@@ -106,7 +106,7 @@ def test_what_is_known_in_closed_form():
     stiffness = 3e5
     tied = RestrainedBlock(column, Tendon(stiffness))
     assert tied.uplift_thresholds() == pytest.approx(free, rel=1e-15)
-    record = tied.to_bodies().kernel_records("linear", np.zeros((1, 2)))[0]
+    record = tied.as_bodies().kernel_records("linear", np.zeros((1, 2)))[0]
     own, inertia = column.p**2, 4000.0 * column.radius**2 * 4.0 / 3.0
     rate = own * (1.0 + record["added_weight"]) - own  # Makris and Vassiliou (2015): less stiffness x^2/I
     assert rate == pytest.approx(-stiffness * 0.25**2 / inertia)
@@ -224,7 +224,7 @@ def test_a_wall_too_stocky_for_angular_momentum_rocks_one_way_with_a_restitution
 )
 def test_a_body_of_another_size_moves_alike_in_another_time(restraint, factor):
     """A larger one is slower: what shakes it as much more slowly turns it as far."""
-    body = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0, restitution=0.85), restraint).to_bodies()
+    body = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0, restitution=0.85), restraint).as_bodies()
     peaks = []
     for bodies, rate in ((body, 1.0), (body.with_p_scaled(np.array([factor])), factor)):
         found = rocking.simulate_many(bodies, [rocking.pulses.one_sine(a, 2.0 * rate) for a in (2.5, 3.5, 9.0)])
@@ -246,7 +246,7 @@ def test_without_a_restraint_it_is_the_block_bit_for_bit(block, model, sign, ver
     motions = [rocking.pulses.sine(sign * a, 1.1, cycles=3) for a in (2.2, 3.0, 4.5, 9.0)]
     if vertical:
         motions = [each.with_vertical(rocking.pulses.sine(3.0, 3.3, cycles=4)) for each in motions]
-    assert held.balance == block.balance and held.to_bodies().kind == "blocks"
+    assert held.balance == block.balance and held.as_bodies().kind == "blocks"
     assert held.uplift_thresholds(model) == block.uplift_thresholds(model)
     for motion in motions:
         found, expected = (rocking.simulate(each, motion, **options) for each in (held, block))

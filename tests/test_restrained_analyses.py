@@ -122,14 +122,14 @@ def test_a_survey_is_of_walls_too():
 
 
 def test_columns_are_one_where_sides_are_equal_and_two_where_they_differ():
-    assert {"p", "one_sided", "yields"} <= body_coordinates(FACADE.to_bodies()).keys()
-    assert not FACADE.to_bodies().is_symmetric
-    assert {"alpha_plus", "alpha_minus"} <= body_coordinates(LEANING.to_bodies()).keys()
-    oscillator = dynamics.ImpactOscillator(1.0, 0.8).to_bodies()
+    assert {"p", "one_sided", "yields"} <= body_coordinates(FACADE.as_bodies()).keys()
+    assert not FACADE.as_bodies().is_symmetric
+    assert {"alpha_plus", "alpha_minus"} <= body_coordinates(LEANING.as_bodies()).keys()
+    oscillator = dynamics.ImpactOscillator(1.0, 0.8).as_bodies()
     assert {"frequency", "second_stop"} <= body_coordinates(oscillator).keys()
     assert not oscillator.is_symmetric
-    assert dynamics.InvertedPendulum(3.0, 0.1, 0.5).to_bodies().is_symmetric
-    assert dynamics.ImpactOscillator(1.0, 0.8, stop=0.1, second_stop=0.1).to_bodies().is_symmetric
+    assert dynamics.InvertedPendulum(3.0, 0.1, 0.5).as_bodies().is_symmetric
+    assert dynamics.ImpactOscillator(1.0, 0.8, stop=0.1, second_stop=0.1).as_bodies().is_symmetric
 
 
 @pytest.mark.parametrize("another", [False, pytest.param(True, marks=pytest.mark.thorough)])

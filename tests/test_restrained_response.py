@@ -348,7 +348,7 @@ def test_a_resized_body_has_the_same_rotations_under_a_motion_as_much_slower(mod
     column, rng = Block(width=0.5, height=3.0, mass=4000.0), np.random.default_rng(3)
     rough = 1.5 * np.convolve(rng.normal(size=200), np.ones(4), mode="same")
     restraints = Tendon(3e6, prestress=1e3, strength=2e4), Damper(2e3)
-    tied, factor, judged = RestrainedBlock(column, *restraints, restitution=law).to_bodies(), 0.6, 0
+    tied, factor, judged = RestrainedBlock(column, *restraints, restitution=law).as_bodies(), 0.6, 0
     for level in (0.25, 0.5, 1.0):
         here = rocking.simulate_many(tied, rocking.Motion.from_samples(level * rough, 0.02), model=model)
         slower = rocking.Motion.from_samples(level * rough, 0.02 / factor)

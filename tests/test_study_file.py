@@ -367,7 +367,7 @@ def test_a_file_may_describe_walls_and_restraints(walls):
         )
         for width in (0.5, 0.6) for lean in (0.0, 0.5) for force in (300.0, 600.0)
     ]  # fmt: skip
-    found, wanted = read_study(walls).product.bodies, truth[0].to_bodies().from_bodies(truth)
+    found, wanted = read_study(walls).product.bodies, truth[0].as_bodies().from_bodies(truth)
     assert len(found) == 8
     for name, (values, _) in wanted.parameters().items():
         np.testing.assert_allclose(found.parameters()[name][0], values, rtol=1e-12, err_msg=name)

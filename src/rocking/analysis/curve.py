@@ -387,7 +387,7 @@ def find_openquake_measure(measure: Measure, block: Body | None, model: Model) -
         raise InvalidOption(
             f"{measure.name} counts in a block's own unit; give {{}} to write it as PGA or PGV", "block"
         )
-    unit = 1.0 if block is None else float(compute_units(block.to_bodies(), measure, model)[0])
+    unit = 1.0 if block is None else float(compute_units(block.as_bodies(), measure, model)[0])
     if measure.motion_measure_name == "pgv":
         return "PGV", 100.0 * unit
     if measure.damping != DAMPING:

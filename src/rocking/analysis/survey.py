@@ -62,7 +62,7 @@ class BlockUnderRecords(Result):
 
     def _create_labels(self) -> list[dict[str, Any]]:
         """Create the first columns of each row: record, motion, block."""
-        columns = body_coordinates(self.block.to_bodies())
+        columns = body_coordinates(self.block.as_bodies())
         numbers = {
             add_unit(name, attributes["units"]): float(values[0]) for name, (_, values, attributes) in columns.items()
         }
@@ -132,7 +132,7 @@ class Survey(BlockUnderRecords):
         return super()._headline() + undecided_text + skipped_text
 
     def to_dict(self) -> dict[str, Any]:
-        numbers = self.block.to_bodies().parameters().items()
+        numbers = self.block.as_bodies().parameters().items()
         block = {
             "description": self.block.description,
             **{add_unit(name, unit): values[0].tolist() for name, (values, unit) in numbers},
@@ -219,7 +219,7 @@ class RuleComparison(BlockUnderRecords):
         return super().to_dict() | {"notes": self._list_notes()}
 
     def _list_notes(self) -> list[str]:
-        return [] if self.block.to_bodies().is_symmetric else [MIRROR_NOTE]
+        return [] if self.block.as_bodies().is_symmetric else [MIRROR_NOTE]
 
     def _headline(self) -> str:
         return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"

@@ -105,7 +105,7 @@ class Body(Protocol):
         exist.
         """
 
-    def to_bodies(self) -> Bodies:
+    def as_bodies(self) -> Bodies:
         """Return bodies that contain only this one, for a block `rocking.Blocks`."""
 
 

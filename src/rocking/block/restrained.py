@@ -158,7 +158,7 @@ class RestrainedBlock(Rocking):
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
         checks.choice(model, "model", InvalidOption, MODELS)
-        records = self.to_bodies().kernel_records(model, np.zeros((1, 2)))
+        records = self.as_bodies().kernel_records(model, np.zeros((1, 2)))
         plus, minus = (self.gravity * (records["threshold"] + records["restraint_threshold"])[0]).tolist()
         return plus, minus
 

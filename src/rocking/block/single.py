@@ -56,7 +56,7 @@ class Rocking:
         """Rotation at which the block stands on each side: zero."""
         return 0.0, 0.0
 
-    def to_bodies(self) -> Bodies:
+    def as_bodies(self) -> Bodies:
         """Return `Blocks` that contain only this block."""
         return KINDS["blocks"].from_bodies([self])
 

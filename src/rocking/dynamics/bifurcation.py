@@ -126,8 +126,8 @@ class BifurcationDiagram(DatasetResult):
         return {
             "parameter": data.parameter,
             "cases": data.cases,
-            "transient_periods": data.transient,
-            "kept": data.sizes["iterate"],
+            "transient_periods": data.transient_periods,
+            "recorded_periods": data.sizes["iterate"],
             "direction": data.direction.values.tolist(),
             "value": data.value.values,
             "starts": np.stack([data.start_coordinate.values, data.start_velocity.values], axis=-1),

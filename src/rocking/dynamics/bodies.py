@@ -95,7 +95,7 @@ class LinearBody(ABC):
         stiffness, _, pull, low, high = self.law
         return pull - stiffness * low, stiffness * high - pull if math.isfinite(high) else math.inf
 
-    def to_bodies(self) -> LinearBodies:
+    def as_bodies(self) -> LinearBodies:
         """Return a `LinearBodies` that contains only this body."""
         return LinearBodies((self,))
 
@@ -535,7 +535,7 @@ def _choose_duration(body: LinearBody, motion: Motion | None, duration: float | 
         if motion is None:
             raise InvalidOption("this body is not pressed against a stop and may never rest; specify {}", "duration")
         return motion.end
-    if never_rests(body.to_bodies()):
+    if never_rests(body.as_bodies()):
         raise InvalidOption(
             f"a body with {{}} 1, as this {body.description}, never comes to rest; specify {{}}",
             *("restitution", "duration"),

@@ -50,7 +50,7 @@ class PeriodicForcing:
         if one_period.vertical is not None:
             raise InvalidMotion("motion must not have a vertical component for a stroboscopic map")
         self.body, self.motion = require_body(body), one_period
-        self.bodies = self.body.to_bodies()
+        self.bodies = self.body.as_bodies()
         self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
         if model is not None:
             checks.choice(model, "model", InvalidOption, MODELS)

@@ -64,8 +64,8 @@ def gather_bodies(blocks: Bodies | Body | Iterable[Body]) -> Bodies:
         require_body(body) for body in (cast("Iterable[Body]", blocks) if is_iterable else [cast("Body", blocks)])
     ]
     if len(bodies) == 1:
-        return bodies[0].to_bodies()
-    return KINDS[bodies[0].to_bodies().kind if bodies else "blocks"].from_bodies(bodies)
+        return bodies[0].as_bodies()
+    return KINDS[bodies[0].as_bodies().kind if bodies else "blocks"].from_bodies(bodies)
 
 
 def compute_slenderness(bodies: Bodies) -> Floats:

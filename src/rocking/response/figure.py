@@ -151,7 +151,7 @@ def draw_histories(
 
 def _find_balances(response: Simulated) -> tuple[float, float]:
     """Return the balance on each side, for a one-sided body the same value twice."""
-    (pair,), _ = compute_thresholds(response.block.to_bodies(), response.model)
+    (pair,), _ = compute_thresholds(response.block.as_bodies(), response.model)
     return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
 
 
@@ -242,7 +242,7 @@ def _label_sides(axes: Axes, factors: tuple[float, float]) -> None:
 
 def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
     """Draw the uplift thresholds, which vary with the weight, and the motion beyond them."""
-    (pair,), (weight_part,) = compute_thresholds(response.block.to_bodies(), response.model)
+    (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
     lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
     fill_style: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
     for sign, size, weight_slope in ((-1.0, pair[0], weight_part[0]), (1.0, pair[1], weight_part[1])):

@@ -306,7 +306,7 @@ def find_linear_balance(body: Block | RestrainedBlock) -> Floats:
     For a yielding tendon the first yield is considered, with the smaller of elastic force and strength, so the nearer
     balance is returned.
     """
-    (record,) = body.to_bodies().kernel_records("linear", np.zeros((1, 2)))
+    (record,) = body.as_bodies().kernel_records("linear", np.zeros((1, 2)))
     elastic = _solve_linear_balance(record, record["added_weight"], record["added_push"], record["prestress"])
     if not record["yielding"]:
         return elastic

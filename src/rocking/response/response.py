@@ -140,7 +140,7 @@ class Response(Simulated):
         ]
 
     def _list_parameters(self) -> dict[str, Any]:
-        parameters = self.block.to_bodies().parameters().items()
+        parameters = self.block.as_bodies().parameters().items()
         gravity = {add_unit("gravity", "m/s^2"): self.block.gravity}
         return {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters} | gravity
 

@@ -195,7 +195,7 @@ def _summarize_motion(response: Simulated) -> str:
 def _describe_thresholds(response: Simulated) -> str:
     """Return the uplift thresholds, which vary with the weight under vertical motion."""
     motion = response.motion
-    (pair,), (weight_part,) = compute_thresholds(response.block.to_bodies(), response.model)
+    (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
     plus, minus = (pair / STANDARD_GRAVITY).tolist()
     is_single = plus == minus or math.isinf(minus)
     text = f"{plus:.4f} g" if is_single else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"

@@ -110,7 +110,7 @@ def compute_response(
     factor: float = 1.0,
 ) -> Response:
     """Compute a response like `simulate`, with `name` for the initial coordinate in errors."""
-    scheme, bodies, motion = chattering_scheme(chattering), require_body(block).to_bodies(), check_motion(motion)
+    scheme, bodies, motion = chattering_scheme(chattering), require_body(block).as_bodies(), check_motion(motion)
     setup, ground = Setup(bodies, model, scheme, duration, initial), None
     if factor != 1.0:  # repeated simulations leave the cache unchanged
         ground = prepare_ground.__wrapped__(motion, block.gravity, factor)

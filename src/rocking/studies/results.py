@@ -325,7 +325,7 @@ class BlockTable(DatasetResult):
             name, unit = "factor" if is_factor else measure.short_name, measure.display_unit
             names = [
                 f"{name} {measure.display_factor * value:.4g} {unit}".rstrip()
-                for value in plotted.display_factor.values
+                for value in plotted.scale.values
             ]
             panels, missing = plotted.values, "overturns"
             label = f"{100.0 * float(plotted.fractile):g} % fractile of peak rotation over slenderness"
