@@ -53,7 +53,7 @@ CALLS = [
     (lambda: simulate(InvertedPendulum(2.0, 0.1, 0.5), None, initial_position=0.2), InvalidOption, "-0.1 to 0.1 m"),
     (lambda: simulate(BALL, None, initial_velocity=-1.0), InvalidOption, "into it"),
     (lambda: simulate(BALL, None, chattering="velocity=-1"), InvalidOption, "a positive number, in m/s, or of a block"),
-    (lambda: simulate(3, None), InvalidBlock, "of rocking.dynamics is needed, not int"),
+    (lambda: simulate(3, None), InvalidBlock, "of rocking.dynamics is required, not int"),
     (lambda: simulate(ImpactOscillator(1.0, 0.5, stop=0.1), None), InvalidOption, "duration"),
     (lambda: simulate(Block(width=0.2, height=1.0), None), InvalidBlock, "rocking.simulate"),
     (lambda: dynamics.LinearBodies([]), InvalidBlock, "same kind"),

@@ -197,7 +197,7 @@ def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
     [
         ({"width": "0.2"}, InvalidBlock, "either width and height"),
         ({**STATUE, "p": "3"}, InvalidBlock, "either width and height"),
-        ({**STATUE, "width": "wide"}, InvalidOption, "width takes a length"),
+        ({**STATUE, "width": "wide"}, InvalidOption, "width must be a length"),
         ({**STATUE, "width": "-1"}, InvalidBlock, "positive"),
         ({**STATUE, "width": "nan"}, InvalidBlock, "positive"),
         ({**STATUE, "colour": "red"}, InvalidOption, "no 'colour'"),

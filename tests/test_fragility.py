@@ -407,7 +407,7 @@ def test_data_that_cannot_be_fitted_are_refused(changes, word):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"limit_states": {}}, "limit_states must be a mapping with one entry or more"),
+        ({"limit_states": {}}, "limit_states must be a mapping with at least one entry"),
         ({"limit_states": {"half": -0.5}}, "'half'"),
         ({"motions": []}, "at least one motion"),
     ],
@@ -568,7 +568,7 @@ def test_components_of_one_station_are_one_cluster_where_that_is_asked_for_and_n
         )
         assert number_clusters([*named, beside, PULSES[0], PULSES[1]], "station").tolist() == [0, 1, 0, 2, 3]
         assert capsys.readouterr().err == ""
-    with pytest.raises(InvalidOption, match="clusters station is for records that name theirs"):
+    with pytest.raises(InvalidOption, match="clusters station requires records that name their station"):
         number_clusters(PULSES, "station")
 
 
@@ -610,7 +610,7 @@ def test_labels_of_pandas_that_are_missing_are_on_their_own_and_masked_outcomes_
     ):
         assert fit_fragility(levels, fell, clusters=labels).curves[0].clusters == 5
     masked = np.ma.masked_array(fell, mask=[0, 0, 0, 0, 0, 1])
-    with pytest.raises(InvalidOption, match="some are masked"):
+    with pytest.raises(InvalidOption, match="must not contain masked values"):
         fit_fragility(levels, masked)
     with pytest.raises(InvalidOption, match="must not be masked"):
         rocking.calibrate([rocking.pulses.one_sine(each, 1.0) for each in levels], masked)

@@ -181,7 +181,7 @@ def test_a_tendon_that_has_yielded_leaves_the_block_free():
         (lambda: Tendon(1e5, prestress=5e3, strength=4e3), "must be above its prestress"),
         (lambda: Tendon(0.0, prestress=5e3, strength=6e3), "a yielding tendon requires a stiffness"),
         (lambda: Thrust(0.0, 2.0), "must not be zero"),
-        (lambda: RestrainedBlock(0.4), "a free Block is needed"),
+        (lambda: RestrainedBlock(0.4), "a free Block is required"),
         # Its moment about the pivot is that of the weight: the quotient is zero to the last bit.
         (lambda: RestrainedBlock(Block(width=0.25, height=1.0, mass=1.0), Thrust(0.25 * 9.80665, 0.5)), " 0 m/s"),
         (

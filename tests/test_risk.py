@@ -238,9 +238,9 @@ DAMAGED = "#,,imt='{}',investigation_time={}\nlon,lat,poe-{},poe-0.2\n0,0,0.5,0.
         ("pga_g,annual_rate\n0.1,0.01\n", {}, "two points"),
         ("pga_g,annual_rate\n0.1,0.9\n0.2,1.5\n", {}, "positive and decrease .* that of point 2 is 1.5 after 0.9"),
         ("pga_g,annual_rate\n0.2,0.01\n0.1,0.001\n", {}, "intensities of a hazard curve must be positive and increase"),
-        ("pga_g,annual_rate\n0.1,nan\n0.2,0.1\n", {}, "that of point 1 is nan; correct it or leave the point out"),
-        ("sa_g,annual_rate\n0.1,0.01\n0.2,0.001\n", {}, "period must be given, in s"),
-        ("pga_m_s2,annual_rate\n1,9,0\n2,5,0\n", {}, "1,9,0 is not an intensity and a rate, in 2 cells"),
+        ("pga_g,annual_rate\n0.1,nan\n0.2,0.1\n", {}, "got nan at point 1; correct or remove this point"),
+        ("sa_g,annual_rate\n0.1,0.01\n0.2,0.001\n", {}, "a spectral acceleration requires period, in s"),
+        ("pga_m_s2,annual_rate\n1,9,0\n2,5,0\n", {}, "in 2 cells, as in the heading; got 1,9,0"),
         *[("pga_g,annual_rate\n0.1,0.9\n0.2,0.5\n", {"site": site}, "site") for site in (1, -1, math.nan, "x")],
         ("pga_g,annual_rate\n0.1,0.9\n0.2,0.5\n", {"period": 1.0}, "period belongs .* and this curve is of pga"),
         ("pga_g,annual_rate\n0.1,inf\n0.2,0.1\n", {}, "that of point 1 is inf"),
@@ -592,7 +592,7 @@ def test_a_measure_that_is_not_that_of_observed_outcomes_is_refused(tmp_path):
     table = tmp_path / "observed.csv"
     table.write_text("pga_g,overturned\n0.1,0\n0.2,1\n0.3,0\n0.4,1\n")
     for measure in (Measure("pgv"), Measure("sa", 1.0)):
-        with pytest.raises(InvalidOption, match=f"measure is {measure.name}, but the outcomes are given by pga"):
+        with pytest.raises(InvalidOption, match=f"{measure.name}, but the intensities of the outcomes are pga"):
             read_observed(table, measure)
     assert read_observed(table, Measure("pga"))["measure"] == Measure("pga")
 
@@ -602,7 +602,7 @@ def test_functions_of_intensity_have_one_range():
     functions = (site.rate_of, curve.probability, curve.band, lambda x: curve.largest_rate(x, 100.0))
     for function in functions:
         for wrong in (-1e-300, -1.0, math.nan, [1.0, math.nan]):
-            with pytest.raises(InvalidOption, match="intensities must be numbers that are not negative"):
+            with pytest.raises(InvalidOption, match="intensities must be nonnegative"):
                 function(wrong)
         assert not np.isnan(function([0.0, 1e-300, 1.0, 1e300, math.inf])).any()
     assert [float(function(0.0)) for function in (functions[0], functions[1], functions[3])] == [

@@ -563,7 +563,7 @@ REFUSED = {
     ),
     "support on a line": (
         lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (0.0, 0.0), (-0.1, -0.1)]),
-        "support must have three corners or more that are not on one line",
+        "support must have at least three corners that are not on one line",
     ),
     "support of numbers": (lambda: Solid.from_mesh(box(), support=[0.1, 0.2]), "support must be corners of a polygon"),
     "density of no part": (
@@ -579,12 +579,12 @@ REFUSED = {
     "up": (lambda: Solid.from_mesh(box(), up="north"), "up must be one of x, y, z"),
     "both": (
         lambda: Solid.from_mesh(box(), tolerance=0.01, support=[[0, 0], [0.1, 0], [0, 0.1]]),
-        "tolerance is how a support is looked for: leave it out where support is given",
+        "tolerance is used only to find the support; omit it if support is given",
     ),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
     "a folder": (
         lambda: Solid.from_mesh(Path(__file__).parent),
-        "tests: this is a folder, not a file: name the file in it",
+        "tests: this is a folder, not a file; choose a file in it",
     ),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
     "no mesh": (
@@ -593,7 +593,7 @@ REFUSED = {
     ),
     "inertia": (
         lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, 1), np.diag([1.0, 1.0, 3.0])),
-        "inertia_over_mass is the tensor of no body",
+        "inertia_over_mass must be symmetric",
     ),
     "centre": (lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 1), np.eye(3)), r"centre must be finite numbers of shape"),
     "centre below": (lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, -1), np.eye(3)), "height of the centre of mass"),

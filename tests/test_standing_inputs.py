@@ -80,7 +80,7 @@ WRONG = {
     "a law of a free block": (
         lambda: Block(width=0.4, height=2.0, restitution=Restitution(0.9, 0.5, seed=1)),
         "restitution",
-        "give a law to RestrainedBlock(block, restitution=...)",
+        "for a law, use RestrainedBlock(block, restitution=...)",
     ),
     # Several bodies
     "two gravities": (

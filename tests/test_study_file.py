@@ -129,13 +129,13 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
     with pytest.raises(rocking.errors.StudyError, match="not a text table in UTF-8"):
         read_study(file)
     (tmp_path / "blocks.csv").write_text("p,alpha\n2.0,0.2\nfast,0.2\n")
-    with pytest.raises(rocking.errors.StudyError, match=r"blocks\.csv, line 3: p takes an angular velocity"):
+    with pytest.raises(rocking.errors.StudyError, match=r"blocks\.csv, line 3: p must be an angular velocity"):
         read_study(file)
 
 
 #: What stands in a file (of `TEXT`, or else of `WALLS`), what replaces it, the line of the error, and words of it.
 MISTAKES = r"""
-p = "1:6:5" -> p = "fast" | 2 | p takes an angular velocity
+p = "1:6:5" -> p = "fast" | 2 | p must be an angular velocity
 restitution = 0.9 -> restitutoin = 0.9 | 4 | no restitutoin; did you mean restitution
 {GRID} -> width = 0.3 | 2 | a block needs more than width: give width and height
 [simulation] -> [report.fragility]\n[simulation] | 18 | its options are now those of rocking study report
@@ -152,7 +152,7 @@ chattering = "certified=1e-9" -> chattering = "slow" | 20 | chattering must be
 ["el-centro-meloland-270"] -> ["el-centro-melolnd-270"] | 7 | did you mean the shipped record el-centro-meloland-270
 ["el-centro-meloland-270"] -> [\n"el-centro-meloland-270",\n"nowhere/*.AT2",\n] | 9 | matches this name
 ["el-centro-meloland-270"] -> "el-centro-meloland-270" | 7 | records must be a list of texts
-records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | applies to records, and there
+records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | applies only to records
 [motions] -> [motions]\nskip_unreadable = "no" | 7 | must be true or false
 [motions] -> [motions]\nvertical = "9" | 8 | no file or shipped record '9' for the vertical motion
 [blocks] -> [[blocks]] | 1 | must be one table, [blocks], once
@@ -164,7 +164,7 @@ one_sided = true -> one_sided = 1 | 5 | one_sided must be true or false
 force = [300, 600] -> forze = 300 | 11 | [[blocks.thrusts]] has no forze; did you mean force
 force = [300, 600] -> force = 9e5 | 1 | does not stand
 force = [300, 600]\n ->  | 10 | [[blocks.thrusts]] needs force as well
-follows = false -> follows = "no" | 17 | follows takes a number
+follows = false -> follows = "no" | 17 | follows must be a number
 offset = -0.1 -> offset = -0.5 | 1 | is beyond the pivot
 """
 
@@ -185,7 +185,7 @@ def test_a_mistake_is_a_sentence_with_its_line(file, mistake):
 
 def test_a_file_that_is_no_toml_is_refused(file):
     file.write_text(TEXT.replace("[blocks]", "[blocks"))
-    with pytest.raises(rocking.errors.StudyError, match=f"{file}: this is no TOML file"):
+    with pytest.raises(rocking.errors.StudyError, match=f"{file}: this is not a valid TOML file"):
         read_study(file)
 
 

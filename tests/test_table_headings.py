@@ -126,8 +126,8 @@ REFUSED = [
     ("many of -999.9", "a (gal)\n1\n-999.9\n-999.9\n-3\n", 3, "-999.9 seems to stand for a missing value"),
     ("an unknown unit of time", "Time (fortnights),a (g)\n" + rows(), 1, "not clear from 'fortnights'"),
     ("a unit of time of something", "Recorded (min)\nTime,a (g)\n" + rows(), 2, "not clear from 'min'"),
-    ("a peak in brackets", "# PGA (g) = 0.312\n# Time   Acc\n" + rows(), 3, "the file does not say its units"),
-    ("a conversion", "# 1 g = 981 cm/s2\n# t   acc\n" + rows(), 3, "the file does not say its units"),
+    ("a peak in brackets", "# PGA (g) = 0.312\n# Time   Acc\n" + rows(), 3, "the file does not state its units"),
+    ("a conversion", "# 1 g = 981 cm/s2\n# t   acc\n" + rows(), 3, "the file does not state its units"),
     ("-99", "time (s),a (g)\n0,0.1\n0.01,-99\n0.02,0.2\n", 3, "-99 seems to stand for a missing value"),
     ("24 bits", "time (s),a (gal)\n0,1\n0.01,8388607\n0.02,2\n", 3, "8.38861e+06 seems to stand for a missing value"),
     ("metres", "Time (m),a (g)\n" + rows(), 1, "not clear from 'm'"),
@@ -135,12 +135,12 @@ REFUSED = [
     ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the heading says 'cm/s', which is no unit of an acceleration"),
     ("displacements", "time (s),disp (cm)\n" + rows(), 1, "of an acceleration; give a table of accelerations"),
     ("a unit in Spanish", "t (s),a (cm/seg2)\n" + rows(), 1, "the units 'cm/seg2' are not known; give units as one"),
-    ("a gap in the numbers of rows", "No,t (s),a (g)\n1,0,1\n2,1,2\n4,2,1\n5,3,2\n", 4, "get a record without gaps"),
+    ("a gap in the numbers of rows", "No,t (s),a (g)\n1,0,1\n2,1,2\n4,2,1\n5,3,2\n", 4, "use a record without gaps"),
     ("a factor", "Time (s),a (10^-3 g)\n" + rows(), 1, "the units '10^-3 g' are not known"),
     ("two units", "Time (s),a (g or cm/s2)\n" + rows(), 1, "the units 'g or cm/s2' are not known"),
     ("numbers of rows and no times", "Sample,a (g)\n" + wide(COUNT, SAMPLES), 2, "give dt in seconds"),
     ("components and no times", "NS (g),EW (g)\n" + wide(OTHER, SAMPLES), 2, "give dt in seconds"),
-    ("a spectrum", "Period (s),Sa (g)\n" + rows(), 1, "'Sa', of a spectrum?); give a table of accelerations at times"),
+    ("a spectrum", "Period (s),Sa (g)\n" + rows(), 1, "'Sa', perhaps a spectrum); use a table of"),
     ("unnamed columns", "0 1 2\n1 2 3\n2 3 4\n", 1, "each line holds 3 numbers"),
 ]  # fmt: skip
 
@@ -360,7 +360,7 @@ def test_accelerations_that_are_never_negative_are_read_where_a_column_is_named_
         if is_read:
             assert read(path).pga == pytest.approx(0.3 * G)
         else:
-            with pytest.raises(UnreadableRecord, match="or name their column so"):
+            with pytest.raises(UnreadableRecord, match="or name the column 'time'"):
                 read(path)
 
 
@@ -381,7 +381,7 @@ def test_a_step_that_a_heading_states_is_not_contradicted(stated: str, columns: 
     with pytest.raises(UnreadableRecord, match=r"line 2: the heading says .*, not dt 0.02 s; correct one of them"):
         read(path, dt=0.02, units="gal", channel=channel)
     if columns == 1:
-        with pytest.raises(UnreadableRecord, match=r"no column holds times, but the heading says .*; give dt"):
+        with pytest.raises(UnreadableRecord, match=r"no column contains times, but the heading states .*; give dt"):
             read(path, units="gal")
 
 

@@ -105,8 +105,8 @@ class Header:
         numbers = [parse_token(group.encode("latin-1")) or 0.0 for group in match.groups()] if match else [0.0]
         if not all(number > 0.0 for number in numbers):
             line = self.source.read_line(self.find_offset(key))
-            text = f"expected a positive number in {escape_braces(repr(line.text))}; correct it, or download the file again"
-            raise self.source.error(text, line.start)
+            text = f"expected a positive number in {escape_braces(repr(line.text))}"
+            raise self.source.error(f"{text}; correct it, or download the record again", line.start)
         return numbers
 
 
