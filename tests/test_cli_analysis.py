@@ -315,7 +315,7 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     ("arguments", "said"),
     [
         (["--scale", "3"], "--scale requires a motion; add one with --motion or --pulse"),
-        (["--vertical", "up"], "--vertical requires motions"),
+        (["--vertical", "up"], "--vertical requires a motion"),
         (["--candidates", "512"], "--candidates requires a table of outcomes"),
     ],
 )

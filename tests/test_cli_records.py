@@ -243,7 +243,7 @@ def test_units_and_step_apply_to_those_of_several_files_that_do_not_say_theirs(r
     assert run("simulate", folder, *BLOCK, "--units", "m/s2", "--dt", 0.02)[0] == 0
     # Of one file alone a contradiction is refused.
     code, _, err = run("simulate", folder / "r0.AT2", *BLOCK, "--units", "m/s2")
-    assert code == 2 and "the units are g" in err
+    assert code == 2 and "the units in the file are g" in err
 
 
 def test_a_channel_is_for_those_of_several_files_that_hold_several(run, folder):

@@ -198,9 +198,9 @@ NARROW += b"property list uchar int vertex_indices\nend_header\n0\n1\n2\n3 0 1 2
 HOSTILE = {
     "other.gltf": (
         gltf(buffers=[{"uri": "../secret.bin", "byteLength": 9}]),
-        "cannot be read: it lacks '../secret.bin'",
+        "cannot be read: '../secret.bin' is missing",
     ),
-    "web.gltf": (gltf(buffers=[{"uri": "http://127.0.0.1:9/a", "byteLength": 9}]), "cannot be read: it lacks 'http:"),
+    "web.gltf": (gltf(buffers=[{"uri": "http://127.0.0.1:9/a", "byteLength": 9}]), "cannot be read: 'http:"),
     "bomb.gltf": (gltf(), "cannot be read"),
     "deep.gltf": (b'{"a":' + b"[" * 200_000, "cannot be read"),
     "cut.glb": (b"glTF\x02\x00\x00\x00" + b"\xff" * 40, "cannot be read"),
@@ -208,13 +208,13 @@ HOSTILE = {
     "nan.stl": (content(box())[:96] + struct.pack("<f", math.nan) + content(box())[100:], "are not finite"),
     "inf.obj": (content(box(), "obj").replace(b"0.15000000", b"1e999", 1), "(cannot be read|are not finite)"),
     "wide.obj": (content(box(), "obj").replace(b"0.15000000", b"1e20", 1), "m large, outside the range of bodies"),
-    "text.obj": (b"hello\n" * 9, "(cannot be read|holds no faces)"),
-    "empty.stl": (b"", "(cannot be read|holds no faces)"),
+    "text.obj": (b"hello\n" * 9, "(cannot be read|contains no faces)"),
+    "empty.stl": (b"", "(cannot be read|contains no faces)"),
     "flat.obj": (content(FLAT, "obj"), "^flat.obj: encloses no volume"),
     "point.obj": (b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "all corners of the mesh coincide"),
     "far.obj": (content(FLAT, "obj") + b"f 1 2 99\n", "(cannot be read|no volume)"),
     "huge.ply": (HUGE, "contains 700000 triangles; use a coarser mesh of at most 500000"),
-    "narrow.ply": (NARROW, "cannot be read: it lacks 'y'"),
+    "narrow.ply": (NARROW, "cannot be read: 'y' is missing"),
     "count.ply": (HUGE.replace(b"700000", b"9" * 15), "cannot be read"),
 }
 

@@ -248,7 +248,7 @@ def test_a_table_of_tests_is_read_with_its_units_and_labels(tmp_path):
         (
             "motion,overturned,specimen\nridgecrest-clc-090,1,a\nridgecrest-clc-090,1,b",
             1,
-            "of 2 specimens; use a table for each",
+            "of 2 specimens; use one table for each",
         ),
         ("motion,overturned,overturned\nx,1,1", 1, "must be distinct"),
         ("motion,overturned\nno-such-file.txt,1", 2, "no-such-file.txt"),

@@ -54,7 +54,7 @@ MISTAKES = [
     ("sinus:amplitude=1", "there is no pulse 'sinus'; did you mean sine?"),
     ("zzz:amplitude=1", "there is no pulse 'zzz'; there are half-sine, .* and triangular"),
     ("sine", "the pulse sine needs amplitude, frequency and cycles as well"),
-    ("sine:amplitude=1,frequency=1", "the pulse sine needs cycles as well"),
+    ("sine:amplitude=1,frequency=1", "the pulse sine also requires cycles"),
     ("sine:amplitude=1,frequncy=1", "has no frequncy; did you mean frequency?"),
     ("sine:amplitude=1,zzz=1", "has no zzz; it accepts amplitude, frequency, cycles and phase"),
     ("sine:amplitude=1,amplitude=2", "amplitude is given twice"),

@@ -122,22 +122,22 @@ REFUSED = [
     ("two damaged rows", "t,a\n0,?\n\n0.01,?\n" + rows(start=2), 4, "'?' is not a number"),
     ("a damaged time below names", "t (s)  a (g)\nx.csv  0.1\n" + rows(start=1, sign="  "), 2, "'x.csv' is not"),
     ("one damaged number", "a (g)\n0.l\n0.2\n0.3\n", 2, "'0.l' is not a number"),
-    ("9999", "time (s),a (g)\n0,0.1\n0.01,9999\n0.02,0.2\n", 3, "9999 seems to stand for a missing value"),
-    ("many of -999.9", "a (gal)\n1\n-999.9\n-999.9\n-3\n", 3, "-999.9 seems to stand for a missing value"),
+    ("9999", "time (s),a (g)\n0,0.1\n0.01,9999\n0.02,0.2\n", 3, "9999 seems to represent a missing"),
+    ("many of -999.9", "a (gal)\n1\n-999.9\n-999.9\n-3\n", 3, "-999.9 seems to represent a missing"),
     ("an unknown unit of time", "Time (fortnights),a (g)\n" + rows(), 1, "not clear from 'fortnights'"),
     ("a unit of time of something", "Recorded (min)\nTime,a (g)\n" + rows(), 2, "not clear from 'min'"),
     ("a peak in brackets", "# PGA (g) = 0.312\n# Time   Acc\n" + rows(), 3, "the file does not state its units"),
     ("a conversion", "# 1 g = 981 cm/s2\n# t   acc\n" + rows(), 3, "the file does not state its units"),
-    ("-99", "time (s),a (g)\n0,0.1\n0.01,-99\n0.02,0.2\n", 3, "-99 seems to stand for a missing value"),
-    ("24 bits", "time (s),a (gal)\n0,1\n0.01,8388607\n0.02,2\n", 3, "8.38861e+06 seems to stand for a missing value"),
+    ("-99", "time (s),a (g)\n0,0.1\n0.01,-99\n0.02,0.2\n", 3, "-99 seems to represent a missing"),
+    ("24 bits", "time (s),a (gal)\n0,1\n0.01,8388607\n0.02,2\n", 3, "8.38861e+06 seems to represent a missing"),
     ("metres", "Time (m),a (g)\n" + rows(), 1, "not clear from 'm'"),
-    ("volts", "Time (s),Sensor (mV)\n" + rows(), 1, "the units 'mV' are not known; give units as one of"),
-    ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the heading says 'cm/s', which is no unit of an acceleration"),
+    ("volts", "Time (s),Sensor (mV)\n" + rows(), 1, "the units 'mV' are unknown; give units as one of"),
+    ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the heading says 'cm/s', which is not a unit of an acceleration"),
     ("displacements", "time (s),disp (cm)\n" + rows(), 1, "of an acceleration; give a table of accelerations"),
-    ("a unit in Spanish", "t (s),a (cm/seg2)\n" + rows(), 1, "the units 'cm/seg2' are not known; give units as one"),
+    ("a unit in Spanish", "t (s),a (cm/seg2)\n" + rows(), 1, "the units 'cm/seg2' are unknown; give units as one"),
     ("a gap in the numbers of rows", "No,t (s),a (g)\n1,0,1\n2,1,2\n4,2,1\n5,3,2\n", 4, "use a record without gaps"),
-    ("a factor", "Time (s),a (10^-3 g)\n" + rows(), 1, "the units '10^-3 g' are not known"),
-    ("two units", "Time (s),a (g or cm/s2)\n" + rows(), 1, "the units 'g or cm/s2' are not known"),
+    ("a factor", "Time (s),a (10^-3 g)\n" + rows(), 1, "the units '10^-3 g' are unknown"),
+    ("two units", "Time (s),a (g or cm/s2)\n" + rows(), 1, "the units 'g or cm/s2' are unknown"),
     ("numbers of rows and no times", "Sample,a (g)\n" + wide(COUNT, SAMPLES), 2, "give dt in seconds"),
     ("components and no times", "NS (g),EW (g)\n" + wide(OTHER, SAMPLES), 2, "give dt in seconds"),
     ("a spectrum", "Period (s),Sa (g)\n" + rows(), 1, "'Sa', perhaps a spectrum); use a table of"),
@@ -207,7 +207,7 @@ def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) 
     assert channel.times is not None and channel.times.tolist() == [0.0, 0.005, 0.02]
     path.write_text("t (ms),a (g)\n0,0.1\n5,0.2\n10,0.3\n")
     assert read(path, dt=0.005).dt == 0.005
-    with pytest.raises(UnreadableRecord, match=r"the sampling step is 0\.005 s, not dt 5 s"):
+    with pytest.raises(UnreadableRecord, match=r"the sampling step in the file is 0\.005 s, not dt 5 s"):
         read(path, dt=5.0)
 
 
@@ -265,7 +265,7 @@ def test_components_alone_are_read_with_a_step(tmp_path, names):
 
 def test_of_a_folder_those_that_say_something_else_keep_it_or_are_refused(tmp_path):
     path = tmp_path / "table.csv"
-    for unit, what in (("cm/s", "'cm/s', which is no unit of"), ("counts", "the units 'counts' are not known")):
+    for unit, what in (("cm/s", "'cm/s', which is not a unit of"), ("counts", "the units 'counts' are unknown")):
         path.write_text(f"t (s),v ({unit})\n" + rows())
         with pytest.raises(UnreadableRecord, match=what):
             load_motion(str(path), units="g", several=True)
@@ -378,7 +378,7 @@ def test_a_step_that_a_heading_states_is_not_contradicted(stated: str, columns: 
     path.write_text(f"A STATION\n{stated}\n{names}" + wide(*[SAMPLES] * columns, sign="  "))
     channel = 1 if columns == 3 else None
     assert read(path, dt=0.01, units="gal", channel=channel).dt == 0.01
-    with pytest.raises(UnreadableRecord, match=r"line 2: the heading says .*, not dt 0.02 s; correct one of them"):
+    with pytest.raises(UnreadableRecord, match=r"line 2: the heading states .*, not dt 0.02 s; correct one of them"):
         read(path, dt=0.02, units="gal", channel=channel)
     if columns == 1:
         with pytest.raises(UnreadableRecord, match=r"no column contains times, but the heading states .*; give dt"):

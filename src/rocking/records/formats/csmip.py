@@ -175,7 +175,7 @@ def _choose_step(header: Header, reals: Floats, points: int) -> float:
     # The duration is printed in whole seconds, in some files without the last interval.
     matching = [step for step in steps if not duration or abs(points * step - duration) <= 1.0 + step]
     if not matching:
-        text = f"real headers 34 and 62 do not contain the step of {points} points with the stated duration"
+        text = f"real headers 34 and 62 are inconsistent with {points} points and the stated duration"
         raise header.source.error(f"{text}; correct the header, or download the file again", data_line.start)
     return matching[0]
 

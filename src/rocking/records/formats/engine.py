@@ -280,7 +280,7 @@ def read_values(source: Source, start: int, end: int, layout: Layout | None, sta
         raise invalid_number_error(source, *max(tokens, key=lambda token: token[1]))
     if not stated.fits(len(values)):
         advice = "remove the other values" if len(values) > stated.values else "download the complete file again"
-        mismatch = f"{stated.stated_by} states {stated.values:.15g} values, but {len(values)} follow"
+        mismatch = f"{stated.stated_by} specifies {stated.values:.15g} values, but {len(values)} follow"
         raise source.error(f"{mismatch}; {advice}, or correct that number", stated.offset)
     return values
 

@@ -110,7 +110,7 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
         name = str(getattr(path, "name", "<"))
         name = "standard input" if name.startswith("<") or name.isdecimal() else name
     elif not isinstance(path, (str, bytes, os.PathLike)):
-        raise UnreadableRecord(f"the path of a record must be the name of a file, not {path!r}")
+        raise UnreadableRecord(f"the path of a record must be a file name, not {path!r}")
     else:
         name = os.fsdecode(path)
     try:
