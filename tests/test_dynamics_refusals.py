@@ -88,7 +88,7 @@ CALLS = [
     (lambda: basins(BLOCK, TABLE, [0.1, 0.0], [0.0]), InvalidOption, "positions must be increasing"),
     (lambda: basins(BALL, TABLE, [0.0, 1.0], [0.0, 1e308]), InvalidOption, "velocities must be finite"),
     (lambda: basins(BALL, TABLE, [0.0, 1.0], [-1.0, 1.0]), InvalidOption, "^velocities must not point into a stop"),
-    (lambda: basins(STOPPED, TABLE, [0.0, 0.03], [0.0, 1.0]), InvalidOption, "^velocities .* 1 m/s at 0.03 m:"),
+    (lambda: basins(STOPPED, TABLE, [0.0, 0.03], [0.0, 1.0]), InvalidOption, "^velocities .* 1 m/s at 0.03 m;"),
     (lambda: basins(BALL, TABLE, [-1.0, 1.0], [0.0, 1.0]), InvalidOption, "^positions must be at least 0 m"),
     (lambda: basins(BLOCK, TABLE, [0.1], []), InvalidOption, "velocities"),
     (lambda: chattered(np.nan), InvalidOption, "a must be finite"),

@@ -47,7 +47,7 @@ WRONG = {
     "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
     # Restraints
     "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is not a restraint; give Tendon, Spring"),
-    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them together"),
+    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "and all restraints together"),
     "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "requires its mass, kg"),
     "sizes of a wall without names": (
         lambda: Block.one_sided(0.4, 4.0), "width", "a block requires either half_width and half_height, or"
