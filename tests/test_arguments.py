@@ -76,7 +76,7 @@ TAKES_A_BLOCK = {
 @pytest.mark.parametrize("block", [(0.2, 1.0), 0.2, "statue", None, MOTION, [BLOCK, 0.2]])
 def test_what_is_no_block_is_refused_and_told_how_to_become_one(take, block):
     with pytest.raises(
-        InvalidBlock, match=r"a (free )?Block( or another body)? is needed, not a .*: make one with Block"
+        InvalidBlock, match=r"a (free )?Block( or another body)? is required, not a .*; create one with Block"
     ):
         TAKES_A_BLOCK[take](block)
 
@@ -199,5 +199,5 @@ def test_nothing_is_shaken_more_than_a_motion_may_be(level):
 
 @pytest.mark.parametrize("period", [1e300, 1e9])
 def test_a_period_that_says_nothing_is_refused(period):
-    with pytest.raises(InvalidMotion, match="a period above a million times the duration"):
+    with pytest.raises(InvalidMotion, match="a period longer than one million times the duration"):
         MOTION.spectral_acceleration(period)

@@ -24,9 +24,9 @@ def test_balls_and_blocks_are_bodies():
         assert isinstance(body, Body) and isinstance(body.as_bodies(), Bodies)
         assert not isinstance(body, Bodies) and not isinstance(body.as_bodies(), Body)
     for other in (0.4, "block", rocking.Block, [block]):
-        with pytest.raises(InvalidBlock, match="a Block or another body is needed"):
+        with pytest.raises(InvalidBlock, match="a Block or another body is required"):
             simulate(other, None)
-    with pytest.raises(InvalidBlock, match=r"not a Solid: use solid\.block\(azimuth\)"):
+    with pytest.raises(InvalidBlock, match=r"not a Solid; use solid\.block\(azimuth\)"):
         simulate(rocking.Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, 1), [[1, 0, 0], [0, 1, 0], [0, 0, 1]]), None)
 
 

@@ -642,7 +642,7 @@ def test_an_ensemble_is_read_as_it_was_written(found, tmp_path):
         assert getattr(read.blocks, name) == pytest.approx(getattr(found.blocks, name), rel=1e-9)
     text = (tmp_path / "ensemble.csv").read_text()
     for damaged, said in (
-        (text.replace("weight", "wait", 1), "line 1: not the ensemble.csv"),
+        (text.replace("weight", "wait", 1), "line 1: expected the ensemble.csv"),
         (text.replace("linear", "cubic", 1), "line 2: 'cubic' is not linear or nonlinear"),
         (text.replace("linear", "nonlinear", 1), "one model"),
     ):

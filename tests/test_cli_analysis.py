@@ -119,8 +119,11 @@ LEVELS = ["--levels", "0.1g:1.2g:12"]
     [
         (["fragility", RECORD, OTHER, *SIZES, *LEVELS, "--taxonomy", "a block", "--out", "out"], "--taxonomy of NRML"),
         (["fragility", RECORD, *SIZES, *LEVELS, "--limit-states", "a half=0.5", "--out", "out"], "limit state of NRML"),
-        (["fragility", RECORD, OTHER, *SIZES, *STRIPES, "--hazard", "site.csv"], "fit the one against the other's"),
-        (["fragility", RECORD, OTHER, *SIZES, "--levels", "0.5g"], "--levels must contain two levels or more"),
+        (
+            ["fragility", RECORD, OTHER, *SIZES, *STRIPES, "--hazard", "site.csv"],
+            "against the measure of the hazard curve",
+        ),
+        (["fragility", RECORD, OTHER, *SIZES, "--levels", "0.5g"], "--levels must contain at least two levels"),
         (["measures", RECORD, OTHER, *SIZES, "--damping", "1.5"], "--damping must be a fraction"),
         (["check", RECORD, OTHER, *SIZES, "--rules", "west,east"], "--rules must be one of"),
     ],
@@ -305,14 +308,14 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
         assert (code, err) == (0, "")
         assert json.loads(out)["curves"][0]["median_interval"] == list(fitted.curves[0].median_interval)
     code, _, err = run(*stripes, "--clusters", "a,b")
-    assert code == 2 and "--clusters must hold 6 labels" in err
+    assert code == 2 and "--clusters must contain 6 labels" in err
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--scale", "3"], "--scale requires motions from --motion or --pulse"),
-        (["--vertical", "up"], "--vertical requires motions"),
+        (["--scale", "3"], "--scale requires a motion; add one with --motion or --pulse"),
+        (["--vertical", "up"], "--vertical requires a motion"),
         (["--candidates", "512"], "--candidates requires a table of outcomes"),
     ],
 )

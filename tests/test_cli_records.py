@@ -119,7 +119,10 @@ def test_without_openpyxl_a_note_says_why_there_is_no_workbook(run, folder, tmp_
         monkeypatch.setitem(sys.modules, name, None)
     code, _, err = run("simulate", folder, *BLOCK, "--out", tmp_path)
     assert code == 0
-    assert "note: summary.xlsx left out: a workbook needs openpyxl: run pip install '.[excel]' in the source" in err
+    assert (
+        "note: summary.xlsx left out: an Excel workbook requires openpyxl: run pip install '.[excel]' in the source"
+        in err
+    )
     assert not (tmp_path / "summary.xlsx").exists()
 
 
@@ -240,7 +243,7 @@ def test_units_and_step_apply_to_those_of_several_files_that_do_not_say_theirs(r
     assert run("simulate", folder, *BLOCK, "--units", "m/s2", "--dt", 0.02)[0] == 0
     # Of one file alone a contradiction is refused.
     code, _, err = run("simulate", folder / "r0.AT2", *BLOCK, "--units", "m/s2")
-    assert code == 2 and "the units are g" in err
+    assert code == 2 and "the units in the file are g" in err
 
 
 def test_a_channel_is_for_those_of_several_files_that_hold_several(run, folder):
@@ -262,14 +265,14 @@ def test_a_folder_is_listed_although_some_files_cannot_be_read(run, folder):
     code, out, err = run("records", folder)
     assert code == 2
     assert err == f"rocking: 1 of 4 files cannot be read: {folder / 'notes.txt'}\n"
-    assert out.count("PEER AT2") == 3 and f"{folder / 'notes.txt'}: this is text in no format known here" in out
+    assert out.count("PEER AT2") == 3 and f"{folder / 'notes.txt'}: the format of this text is unknown" in out
     code, out, _ = run("records", folder, "--json")
     assert code == 2
     files = json.loads(out)["files"]
     assert [("error" in each, Path(each["file"]).name) for each in files][-1] == (True, "notes.txt")
     assert len(files) == 4
     code, out, err = run("records", folder / "notes.txt")
-    assert (code, out) == (2, "") and "this is text in no format known here" in err
+    assert (code, out) == (2, "") and "the format of this text is unknown" in err
 
 
 def test_a_hyphen_is_a_polarity(run):

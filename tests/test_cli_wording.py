@@ -19,16 +19,16 @@ PULSE = "one-sine:amplitude=0.4g,frequency=1Hz"
 #: its parameters, {W} a wall of a mass, {P} a pulse.
 MISTAKES = """
 simulat | there is no command simulat; did you mean simulate?
-simulate {R} | a block is needed: give --width and --height, or --half-width and --half-height, or --p and --alpha
+simulate {R} | a block is required; give --width and --height, or --half-width and --half-height, or --p and --alpha
 simulate {S} | at least one record is required
-simulate {R} --width 1 | a block needs more than --width: give --width and --height
+simulate {R} --width 1 | a block requires more than --width; give --width and --height
 simulate {R} {S} --p 2 | different descriptions
-simulate {R} --alpha 12deg | a block needs more than --alpha: give --p and --alpha; p is sqrt(3 g/(4 R))
+simulate {R} --alpha 12deg | a block requires more than --alpha; give --p and --alpha; p is sqrt(3 g/(4 R))
 simulate {R} --width -0.24 --height 1 | --width must be a positive number, in m, not -0.24
-simulate {R} --width 24kg --height 1 | --width takes a length as 0.2, 0.2m or 20cm, not '24kg'
-simulate {R} --half-width 2 --half-height 1 | give --restitution
-simulate {R} --width 1.1 --height 0.24 | correct its sizes if they are swapped, or give --restitution a value in (0, 1]
-simulate {R} --p 2 --alpha 12 | is taken for rad, and pi/2 is the limit; did you mean 12deg?
+simulate {R} --width 24kg --height 1 | --width must be a length, as 0.2, 0.2m or 20cm, not '24kg'
+simulate {R} --half-width 2 --half-height 1 | set --restitution
+simulate {R} --width 1.1 --height 0.24 | if they are swapped, or set --restitution to a value in (0, 1]
+simulate {R} --p 2 --alpha 12 | which is read as rad; did you mean 12deg?
 simulate {R} {S} --initial-rotation 95deg | --initial-rotation must be below 90deg in size, not 95deg
 simulate {R} {S} --restituton 0.9 | has no option --restituton; did you mean --restitution?
 simulate {R} {S} --model cubic | "cubic" for --model. Choose from: "nonlinear", "linear"
@@ -36,42 +36,42 @@ simulate {R} {S} --chattering foo | one of time, certified, velocity, bypass, in
 simulate {R} {S} --chattering certified=0 | --chattering "certified=0": tolerance must be a positive number, in s, not 0
 simulate {R} {S} --scale 2 --pga 0.5g | --scale and --pga
 simulate {R} {S} --sa 0.4g | 0.4g@1.0
-simulate {R} {S} --pga | --pga needs a value; see rocking simulate --help
-simulate {R} {S} --pga -0.4g | --pga must be positive; got -0.4g; --scale -1 reverses a motion
-simulate {R} {S} --channel 7 | a shipped record is one channel, with its step and units; leave --channel out
+simulate {R} {S} --pga | --pga requires a value; see rocking simulate --help
+simulate {R} {S} --pga -0.4g | --pga must be positive; got -0.4g; use --scale -1 to reverse a motion
+simulate {R} {S} --channel 7 | a shipped record has one channel, with known step and units; omit --channel
 simulate {R} {S} --energy | --energy writes files
 simulate {R} {S} --each | --out
 simulate ridgecrest-clc-91 {S} | did you mean the shipped record ridgecrest-clc-090?
-simulate {P} --offset 0.1 | needs more than --offset: give --width and --height, or --half-width and --half-height
+simulate {P} --offset 0.1 | requires more than --offset; give --width and --height, or --half-width and --half-height
 simulate {P} {W} --tendon stiffnes=1 | --tendon has no stiffnes; did you mean stiffness?
-simulate {P} {W} --tendon prestress=1 | --tendon needs stiffness
+simulate {P} {W} --tendon prestress=1 | --tendon also requires stiffness
 simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon must be NAME=VALUE pairs separated by commas
 simulate {P} {W} --tendon stiffness=-1 | --tendon: stiffness of a tendon must be at least 0 N/m, not -1
 simulate {P} {W} --load mass=1,height=2,follows=maybe | --load must contain follows=yes or follows=no; got 'maybe'
 simulate {P} {W} --lean 40deg | --lean must be between -0.1244 and 0.1244 rad
 spectrum {R} --p 1 | a spectrum requires --alpha, or the --ensemble of a calibration
-spectrum {R} --alpha 0.2 | one of --p
-spectrum {R} --alpha 0.2 --p 1 --size 1 | give not both of --p (rad/s) and --size (half diagonals, m)
+spectrum {R} --alpha 0.2 | give either --p
+spectrum {R} --alpha 0.2 --p 1 --size 1 | give either --p (rad/s) or --size (half diagonals, m), not both
 spectrum --alpha 0.2 --p 2 | record
-spectrum {R} --alpha 0.2 --p 1:2 | --p takes numbers, 1,2,5, or a range
+spectrum {R} --alpha 0.2 --p 1:2 | --p must be numbers, as 1,2,5, or a range
 spectrum {R} --alpha 0.2 --p 1:2:9999999 | COUNT
-spectrum {R} --alpha 0.1:0.3:10000 --p 1:9:10000 | can be computed: take fewer
-map sine | a block is needed
-map sine --alpha 0.2 | the pulse sine needs cycles as well
-map half-sine --cycles 3 --alpha 0.2 | the pulse half-sine has no cycles; it takes amplitude and frequency
-ida {R} {S} --measure pgv --levels 0.2g:1g:5 | --levels takes a velocity as 40cm/s or 0.4 (m/s), not '0.2g'
+spectrum {R} --alpha 0.1:0.3:10000 --p 1:9:10000 | points; use at most
+map sine | a block is required
+map sine --alpha 0.2 | the pulse sine also requires cycles
+map half-sine --cycles 3 --alpha 0.2 | the pulse half-sine has no cycles; it accepts amplitude and frequency
+ida {R} {S} --measure pgv --levels 0.2g:1g:5 | --levels must be a velocity, as 40cm/s or 0.4 (m/s), not '0.2g'
 ida {R} {S} --measure pga_ratio --levels 0.2g,1g | which is in units of the block; got '0.2g'
 fragility {R} --ensemble none.csv --restitution 0.5 | --ensemble replaces the block: omit --restitution
 measures {R} --ensemble none.csv --one-sided --spring 2 | omit --one-sided and --spring
 fragility {R} {S} --limit-states half=0.5,half=0.7 | contains half twice
 fragility {R} {S} --limit-states overturning=0.5 | must not name a rotation 'overturning'
-fragility {R} {S} --site 2 | --site requires a curve from --hazard
+fragility {R} {S} --site 2 | --site requires a hazard curve; add one with --hazard
 chatter one 2 0.9 | Invalid value for A: unable to convert "one" into float; see rocking chatter --help
-chatter 1.5 2 | rocking chatter needs ETA; see rocking chatter --help
-chatter | rocking chatter needs A; see
+chatter 1.5 2 | rocking chatter requires ETA; see rocking chatter --help
+chatter | rocking chatter requires A; see
 mesh nobody.obj | nobody.obj: there is no such file
-mesh statue --density heavy | --density takes a number, not 'heavy'
-mesh statue --restitution 0.9 | --restitution requires blocks from --azimuth: add one
+mesh statue --density heavy | --density must be a number, not 'heavy'
+mesh statue --restitution 0.9 | --restitution applies only to blocks created by --azimuth; add
 explore --port http | --port: http is not a whole number; see rocking explore --help
 pulses sine x | Unused Tokens: ['sine', 'x']; see rocking pulses --help
 --version --verbos | Did you mean --verbose?
@@ -229,7 +229,7 @@ def test_a_map_takes_a_block_as_the_other_commands_do(run):
     sided = run("map", "one-sine", *ECCENTRIC, *grid)
     assert json.loads(sided[1])["restitution"] == pytest.approx([0.950255, 0.913887], abs=1e-6)
     code, _, err = run("map", "one-sine", "--alpha", "0.27417,0.155", *grid)
-    assert code == 2 and "follows from --p and --alpha of both: also set --p" in err
+    assert code == 2 and "depends on --p and --alpha of both; also set --p" in err
 
 
 @pytest.mark.thorough
@@ -248,4 +248,4 @@ def test_a_file_in_the_way_of_a_folder_is_one_sentence(run, tmp_path):
         *("simulate", RECORD, "el-centro-meloland-360", "--width", "0.24", "--height", "1", "--each"), "--out", tmp_path
     )
     assert code == 2
-    assert err.splitlines()[-1] == f"rocking: {tmp_path / RECORD}: this folder cannot be made: File exists"
+    assert err.splitlines()[-1] == f"rocking: {tmp_path / RECORD}: this folder cannot be created: File exists"

@@ -80,7 +80,7 @@ def test_a_measure_in_the_blocks_own_units_serves_blocks_of_all_sizes():
 
 def test_what_cannot_be_compared_is_told_in_one_sentence():
     pulse = rocking.pulses.half_sine(1.0, 1.0)
-    with pytest.raises(rocking.errors.InvalidOption, match="must contain two motions or more"):
+    with pytest.raises(rocking.errors.InvalidOption, match="must contain at least two motions"):
         compare_measures(SLENDER, pulse)
     with pytest.raises(rocking.errors.InvalidOption, match="periods must be one or more positive"):
         compare_measures(SLENDER, [pulse, pulse], periods=[0.0])

@@ -64,7 +64,7 @@ def test_a_pulse_of_the_defaults_of_its_fields_can_be_made(name):
 def test_two_sides_are_read_where_a_parameter_may_have_them_and_refused_elsewhere():
     assert PARAMETERS["restitution"].read("0.9,0.8") == (0.9, 0.8)
     assert PARAMETERS["pivots"].read("20cm,0.1") == (0.2, 0.1)
-    with pytest.raises(InvalidOption, match="takes a length"):
+    with pytest.raises(InvalidOption, match="must be a length"):
         PARAMETERS["width"].read("0.2,0.3")
 
 

@@ -59,12 +59,12 @@ def complaint(path: Path | str, error: type[RockingError] = UnreadableRecord, **
 
 #: What the fixtures hold that are no records of acceleration: the words of their refusal.
 REFUSED = {
-    "nga.vt2": "line 4: this PEER AT2 file holds 'velocity'; give the file of the acceleration",
-    "nga.dt2": "line 4: this PEER AT2 file holds 'displacement'",
-    "velocity.smc": "this USGS SMC file holds 'velocity'",
-    "velocity.asc": "this ESM file holds 'velocity'",
-    "velocity.v2c": "this COSMOS file holds 'velocity'",
-    "raw.v0c": "this COSMOS file holds 'raw accel.'",
+    "nga.vt2": "line 4: this PEER AT2 file contains 'velocity'; use the file of the acceleration",
+    "nga.dt2": "line 4: this PEER AT2 file contains 'displacement'",
+    "velocity.smc": "this USGS SMC file contains 'velocity'",
+    "velocity.asc": "this ESM file contains 'velocity'",
+    "velocity.v2c": "this COSMOS file contains 'velocity'",
+    "raw.v0c": "this COSMOS file contains 'raw accel.'",
 }
 
 #: Those of records with a header.
@@ -256,7 +256,7 @@ def test_labels_of_at2_are_on_the_second_line_of_the_file(file: Callable[[str], 
 def test_at2_may_touch_and_may_lack_the_units_line(file: Callable[[str], Path]) -> None:
     packed = "".join(f"{value:15.8E}" for value in (-0.5, -0.25, 0.125, -0.0625, -0.03125)) + "\n"
     text = f"header\nNPTS=5, DT=.01\n{packed}"
-    assert "does not say its units; give units as" in complaint(file(text))
+    assert "does not state its units; give units as" in complaint(file(text))
     assert read(file(text), units="m/s2").samples.tolist() == [-0.5, -0.25, 0.125, -0.0625, -0.03125]
 
 
@@ -296,7 +296,7 @@ def test_the_first_values_of_smc_are_the_record(title, rate, padding: int, count
         f"{4.0 + k:10.4f}" + "\n" * (k == 7) for k in range(padding)
     )
     if padding == 9:
-        assert f"the header says {count} values but {count + 9} follow" in complaint(file(padded))
+        assert f"the header specifies {count} values, but {count + 9} follow" in complaint(file(padded))
         return
     (plain,), (channel,) = channels(file(written.smc(values, rate=rate, title=title))), channels(file(padded))
     np.testing.assert_array_equal(channel.acceleration, plain.acceleration)
@@ -310,7 +310,7 @@ def test_uneven_times_contradict_a_step(form: str, file: Callable[[str], Path]) 
     v1 = written.csmip_v1_pairs([(1, "90 Deg", times, [x / 1000.0 for x in pairs[1::2]])])
     path = file(v1 if form == "CSMIP V1" else written.smc(pairs, rate=None))
     assert channels(path)[0].times is not None
-    assert "the times are not evenly 0.02 s apart; leave dt out" in complaint(path, dt=0.02)
+    assert "the times are not evenly 0.02 s apart; omit dt" in complaint(path, dt=0.02)
     request = source.Request.create(0.02, None, several=True)
     assert formats.read_channel(path, request).times is not None
 
@@ -348,13 +348,15 @@ def test_knet_counts_keep_their_offset() -> None:
     assert (kik.name, kik.azimuth, kik.dt) == ("E-W", 90.0, 0.005)
 
 
-@pytest.mark.parametrize(("samples", "advice"), [(200, "get"), (299, "get"), (300, ""), (399, ""), (400, "remove")])
+@pytest.mark.parametrize(
+    ("samples", "advice"), [(200, "download"), (299, "download"), (300, ""), (399, ""), (400, "remove")]
+)
 def test_knet_lasts_its_whole_seconds_and_less_than_one_more(samples: int, advice: str, file) -> None:
     text = written.knet([100 + k % 7 for k in range(samples)])
     text = text.replace(f"{'Duration Time(s)':<18}{samples // 100}\n", f"{'Duration Time(s)':<18}3\n")
     assert f"{'Duration Time(s)':<18}3\n" in text
     if advice:
-        says = f"line 12: the duration says 300 values but {samples} follow; {advice}"
+        says = f"line 12: the duration specifies 300 values, but {samples} follow; {advice}"
         assert says in complaint(file(text))
     else:
         assert len(read(file(text)).breakpoints) == samples
@@ -369,7 +371,7 @@ def test_knet_lasts_its_whole_seconds_and_less_than_one_more(samples: int, advic
 )  # fmt: skip
 def test_more_values_than_are_stated_are_not_taken_for_a_file_cut_short(name: str, line: int, file) -> None:
     lines = (written.FOLDER / name).read_text().splitlines(keepends=True)
-    for times, advice in ((30, "remove what does not belong to it"), (0, "get the whole file again")):
+    for times, advice in ((30, "remove the other values"), (0, "download the complete file again")):
         changed = [*lines]
         changed[line] = times * lines[line]
         assert f"follow; {advice}, or correct that number" in complaint(file("".join(changed)), channel=1)
@@ -444,18 +446,22 @@ def test_uneven_times_make_an_uneven_motion(file: Callable[[str], Path]) -> None
 @pytest.mark.parametrize(
     ("text", "request_", "what"),
     [
-        ("1\n2\n", {"units": "g"}, "line 1: the file does not say its sampling step; give dt in seconds"),
-        ("1\n2\n", {"dt": 0.1}, "line 1: the file does not say its units; give units as one of g, m/s2"),
+        ("1\n2\n", {"units": "g"}, "line 1: the file does not state its sampling step; give dt in seconds"),
+        ("1\n2\n", {"dt": 0.1}, "line 1: the file does not state its units; give units as one of g, m/s2"),
         ("0 1\n1 2\n1 3\n", {"units": "g"}, "line 3: the time does not increase from the row before"),
         ("0 1\n\n#\n1 2\n-1 3\n", {"units": "g"}, "line 5: the time does not increase from the row before"),
-        ("0 1\n1 2\n2\n", {"units": "g"}, "line 3: columns in this row: 1, in others: 2"),
+        ("0 1\n1 2\n2\n", {"units": "g"}, "line 3: all rows must have 2 columns; got 1 in this row"),
         ("0.1\n0.2\nEND\n", {"units": "g", "dt": 0.1}, "line 3: 'END' is not a number"),
-        ("0 1\n0.1 2\n0.2 3\n", {"units": "g", "dt": 0.2}, "line 1: the sampling step is 0.1 s, not dt 0.2 s"),
+        (
+            "0 1\n0.1 2\n0.2 3\n",
+            {"units": "g", "dt": 0.2},
+            "line 1: the sampling step in the file is 0.1 s, not dt 0.2 s",
+        ),
         ("a\n0,5\n1,5\n", {"units": "g", "dt": 0.1}, "line 2: '0,5' may be one number with a decimal comma, or"),
-        ("0,5\n1,5\n2,0\n", {"units": "g"}, "write decimal points, or blanks between two numbers"),
+        ("0,5\n1,5\n2,0\n", {"units": "g"}, "use a point as the decimal sign, and separate numbers by blanks"),
         ('"1,5E-1"\n"2,5E-1"\n', {"units": "g", "dt": 0.1}, "decimal comma"),
         (",512\n,301\n", {"units": "g", "dt": 0.1}, "',512' may be one number with a decimal comma"),
-        ("0\n1,5\n2,0\n", {"units": "g", "dt": 0.1}, "line 2: '1,5' is not a number; write decimal points"),
+        ("0\n1,5\n2,0\n", {"units": "g", "dt": 0.1}, "line 2: '1,5' is not a number; use a point"),
         ("0 1\n1 2\n" + 600 * "1 " + "\n", {"units": "g"}, "line 3: this row is 1199 characters long"),
         ("0 1\n", {"units": "g"}, "line 1: 1 values are too few"),
         ("1e308\n1e308\n", {"units": "g", "dt": 0.1}, "too large"),
@@ -520,7 +526,7 @@ def test_columns_that_a_heading_names_are_channels(delimiter: str, file: Callabl
     first, second = channels(path)
     assert [(each.number, each.name, each.dt) for each in (first, second)] == [(1, "NS", 0.1), (2, "EW", 0.1)]
     assert second.acceleration.tolist() == [0.04, 0.05, 0.09]
-    assert "the file holds 2 channels; give channel as one of 1 'NS', 2 'EW'" in complaint(path)
+    assert "the file contains 2 channels; give channel as one of 1 'NS', 2 'EW'" in complaint(path)
     assert read(path, channel="NS").pga == read(path, channel=1).pga == 0.035
 
 
@@ -538,8 +544,8 @@ def test_a_bad_dt_is_refused_before_the_file_is_opened(dt: object) -> None:
 def test_arguments_must_agree_with_the_file() -> None:
     path = written.FOLDER / "nga.at2"
     assert read(path, dt=0.005, units="g").pga == read(path).pga
-    assert "the sampling step is 0.005 s, not dt 0.01 s" in complaint(path, dt=0.01)
-    assert "the units are g, not units 'm/s2'" in complaint(path, units="m/s2")
+    assert "the sampling step in the file is 0.005 s, not dt 0.01 s" in complaint(path, dt=0.01)
+    assert "the units in the file are g, not units 'm/s2'" in complaint(path, units="m/s2")
 
 
 # Steps
@@ -617,7 +623,7 @@ def test_line_ends_marks_and_page_breaks_do_not_matter(file: Callable[[bytes], P
 @pytest.mark.parametrize("between", ["", "# a comment\n"], ids=["at once", "row after row"])
 def test_a_row_of_a_table_may_be_1024_characters_long_and_no_longer(file: Callable[[str], Path], between: str) -> None:
     rows = [f"0.0{k} {k}.5\n" for k in range(6)]
-    for blanks, says in ((1017, ""), (1018, "line 3: this row is 1025 characters long; make all rows alike")):
+    for blanks, says in ((1017, ""), (1018, "line 3: this row is 1025 characters long, too long for a row of numbers")):
         rows[2] = f"0.02{' ' * blanks}2.5\n"
         table = file("".join([*rows[:4], between, *rows[4:]]))
         if says:
@@ -651,9 +657,9 @@ def test_a_file_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch, fi
 
 def test_foreign_files_are_said_to_be_text_or_binary(file: Callable[[bytes], Path]) -> None:
     for byte in set(range(32)) - set(b"\t\n\f\r"):
-        assert "this is a binary file in no format known here" in complaint(file(b"ab%ccd\n" % byte))
+        assert "the format of this binary file is unknown" in complaint(file(b"ab%ccd\n" % byte))
     for text in (b"Dear reader,\nthere is no record here.\n", b"time (s), acceleration (g)\n"):
-        assert "in no format known here: none of its first 1000 lines holds numbers alone" in complaint(file(text))
+        assert "is unknown: none of its first 1000 lines contains only numbers" in complaint(file(text))
 
 
 # ObsPy
@@ -674,7 +680,7 @@ def waveform(form: str, points: int = 50) -> bytes:
 def test_other_formats_go_through_obspy(form: str, file: Callable[[bytes], Path]) -> None:
     path = file(waveform(form))
     assert identify(path).format == f"{form} (through ObsPy)"
-    assert "does not say its units; give units as" in complaint(path)
+    assert "does not state its units; give units as" in complaint(path)
     (channel,) = channels(path, units="cm/s2")
     assert (channel.name, channel.dt, len(channel.acceleration)) == ("HNZ", 0.01, 50)
     np.testing.assert_allclose(channel.acceleration, 0.03 * np.arange(50), rtol=1e-6, atol=1e-12)
@@ -708,7 +714,7 @@ def test_what_obspy_reads_of_a_file_without_its_end_is_refused(form: str, file: 
     (whole,) = channels(file(content), units="gal")
     assert len(whole.acceleration) == 9000
     cut = content[:-900] if form == "MSEED" else b"\n".join(content.splitlines()[:-10])
-    assert "get the whole file again" in complaint(file(cut), units="gal")
+    assert "download the complete file again" in complaint(file(cut), units="gal")
 
 
 def test_traces_with_gaps_or_without_numbers_are_refused(
@@ -720,7 +726,7 @@ def test_traces_with_gaps_or_without_numbers_are_refused(
     for data in (gaps, np.array(["a", "b"])):
         stream = obspy.Stream([obspy.Trace(data)])
         monkeypatch.setattr(through_obspy, "_read_traces", lambda *_, stream=stream: stream)
-        assert "trace 1 has gaps, or no numbers" in complaint(path, units="g")
+        assert "trace 1 has gaps or invalid numbers" in complaint(path, units="g")
 
 
 @pytest.fixture(params=["UTC0", "XXX-9", "XXX+8", "XXX-5:30"])
@@ -851,53 +857,53 @@ FURLONG = "ACCELERATION TIME SERIES IN UNITS OF FURLONG"
     ("content", "channel", "sentence"),
     [
         *((fixture(name), None, sentence) for name, sentence in REFUSED.items()),
-        (fixture("two.v1"), None, "holds 2 channels; give channel as one of 1 '90 Deg', 2 'Up'"),
+        (fixture("two.v1"), None, "contains 2 channels; give channel as one of 1 '90 Deg', 2 'Up'"),
         (fixture("two.v1"), 3, "no channel 3; give one of 1 '90 Deg', 2 'Up'"),
         (fixture("two.v1"), "", "no channel ''"),
         (written.csmip_v1([UP, (2, *UP[1:])]), "Up", "2 channels are called 'Up'"),
-        (written.at2([0.1, -0.2, 0.1], "NPTS=3, DT=.01", FURLONG), 1, "the units 'FURLONG' are not known; give units"),
-        *((written.at2(VALUES, f"NPTS= {n}, DT= .005"), 1, f"line 4: NPTS says {n} values but 37") for n in (36, 38)),
-        *((written.at2(VALUES, f"NPTS=37, DT={dt} SEC"), 1, "line 4: the sampling step is") for dt in ("0", "1E999")),
-        (written.at2([], "NPTS= 3, DT= .01"), 1, "NPTS says 3 values but 0 follow"),
-        (written.cosmos(FLAGGED), 1, "seems to stand for a missing value"),
-        (WRONG_COSMOS.replace("(8F10.5)", "(2F10.5)"), 1, "38 values but 37 follow"),
-        (written.cosmos(LONG, step_ms=-999.0, raw_step=-999.0), 1, "real headers 34 and 62 give no step"),
-        (fixture("even.smc", "        37", "        33", lines=slice(-1)) + "  1.7E+38\n", 1, "for a missing value"),
+        (written.at2([0.1, -0.2, 0.1], "NPTS=3, DT=.01", FURLONG), 1, "the units 'FURLONG' are unknown; give units"),
+        *((written.at2(VALUES, f"NPTS= {n}, DT= .005"), 1, f"line 4: NPTS specifies {n} values") for n in (36, 38)),
+        *((written.at2(VALUES, f"NPTS=37, DT={dt} SEC"), 1, "line 4: the sampling step") for dt in ("0", "1E999")),
+        (written.at2([], "NPTS= 3, DT= .01"), 1, "NPTS specifies 3 values, but 0 follow"),
+        (written.cosmos(FLAGGED), 1, "seems to represent a missing value"),
+        (WRONG_COSMOS.replace("(8F10.5)", "(2F10.5)"), 1, "38 values, but 37 follow"),
+        (written.cosmos(LONG, step_ms=-999.0, raw_step=-999.0), 1, "real headers 34 and 62 are inconsistent"),
+        (fixture("even.smc", "        37", "        33", lines=slice(-1)) + "  1.7E+38\n", 1, "a missing value"),
         (fixture("esm.asc", "UNITS", "NO_UNITS"), 1, "give units as one of"),
-        (KNET.replace("Scale Factor      3920", "Scale Factor      0"), 1, "line 14: 'Scale Factor 0(gal)/6182761' "),
-        (KNET.replace("100Hz", "fast"), 1, "line 11: 'Sampling Freq(Hz) fast' gives no positive number"),
-        (fixture("knet.ns", lines=slice(-13)), 1, "line 12: the duration says 200 values but 96 follow"),
+        (KNET.replace("Scale Factor      3920", "Scale Factor      0"), 1, "in 'Scale Factor 0(gal)/6182761'"),
+        (KNET.replace("100Hz", "fast"), 1, "line 11: expected a positive number in 'Sampling Freq(Hz) fast'"),
+        (fixture("knet.ns", lines=slice(-13)), 1, "line 12: the duration specifies 200 values, but 96 follow"),
         (fixture("knet.ns", lines=slice(15)), 1, "ends within its header"),
-        ("a (g) or (cm/s2)\n0,0\n0.01,2.5\n", None, "does not say its units"),
+        ("a (g) or (cm/s2)\n0,0\n0.01,2.5\n", None, "does not state its units"),
         ("time (s),acc (g)\n0.00,0.1\n0.01,0.2\n0.01,0.1\n0.02,0.0\n", None, "give dt if it is missing or rounded"),
-        *((mark + bytes(64), None, "binary file in no format") for mark in (b"\x93NUMPY\1", b"PK\3\4", b"\x1f\x8b")),
-        (fixture("two.v1", lines=slice(31)), 1, "37 values but"),
+        *((mark + bytes(64), None, "this binary file is unknown") for mark in (b"\x93NUMPY\1", b"PK\3\4", b"\x1f\x8b")),
+        (fixture("two.v1", lines=slice(31)), 1, "37 values, but"),
         (fixture("two.v1", lines=slice(20)), 1, "ends within its header"),
-        (fixture("two.v2", lines=slice(49)), 1, "37 values but"),
+        (fixture("two.v2", lines=slice(49)), 1, "37 values, but"),
         (fixture("two.v2", lines=slice(30)), 1, "ends this channel's header"),
-        (fixture("two.v2c", lines=slice(52)), 1, "37 values but"),
+        (fixture("two.v2c", lines=slice(52)), 1, "37 values, but"),
         (fixture("two.v2c", lines=slice(16)), 1, "ends within its header"),
-        (fixture("even.smc", lines=slice(31)), 1, "37 values but"),
+        (fixture("even.smc", lines=slice(31)), 1, "37 values, but"),
         (fixture("even.smc", lines=slice(20)), 1, "ends within its header"),
-        (fixture("esm.asc", lines=slice(50)), 1, "NDATA says 37 values but"),
-        (fixture("pairs.v1", lines=slice(30)), 1, "74 values but"),
-        (fixture("two.v2c", "(Format v01.20", "(Formt v01.20"), 1, "line 111: the title of another channel"),
-        (fixture("two.v2c", "velocity pts", "velocity xxx"), 1, "the line with the number of points should"),
-        (fixture("two.v2c", "100 Integer-header", "100 Integr-header"), 1, "a line '... header values follow' should"),
-        (fixture("two.v1", "Uncorrected Accel", "Unocrrected Accel"), 1, "the title of another channel should stand"),
+        (fixture("esm.asc", lines=slice(50)), 1, "NDATA specifies 37 values, but"),
+        (fixture("pairs.v1", lines=slice(30)), 1, "74 values, but"),
+        (fixture("two.v2c", "(Format v01.20", "(Formt v01.20"), 1, "line 111: expected the title of the next channel"),
+        (fixture("two.v2c", "velocity pts", "velocity xxx"), 1, "expected the line with the number of points here"),
+        (fixture("two.v2c", "100 Integer-header", "100 Integr-header"), 1, "expected a line '... header"),
+        (fixture("two.v1", "Uncorrected Accel", "Unocrrected Accel"), 1, "expected the title of the next channel"),
         (fixture("two.v2", "points of veloc", "pionts of veloc"), 1, "' 37 pio' is not a number"),
-        (fixture("two.v1", "at 200 pts", "at two pts"), 1, "the sampling step is 0 s, but it must be positive"),
+        (fixture("two.v1", "at 200 pts", "at two pts"), 1, "the sampling step must be positive; got 0 s"),
         (fixture("pairs.v1", "100.005", "100.000"), 1, "the time does not increase from the row before"),
         (fixture("two.v2", "accel data equally spaced at  .005", "accel data equally spaced at  .0x5"), 1,
-          "the sampling step is 0 s, but it must be positive"),
-        (fixture("esm.asc", "NDATA: 37", "NDATA: many"), 1, "line 13: 'NDATA: many' gives no positive number"),
-        *((fixture("esm.asc", f"{key}: {value}", f"{key}:"), 1, f"line {n}: the header gives no {key}; get the record")
+          "the sampling step must be positive; got 0 s"),
+        (fixture("esm.asc", "NDATA: 37", "NDATA: many"), 1, "line 13: expected a positive number in 'NDATA: many'"),
+        *((fixture("esm.asc", f"{key}: {value}", f"{key}:"), 1, f"line {n}: the header does not contain {key}")
           for n, key, value in ((13, "NDATA", "37"), (24, "DATA_TYPE", "ACCELERATION"))),
-        (fixture("esm.asc", "NDATA: 37", "\nNDATA: 37"), 1, "line 13: the header gives no "),
-        (fixture("knet.ns", "Mag.   ", "Magn.  "), 1, "line 5: the header line 'Mag.' should stand here"),
+        (fixture("esm.asc", "NDATA: 37", "\nNDATA: 37"), 1, "line 13: the header does not contain "),
+        (fixture("knet.ns", "Mag.   ", "Magn.  "), 1, "line 5: expected the header line 'Mag.' here"),
         (fixture("even.smc", "         2\n        37", "     20000\n        37"), 1, "ends within its header"),
-        (fixture("even.smc", "  2.0000000E+02", " -2.0000000E+02"), 1, "the sampling step is -0.005 s"),
-        (fixture("even.smc", "  2.0000000E+02", "  1.7000000E+38"), 1, "the values are no pairs of time"),
+        (fixture("even.smc", "  2.0000000E+02", " -2.0000000E+02"), 1, "positive; got -0.005 s"),
+        (fixture("even.smc", "  2.0000000E+02", "  1.7000000E+38"), 1, "expected pairs of time"),
     ],
 )  # fmt: skip
 def test_what_is_no_record_unknown_cut_short_or_damaged_is_refused(content, channel, sentence, file) -> None:
@@ -915,7 +921,7 @@ def test_cosmos_has_the_step_that_fits_the_duration_to_a_second(step_ms, raw_ste
     text = written.cosmos(LONG, step_ms=step_ms, raw_step=raw_step)
     path = file(text.replace("approx   10 secs", f"approx {seconds:4d} secs"))
     if step is None:
-        assert "give no step at which 2000 points last as stated; correct the header" in complaint(path)
+        assert "are inconsistent with 2000 points and the stated duration; correct the header" in complaint(path)
     else:
         assert read(path).dt == step
 
@@ -931,14 +937,14 @@ def test_what_obspy_may_not_or_cannot_read_is_refused(
         assert complaint(file(content), units="g")
     pickled, pieces = io.BytesIO(), io.BytesIO()
     obspy.Stream([obspy.Trace(np.zeros(9))]).write(pickled, format="PICKLE")
-    assert "in no format known here" in complaint(file(pickled.getvalue()), units="g")
+    assert "the format of this" in complaint(file(pickled.getvalue()), units="g")
     header = {"station": "X", "channel": "HNE", "delta": 0.01}
     traces = [obspy.Trace(np.arange(50, dtype=np.int32), header | {"starttime": obspy.UTCDateTime(t)}) for t in (0, 10)]
     obspy.Stream(traces).write(pieces, format="MSEED")
     assert ".X..HNE is in 2 pieces, with gaps or overlaps" in complaint(file(pieces.getvalue()), units="g")
     monkeypatch.setitem(sys.modules, "obspy", None)
     binary = file(bytes(range(256)) * 3 + b"\n5\n6\n7\n")
-    assert "this is a binary file in no format known here" in complaint(binary)
+    assert "the format of this binary file is unknown" in complaint(binary)
 
 
 # Whatever bytes a file holds

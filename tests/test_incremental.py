@@ -171,12 +171,12 @@ def test_the_figure_shows_peaks_and_bands(analysis):
     ("changes", "word"),
     [
         ({"measure": "factor"}, "measure"),
-        ({"levels": [2.0, 1.0]}, "increase"),
+        ({"levels": [2.0, 1.0]}, "increasing order"),
         ({"levels": [0.0, 1.0]}, "positive"),
         ({"rtol": -1.0}, "rtol"),
         ({"motions": []}, "at least one motion"),
         ({"motions": rocking.Motion([0.0, 1.0], [[0.0]])}, "zero throughout"),
-        ({"blocks": rocking.Block.from_parameters(1.0, 0.2, 1.0)}, "restitution 1"),
+        ({"blocks": rocking.Block.from_parameters(1.0, 0.2, 1.0)}, "restitution must be below 1"),
     ],
 )
 def test_what_cannot_be_scaled_up_is_refused(changes, word):

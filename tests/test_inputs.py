@@ -102,5 +102,5 @@ def test_a_description_of_a_block_is_complete_or_refused(shape):
             create_block({each: value for each, value in values.items() if each != name})
     for other in SHAPES:
         if other is not shape:
-            with pytest.raises(RockingError, match="belong to different descriptions of a block"):
+            with pytest.raises(RockingError, match="are from different descriptions of a block"):
                 create_block(values | dict.fromkeys(other.needed, 0.3))

@@ -198,7 +198,7 @@ def test_what_is_no_outcome_is_no_test(given, sentence):
     [
         ({"tests": []}, "tests must contain at least one test"),
         ({"tests": [STRONG]}, "tests must contain ShakeTest"),
-        ({"weights": [1.0, 2.0]}, "weights must be 1 numbers of 0 or more"),
+        ({"weights": [1.0, 2.0]}, "weights must contain 1 nonnegative numbers"),
         ({"outlier_probability": 0.7}, "outlier_probability must be a number from 0 to 0.5"),
         ({"simulations": 3}, "simulations must be a whole number of at least 100"),
         ({"blocks": rocking.dynamics.BouncingBall(0.9)}, "slenderness is defined for blocks only"),
@@ -248,11 +248,11 @@ def test_a_table_of_tests_is_read_with_its_units_and_labels(tmp_path):
         (
             "motion,overturned,specimen\nridgecrest-clc-090,1,a\nridgecrest-clc-090,1,b",
             1,
-            "of 2 specimens; use a table for each",
+            "of 2 specimens; use one table for each",
         ),
         ("motion,overturned,overturned\nx,1,1", 1, "must be distinct"),
         ("motion,overturned\nno-such-file.txt,1", 2, "no-such-file.txt"),
-        ("motion,overturned\n,1", 2, "this is a folder; name one record file"),
+        ("motion,overturned\n,1", 2, "this is a folder; choose a record file"),
         ("motion,overturned\nridgecrest-clc-090,perhaps", 2, "'perhaps' is not 0 or 1"),
         ("motion,overturned\nridgecrest-clc-090,1\nridgecrest-clc-090,", 3, "'' is not 0 or 1"),
         ("motion,overturned,scale\nridgecrest-clc-090,1,inf", 2, "'inf' is not a number"),
@@ -280,7 +280,7 @@ def test_the_command_writes_figure_tables_and_numbers(run, undrawn, tmp_path):
     lines = (tmp_path / "out" / "tests.csv").read_text("utf-8").splitlines()
     assert lines[0] == "name,motion,overturned,probability" and len(lines) == 4
     code, _, err = run("validate", table)
-    assert code == 2 and "a block is needed" in err
+    assert code == 2 and "a block is required" in err
 
 
 def test_predictions_of_tests_that_were_left_out_take_no_lapse_and_no_weights():

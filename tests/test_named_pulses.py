@@ -54,16 +54,16 @@ MISTAKES = [
     ("sinus:amplitude=1", "there is no pulse 'sinus'; did you mean sine?"),
     ("zzz:amplitude=1", "there is no pulse 'zzz'; there are half-sine, .* and triangular"),
     ("sine", "the pulse sine needs amplitude, frequency and cycles as well"),
-    ("sine:amplitude=1,frequency=1", "the pulse sine needs cycles as well"),
+    ("sine:amplitude=1,frequency=1", "the pulse sine also requires cycles"),
     ("sine:amplitude=1,frequncy=1", "has no frequncy; did you mean frequency?"),
-    ("sine:amplitude=1,zzz=1", "has no zzz; it takes amplitude, frequency, cycles and phase"),
+    ("sine:amplitude=1,zzz=1", "has no zzz; it accepts amplitude, frequency, cycles and phase"),
     ("sine:amplitude=1,amplitude=2", "amplitude is given twice"),
     ("sine:1", "'1' has no name"),
-    ("sine:amplitude=1h,frequency=1", "the amplitude of a sine pulse takes an acceleration"),
-    ("sine:amplitude=1,frequency=1s", "the frequency of a sine pulse takes a frequency"),
-    ("sine:amplitude=1,2,frequency=1", "the amplitude of a sine pulse is one value, not 1, 2"),
-    ("mavroeidis-papageorgiou:amplitude=1g", "takes a velocity"),
-    ("rectangular:amplitude=1,duration=1Hz", "takes a time"),
+    ("sine:amplitude=1h,frequency=1", "the amplitude of a sine pulse must be an acceleration"),
+    ("sine:amplitude=1,frequency=1s", "the frequency of a sine pulse must be a frequency"),
+    ("sine:amplitude=1,2,frequency=1", "the amplitude of a sine pulse must be one value, not 1, 2"),
+    ("mavroeidis-papageorgiou:amplitude=1g", "must be a velocity"),
+    ("rectangular:amplitude=1,duration=1Hz", "must be a time"),
 ]
 
 

@@ -151,7 +151,7 @@ def test_restraints_stay_where_they_are_on_the_block_when_a_load_that_follows_mo
 def test_a_body_too_stocky_for_angular_momentum_carries_a_load_with_a_restitution_that_is_given():
     stocky = Block(width=2.5, height=1.6, mass=1e3, restitution=0.5)
     assert [side.restitution for side in RestrainedBlock(stocky, Load(50.0, 1.6), restitution=0.4).sides] == [0.4, 0.4]
-    with pytest.raises(rocking.errors.InvalidBlock, match=r"too stocky to rock that way; .*give restitution"):
+    with pytest.raises(rocking.errors.InvalidBlock, match=r"too stocky; .*set restitution"):
         RestrainedBlock(stocky, Load(50.0, 1.6))
 
 
@@ -181,7 +181,7 @@ def test_a_tendon_that_has_yielded_leaves_the_block_free():
         (lambda: Tendon(1e5, prestress=5e3, strength=4e3), "must be above its prestress"),
         (lambda: Tendon(0.0, prestress=5e3, strength=6e3), "a yielding tendon requires a stiffness"),
         (lambda: Thrust(0.0, 2.0), "must not be zero"),
-        (lambda: RestrainedBlock(0.4), "a free Block is needed"),
+        (lambda: RestrainedBlock(0.4), "a free Block is required"),
         # Its moment about the pivot is that of the weight: the quotient is zero to the last bit.
         (lambda: RestrainedBlock(Block(width=0.25, height=1.0, mass=1.0), Thrust(0.25 * 9.80665, 0.5)), " 0 m/s"),
         (
@@ -200,7 +200,7 @@ def test_what_cannot_be_is_refused_in_one_sentence(make, says):
 
 @pytest.mark.parametrize("restitution", [0.4, rocking.Restitution(0.4, 0.3, seed=1)])
 def test_a_wall_too_stocky_for_angular_momentum_rocks_one_way_with_a_restitution_that_is_given(restitution):
-    with pytest.raises(InvalidBlock, match=r"too stocky to rock that way; .*give restitution a value in \(0, 1\]"):
+    with pytest.raises(InvalidBlock, match=r"too stocky; .*set restitution to a value in \(0, 1\]"):
         Block.one_sided(width=3.0, height=2.0)
     wall = Block.one_sided(width=3.0, height=2.0, restitution=restitution)
     assert wall.is_one_sided and wall.sides[0].restitution == 0.4 and wall.balance[1] == math.inf
@@ -273,5 +273,5 @@ def test_blocks_of_all_kinds_are_simulated_together_as_alone():
     limits = np.zeros((4, 2))
     for model in ("nonlinear", "linear"):
         assert np.array_equal(again.kernel_records(model, limits), gathered.kernel_records(model, limits))
-    with pytest.raises(InvalidBlock, match="blocks have no stif; terms of restraints are sine, cosine"):
+    with pytest.raises(InvalidBlock, match="blocks have no parameter stif; the terms of restraints are sine, cosine"):
         rocking.Blocks(1.0, 0.2, 0.9, stif=3.0)

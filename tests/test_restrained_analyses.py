@@ -171,7 +171,7 @@ def test_what_needs_a_free_block_or_any_block_says_so_in_one_sentence():
         lambda: rocking.rules.compare_rules(FACADE, pulse),
         lambda: rocking.rules.west(FACADE, pulse),
     ):
-        with pytest.raises(InvalidBlock, match="a free Block is needed, not a RestrainedBlock"):
+        with pytest.raises(InvalidBlock, match="a free Block is required, not a RestrainedBlock"):
             analysis()
     with pytest.raises(InvalidOption, match="block"):
         rocking.simulate(FACADE, rocking.pulses.sine(2.0, 1.0, cycles=2), chattering="time", model="linear")

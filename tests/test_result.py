@@ -377,7 +377,7 @@ def test_a_part_has_no_numbers_of_the_whole(results, of_several):
         ("Basins", "angular_velocity"),
     ):  # fmt: skip
         assert dimension in results[name].data.sizes, name
-        with pytest.raises(errors.InvalidOption, match=f"of all its values of {dimension} together; compute a part"):
+        with pytest.raises(errors.InvalidOption, match=f"aggregated over {dimension}; repeat the analysis for a part"):
             results[name].select(**{dimension: results[name].data[dimension].values[0]})
 
 

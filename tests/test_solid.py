@@ -540,7 +540,7 @@ REFUSED = {
     "no volume": (lambda: Solid.from_mesh(flat()), "mesh encloses no volume: it is a surface without an inside"),
     "one side": (lambda: Solid.from_mesh(strip()), "point to different sides of the surface: orient them alike"),
     "mixed": (lambda: Solid.from_mesh(mixed()), "normals of neighbouring triangles point to different sides"),
-    "one place": (lambda: Solid.from_mesh(mesh_of(np.ones((3, 3)), [(0, 1, 2)])), "are at one place"),
+    "one place": (lambda: Solid.from_mesh(mesh_of(np.ones((3, 3)), [(0, 1, 2)])), "coincide"),
     "not finite": (
         lambda: Solid.from_mesh(mesh_of([(0, 0, 0), (1, 0, 0), (0, np.nan, 0)], [(0, 1, 2)])),
         "corners that are not finite",
@@ -563,7 +563,7 @@ REFUSED = {
     ),
     "support on a line": (
         lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (0.0, 0.0), (-0.1, -0.1)]),
-        "support must have three corners or more that are not on one line",
+        "support must have at least three corners that are not on one line",
     ),
     "support of numbers": (lambda: Solid.from_mesh(box(), support=[0.1, 0.2]), "support must be corners of a polygon"),
     "density of no part": (
@@ -579,12 +579,12 @@ REFUSED = {
     "up": (lambda: Solid.from_mesh(box(), up="north"), "up must be one of x, y, z"),
     "both": (
         lambda: Solid.from_mesh(box(), tolerance=0.01, support=[[0, 0], [0.1, 0], [0, 0.1]]),
-        "tolerance is how a support is looked for: leave it out where support is given",
+        "tolerance is used only to find the support; omit it if support is given",
     ),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
     "a folder": (
         lambda: Solid.from_mesh(Path(__file__).parent),
-        "tests: this is a folder, not a file: name the file in it",
+        "tests: this is a folder, not a file; choose a file in it",
     ),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
     "no mesh": (
@@ -593,11 +593,11 @@ REFUSED = {
     ),
     "inertia": (
         lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, 1), np.diag([1.0, 1.0, 3.0])),
-        "inertia_over_mass is the tensor of no body",
+        "inertia_over_mass must be symmetric",
     ),
     "centre": (lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 1), np.eye(3)), r"centre must be finite numbers of shape"),
     "centre below": (lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, -1), np.eye(3)), "height of the centre of mass"),
-    "stocky": (lambda: Solid.from_mesh(box((2.0, 2.0, 0.3))).block(0.0), "too stocky to rock that way"),
+    "stocky": (lambda: Solid.from_mesh(box((2.0, 2.0, 0.3))).block(0.0), "too stocky"),
 }
 
 
@@ -619,14 +619,14 @@ def test_azimuths_are_numbers(azimuths):
     ("name", "content", "sentence"),
     [
         ("points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
-         "property float z\nend_header\n0 0 0\n", "holds no faces"),
-        ("nothing.obj", "# nothing\n", "holds no faces"),
-        ("empty.obj", "", "holds no faces"),
-        ("text.stl", "hello", "holds no faces"),
+         "property float z\nend_header\n0 0 0\n", "contains no faces"),
+        ("nothing.obj", "# nothing\n", "contains no faces"),
+        ("empty.obj", "", "contains no faces"),
+        ("text.stl", "hello", "contains no faces"),
         ("text.ply", "hello", "cannot be read: "),
         ("text.glb", "hello", "cannot be read: "),
-        ("block.xyzw", "hello", "cannot be read: is of no format that trimesh reads"),
-        ("plain", "hello", "cannot be read: is of no format that trimesh reads"),
+        ("block.xyzw", "hello", "cannot be read: trimesh reads only the formats"),
+        ("plain", "hello", "cannot be read: trimesh reads only the formats"),
     ],
 )  # fmt: skip
 def test_a_file_without_a_mesh_is_refused_by_its_name(tmp_path, name, content, sentence):
@@ -676,7 +676,7 @@ def test_a_stream_names_no_other_file(tmp_path, monkeypatch):
     gltf = {"asset": {"version": "2.0"}, "buffers": [{"uri": "other.bin", "byteLength": 120}]}
     for uri in ("other.bin", "/etc/passwd", "../other.bin", "http://127.0.0.1:9/other.bin", "file:///etc/passwd"):
         gltf["buffers"][0]["uri"] = uri
-        with pytest.raises(InvalidBlock, match=f"a.gltf: cannot be read: it lacks '{uri}'"):
+        with pytest.raises(InvalidBlock, match=f"a.gltf: cannot be read: '{uri}' is missing"):
             Solid.from_mesh(named(json.dumps(gltf).encode(), "a.gltf"))
     # Materials of an OBJ file are not looked for.
     scene = b"mtllib /etc/passwd\nusemtl red\n" + trimesh.exchange.obj.export_obj(box()).encode()

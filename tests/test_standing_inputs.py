@@ -47,7 +47,7 @@ WRONG = {
     "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
     # Restraints
     "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is not a restraint; give Tendon, Spring"),
-    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them together"),
+    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "and all restraints together"),
     "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "requires its mass, kg"),
     "sizes of a wall without names": (
         lambda: Block.one_sided(0.4, 4.0), "width", "a block requires either half_width and half_height, or"
@@ -80,7 +80,7 @@ WRONG = {
     "a law of a free block": (
         lambda: Block(width=0.4, height=2.0, restitution=Restitution(0.9, 0.5, seed=1)),
         "restitution",
-        "give a law to RestrainedBlock(block, restitution=...)",
+        "for a law, use RestrainedBlock(block, restitution=...)",
     ),
     # Several bodies
     "two gravities": (

@@ -129,30 +129,30 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
     with pytest.raises(rocking.errors.StudyError, match="not a text table in UTF-8"):
         read_study(file)
     (tmp_path / "blocks.csv").write_text("p,alpha\n2.0,0.2\nfast,0.2\n")
-    with pytest.raises(rocking.errors.StudyError, match=r"blocks\.csv, line 3: p takes an angular velocity"):
+    with pytest.raises(rocking.errors.StudyError, match=r"blocks\.csv, line 3: p must be an angular velocity"):
         read_study(file)
 
 
 #: What stands in a file (of `TEXT`, or else of `WALLS`), what replaces it, the line of the error, and words of it.
 MISTAKES = r"""
-p = "1:6:5" -> p = "fast" | 2 | p takes an angular velocity
+p = "1:6:5" -> p = "fast" | 2 | p must be an angular velocity
 restitution = 0.9 -> restitutoin = 0.9 | 4 | no restitutoin; did you mean restitution
-{GRID} -> width = 0.3 | 2 | a block needs more than width: give width and height
+{GRID} -> width = 0.3 | 2 | a block requires more than width; give width and height
 [simulation] -> [report.fragility]\n[simulation] | 18 | its options are now those of rocking study report
 [scales] -> [scale] | 14 | no table [scale]; did you mean scales?
-frequency = [0.5, 1.0] ->  | 9 | the pulse one-sine needs frequency as well
+frequency = [0.5, 1.0] ->  | 9 | the pulse one-sine also requires frequency
 frequency = [0.5, 1.0] -> frequncy = 2 | 12 | no frequncy; did you mean frequency
 amplitude = ["0.3g", "0.5g"] -> amplitude = "0.3h" | 11 | acceleration
 factor = [0.5, 1.0] -> refine = 1e-3 | 15 | [scales] has no refine; there are factor, pga, pgv, sa
 factor = [0.5, 1.0] -> factor = 1\npga = 2 | 15 | one measure only
-factor = [0.5, 1.0] -> sa = 2 | 15 | "sa" needs period
+factor = [0.5, 1.0] -> sa = 2 | 15 | "sa" requires period
 factor = [0.5, 1.0] -> damping = 0.1 | 15 | damping is only allowed with sa
 polarity = "both" -> polarity = "up" | 16 | polarity must be
 chattering = "certified=1e-9" -> chattering = "slow" | 20 | chattering must be
 ["el-centro-meloland-270"] -> ["el-centro-melolnd-270"] | 7 | did you mean the shipped record el-centro-meloland-270
 ["el-centro-meloland-270"] -> [\n"el-centro-meloland-270",\n"nowhere/*.AT2",\n] | 9 | matches this name
 ["el-centro-meloland-270"] -> "el-centro-meloland-270" | 7 | records must be a list of texts
-records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | applies to records, and there
+records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | applies only to records
 [motions] -> [motions]\nskip_unreadable = "no" | 7 | must be true or false
 [motions] -> [motions]\nvertical = "9" | 8 | no file or shipped record '9' for the vertical motion
 [blocks] -> [[blocks]] | 1 | must be one table, [blocks], once
@@ -163,8 +163,8 @@ one_sided = true -> one_sided = 1 | 5 | one_sided must be true or false
 [[blocks.thrusts]] -> [blocks.thrusts] | 10 | thrusts must be tables, [[blocks.thrusts]]
 force = [300, 600] -> forze = 300 | 11 | [[blocks.thrusts]] has no forze; did you mean force
 force = [300, 600] -> force = 9e5 | 1 | does not stand
-force = [300, 600]\n ->  | 10 | [[blocks.thrusts]] needs force as well
-follows = false -> follows = "no" | 17 | follows takes a number
+force = [300, 600]\n ->  | 10 | [[blocks.thrusts]] also requires force
+follows = false -> follows = "no" | 17 | follows must be a number
 offset = -0.1 -> offset = -0.5 | 1 | is beyond the pivot
 """
 
@@ -185,7 +185,7 @@ def test_a_mistake_is_a_sentence_with_its_line(file, mistake):
 
 def test_a_file_that_is_no_toml_is_refused(file):
     file.write_text(TEXT.replace("[blocks]", "[blocks"))
-    with pytest.raises(rocking.errors.StudyError, match=f"{file}: this is no TOML file"):
+    with pytest.raises(rocking.errors.StudyError, match=f"{file}: this is not a valid TOML file"):
         read_study(file)
 
 
@@ -295,7 +295,7 @@ def test_a_file_that_is_there_is_not_overwritten(run, tmp_path):
         (["study", "crate", "a"], "there is no command crate; did you mean create?"),
         (["study", "run", "m", "--thread", "2"], "Unknown option: --thread. Did you mean --threads?"),
         (["study", "run", "nowhere"], "nowhere: the folder contains no study"),
-        (["study", "export", "nowhere", "all.doc"], "exported to .nc, .csv, .parquet, not to all.doc"),
+        (["study", "export", "nowhere", "all.doc"], "must end with one of .nc, .csv, .parquet; got all.doc"),
     ],
 )
 def test_mistakes_in_the_commands_are_one_line(run, tmp_path, monkeypatch, arguments, sentence):
@@ -339,7 +339,7 @@ def test_units_are_for_those_of_several_records_that_do_not_say_theirs(file, tmp
     assert (silent.duration, says.duration) == pytest.approx((39 * 0.02, 39 * 0.01))
     assert says.pga == pytest.approx(9.80665 * silent.pga)
     file.write_text(several.replace('"silent.txt", ', ""))
-    with pytest.raises(rocking.errors.UnreadableRecord, match=r"leave (units|dt) out"):
+    with pytest.raises(rocking.errors.UnreadableRecord, match=r"omit (units|dt)"):
         read_study(file)
     vertical = several.replace('"silent.txt", ', "").replace(
         'units = "m/s2"\ndt = 0.02', 'vertical = "silent.txt"\nunits = "g"\ndt = 0.01'
@@ -394,12 +394,12 @@ def test_the_fragility_of_a_study_of_walls_is_that_of_the_function(walls, run, t
 @pytest.mark.parametrize(
     ("table", "sentence"),
     [
-        ("width,height\n1,2,3,6\n", "line 2: 4 cells under 2 columns"),
+        ("width,height\n1,2,3,6\n", "line 2: this row has 4 cells for 2 columns"),
         ("width,height,spring\n1,3,2000\n", "column spring"),
         ("p,alpha,restituton\n2,0.2,0.9\n", "did you mean restitution"),
         ("p,p,alpha\n2,3,0.2\n", "column p of"),
-        ("width,height,gyration\n1,3,0.5\n", "width and height and gyration belong to different descriptions"),
-        ("p,alpha,mass\n2,0.2,100\n", "mass and p and alpha belong to different descriptions"),
+        ("width,height,gyration\n1,3,0.5\n", "width and height and gyration are from different descriptions"),
+        ("p,alpha,mass\n2,0.2,100\n", "mass and p and alpha are from different descriptions"),
     ],
 )
 def test_a_table_of_blocks_says_all_of_them_or_is_refused(file, tmp_path, table, sentence):

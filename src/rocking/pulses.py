@@ -284,7 +284,7 @@ def _create_sine(family: str, amplitude: float, frequency: float, cycles: float,
     parameters = _check_parameters(amplitude=amplitude, frequency=frequency, phase=phase)
     cycles = checks.positive(cycles, "number of cycles", InvalidMotion, "cycles")
     if cycles > _MAX_CYCLES:
-        raise InvalidMotion(f"a sine may have at most {_MAX_CYCLES} {{}}, not {cycles:g}", "cycles", value=cycles)
+        raise InvalidMotion(f"the {{}} of a sine must be at most {_MAX_CYCLES}, not {cycles:g}", "cycles", value=cycles)
     amplitude, frequency, phase = parameters.values()
     breakpoints = np.linspace(0.0, cycles / frequency, _count_breakpoints(_PIECES_PER_CYCLE * cycles))
     parameters = {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase}
@@ -358,7 +358,8 @@ def ricker(
     limit = 2.0 * (9.1 if symmetric else 9.3) / rate  # limit at 1e-16 of the peak
     span = limit if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")
     if span > limit:
-        raise InvalidMotion(f"a Ricker pulse of {frequency:.6g} Hz lasts only {limit:.6g} s: give no longer duration")
+        sentence = f"a Ricker pulse of {frequency:.6g} Hz lasts {limit:.6g} s; give a duration of at most this value"
+        raise InvalidMotion(sentence)
     breakpoints = np.linspace(0.0, span, _count_breakpoints(rate * span / _GAUSSIAN_PIECE_LENGTH))
     series = -_compute_gaussian_series(2 if symmetric else 3, _compute_midpoints(breakpoints) - 0.5 * span, rate)
     # (x^2 - 3) x exp(-x^2 / 2) is stationary at x^4 - 6 x^2 + 3 = 0.

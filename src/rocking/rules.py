@@ -326,8 +326,8 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     lowest = math.exp(-0.5 / _DAMPING)
     if blocks.restitution.min() <= lowest:
         raise InvalidBlock(
-            f"priestley needs a restitution above {lowest:.2g}, from where on its damping is below critical, not "
-            f"{blocks.restitution.min():g}; leave that rule out"
+            f"the rule priestley requires a restitution above {lowest:.2g}, where its damping is below critical; got "
+            f"{blocks.restitution.min():g}; omit this rule"
         )
     return _find_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 

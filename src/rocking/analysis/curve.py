@@ -218,9 +218,9 @@ def fit_curve(
     log_median = float(-fitted.intercept[0] / fitted.slope[0])
     if not z.min() - math.log(_MAX_MEDIAN_RATIO) <= log_median <= z.max() + math.log(_MAX_MEDIAN_RATIO):
         raise Unfitted(
-            f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, and put the median "
-            f"{'above' if log_median > z.max() else 'below'} all intensities by a factor of more than 1000: "
-            "motions nearer to it, or another measure, are needed"
+            f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, so that the median "
+            f"is {'above' if log_median > z.max() else 'below'} all intensities by a factor of more than 1000; use "
+            "motions nearer to it, or another measure"
         )
     cluster_count = round(float(trials.sum())) if clusters is None else int(clusters.max()) + 1
     independent = clusters is None or (cluster_count == z.size and bool(np.all(trials <= 1.0)))
@@ -265,12 +265,10 @@ def check_counts(values: ArrayLike, argument: str, size: int, minimum: float, ma
     try:
         numbers = np.broadcast_to(array, size)
     except ValueError:
-        raise InvalidOption(f"{{}} must hold one number for each of the {size} intensities", argument) from None
+        raise InvalidOption(f"{{}} must contain one number for each of the {size} intensities", argument) from None
     if not np.all((numbers >= minimum) & (numbers <= np.asarray(maximum)) & (numbers == np.floor(numbers))):
-        maximum_text = f"{maximum:g}" if isinstance(maximum, float) else "the trials"
-        raise InvalidOption(
-            f"{{}} must be whole numbers, at least {minimum:g} and no more than {maximum_text}", argument
-        )
+        maximum_text = f"{maximum:g}" if isinstance(maximum, float) else "the number of trials"
+        raise InvalidOption(f"{{}} must be whole numbers from {minimum:g} to {maximum_text}", argument)
     return numbers
 
 
@@ -344,8 +342,8 @@ def format_nrml(
     low = max(low, no_damage or 0.0)
     if not high > low * (1.0 + 1e-5):
         raise InvalidOption(
-            f"a fragility model needs a range of intensities, not {low:.6g} to {high:.6g}: the data are all at one "
-            "intensity, or below the one that lifts the block"
+            f"a fragility model requires a range of intensities above the uplift of the block; got {low:.6g} to "
+            f"{high:.6g}; add motions of other intensities"
         )
     root = ET.Element("nrml", {"xmlns": NAMESPACE})
     model = ET.SubElement(root, "fragilityModel", attributes)
@@ -359,7 +357,7 @@ def format_nrml(
     for curve in curves:
         variance = curve.dispersion**2
         if variance > _MAX_VARIANCE:
-            raise InvalidOption(f"a dispersion of {curve.dispersion:.3g} is too wide for the mean and stddev of NRML")
+            raise InvalidOption(f"a dispersion of {curve.dispersion:.3g} is too large for the mean and stddev of NRML")
         mean = measure[1] * curve.median * math.exp(0.5 * variance)
         moments = {"mean": f"{mean:.8g}", "stddev": f"{mean * math.sqrt(math.expm1(variance)):.8g}"}
         ET.SubElement(function, "params", {"ls": curve.limit_state} | moments)
@@ -372,7 +370,7 @@ def check_nrml_names(names: Iterable[str], argument: str) -> None:
     for name in names:
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", checks.text(name, argument, InvalidOption)):
             raise InvalidOption(
-                f"{{}} of NRML may have letters, digits, dashes and underscores, and 100 of them at most, not {name!r}",
+                f"{{}} of NRML must consist of at most 100 letters, digits, dashes and underscores, not {name!r}",
                 argument,
                 value=name,
             )
@@ -384,16 +382,14 @@ def find_openquake_measure(measure: Measure, block: Body | None, model: Model) -
     SA(T) does not state its damping, which is the damping of ground-motion models.
     """
     if measure.has_block_units and block is None:
-        raise InvalidOption(
-            f"{measure.name} counts in a block's own unit; give {{}} to write it as PGA or PGV", "block"
-        )
+        raise InvalidOption(f"{measure.name} is in units of the block; give {{}} to convert it to PGA or PGV", "block")
     unit = 1.0 if block is None else float(compute_units(block.as_bodies(), measure, model)[0])
     if measure.motion_measure_name == "pgv":
         return "PGV", 100.0 * unit
     if measure.damping != DAMPING:
         raise InvalidOption(
-            f"the {{}} of OpenQuake's spectral accelerations is {DAMPING:g} of critical, not {measure.damping:g}: fit "
-            "the fragility against a measure of that damping",
+            f"the {{}} of a spectral acceleration must be {DAMPING:g} of critical for OpenQuake; got "
+            f"{measure.damping:g}; fit the fragility against a measure with this damping",
             "damping",
             value=measure.damping,
         )

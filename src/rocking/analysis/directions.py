@@ -104,7 +104,9 @@ def response_rose(
     import xarray as xr
 
     if not isinstance(solid, Solid):
-        raise InvalidBlock(f"a Solid is needed, not a {type(solid).__name__}: make one with rocking.Solid.from_mesh")
+        raise InvalidBlock(
+            f"a Solid is required, not a {type(solid).__name__}; create one with rocking.Solid.from_mesh"
+        )
     named_pairs = _name_pairs(pairs)
     angles = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
     scales = Scales.from_levels(levels, measure)
@@ -254,7 +256,7 @@ def _name_pairs(pairs: Pairs) -> dict[str, Pair]:
     lists = [list_motions(pair) for pair in entries if not isinstance(pair, Motion)]
     if not lists or len(lists) < len(entries) or any(len(components) != 2 for components in lists):
         raise InvalidOption(
-            "{} must hold the two horizontal components of each place, as [(first, second)]", "pairs", value=pairs
+            "{} must contain a pair of horizontal components for each site, as [(first, second)]", "pairs", value=pairs
         )
     names = [f"{first.name} and {second.name}" for first, second in lists]
     unique_names = [f"{name} #{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]

@@ -108,7 +108,7 @@ def compare_measures(
     compute_slenderness(bodies)  # raise errors before the simulations
     block_weights = normalise_weights(weights, len(bodies))
     if len(motions) < 2:
-        raise InvalidOption("{} must contain two motions or more for a comparison of measures; got one", "motions")
+        raise InvalidOption("{} must contain at least two motions for a comparison of measures; got one", "motions")
     period_values = checks.positive_numbers(periods, "periods", InvalidOption)
     spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
     measures = [Measure("pga"), Measure("pgv"), *spectral_measures, Measure("pga_ratio"), Measure("pgv_ratio")]
@@ -268,5 +268,5 @@ def _check_sample_size(count: int, clusters: object) -> None:
     if count < 2:
         argument, kind = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
         raise InvalidOption(
-            f"fewer than two {{}}{kind} overturn a block, however strong; a dispersion needs more", argument
+            f"fewer than two {{}}{kind} overturn a block at any scale; a dispersion requires at least two", argument
         )

@@ -263,7 +263,9 @@ class Fragility(Result):
             columns = zip((self.measure.column, "probability", "lower", "upper"), values, strict=True)
             return [Column("limit_state", names), *(Column(name, column) for name, column in columns)]
         if self.outcomes is None:
-            raise InvalidOption("this fragility was fitted to given outcomes: there are no simulations to write")
+            raise InvalidOption(
+                "this fragility was fitted to observed outcomes, so that there are no simulations to write"
+            )
         return [Column(str(name), self.outcomes[name]) for name in self.outcomes]
 
     def to_nrml(
@@ -278,9 +280,9 @@ class Fragility(Result):
     ) -> None:
         """Write the curves as an OpenQuake fragility model (NRML 0.5).
 
-        Lognormals are written by mean and standard deviation of the intensity (PGA and SA in g, PGV in cm/s, a block's
-        own units as its PGA or PGV). For PGA the no-damage limit is the uplift acceleration, unless it is lowered by a
-        simulated vertical motion.
+        Each lognormal curve is written as the mean and standard deviation of the intensity, with PGA and SA in g and
+        PGV in cm/s. Intensities in units of a block are converted to its PGA or PGV. For PGA the no-damage limit is the
+        uplift acceleration, unless it is lowered by a simulated vertical motion.
 
         Parameters
         ----------
@@ -407,7 +409,7 @@ def fragility(
     states = check_limit_states(limit_states)
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
-        raise InvalidOption(f"{{}} must contain two levels or more; got {stripes.size}", "levels", value=levels)
+        raise InvalidOption(f"{{}} must contain at least two levels; got {stripes.size}", "levels", value=levels)
     motions = list_motions(motions)
     values, cluster_numbers, units = (
         compute_intensities(motions, measure),

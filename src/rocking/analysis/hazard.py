@@ -92,7 +92,7 @@ class HazardCurve(Result):
         rate = checks.numbers(self.rate, "rate of a hazard curve", InvalidOption)
         if intensity.ndim != 1 or intensity.shape != rate.shape or len(intensity) < 2:
             raise InvalidOption(
-                "a hazard curve needs two points or more, and as many rates as intensities, not shapes "
+                "a hazard curve requires at least two points, and one rate for each intensity; got shapes "
                 f"{intensity.shape} and {rate.shape}"
             )
         _check_order("intensities", intensity, 1.0)
@@ -100,7 +100,9 @@ class HazardCurve(Result):
         measure_input: Any = self.measure
         measure = Measure.parse(measure_input)
         if measure.units == "1":
-            raise InvalidOption("a hazard curve is of pga, pgv or sa, which are of the site, not of a block")
+            raise InvalidOption(
+                f"a hazard curve must be of pga, pgv or sa, which do not depend on a block; got {measure.name}"
+            )
         for name, value in (("intensity", intensity), ("rate", rate), ("measure", measure)):
             object.__setattr__(self, name, value)
         for array in (intensity, rate):
@@ -140,13 +142,13 @@ class HazardCurve(Result):
         try:
             lines = file.read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise InvalidOption(f"it cannot be read: {reason}", path=str(file)) from error
+            reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+            raise InvalidOption(f"the file cannot be read: {reason}", path=str(file)) from error
         try:
             if lines and "investigation_time" in lines[0]:
                 return cls(*_parse_openquake(lines, site, period), file.stem)
             if site:
-                raise InvalidOption("a table of two columns is of one site; leave {} out", "site")
+                raise InvalidOption("a table of two columns contains only one site; omit {}", "site")
             return cls(*_parse_table(lines, period), file.stem)
         except InvalidOption as error:
             error.path = str(file)
@@ -215,8 +217,7 @@ def _check_order(quantity: str, values: Floats, sign: float) -> None:
         predecessor = f" after {values[k - 1]:g}" if k else ""
         raise InvalidOption(
             f"the {quantity} of a hazard curve must be positive and {'increase' if sign > 0.0 else 'decrease'} from "
-            f"point to point, but that of point {k + 1} is {values[k]:g}{predecessor}; correct it or leave "
-            "the point out"
+            f"point to point; got {values[k]:g}{predecessor} at point {k + 1}; correct or remove this point"
         )
 
 
@@ -235,8 +236,8 @@ def _parse_table(lines: list[str], period: float | None) -> tuple[Floats, Floats
     intensity_headings = [cell for cell in heading if cell in HEADINGS]
     if len(intensity_headings) != 1 or heading.count("annual_rate") != 1:
         raise InvalidOption(
-            f"a hazard curve needs a heading with annual_rate and one of {', '.join(HEADINGS)}, "
-            f"not {', '.join(header) or 'nothing'}"
+            f"a hazard curve requires a heading with annual_rate and one of {', '.join(HEADINGS)}; "
+            f"got {', '.join(header) or 'nothing'}"
         )
     kind, factor = HEADINGS[intensity_headings[0]]
     intensity, rate = np.empty(len(rows)), np.empty(len(rows))
@@ -245,12 +246,16 @@ def _parse_table(lines: list[str], period: float | None) -> tuple[Floats, Floats
             cells = dict(zip(heading, row, strict=True))
             intensity[k], rate[k] = (float(cells[name]) for name in (intensity_headings[0], "annual_rate"))
         except ValueError:
-            sentence = f"{','.join(row)} is not an intensity and a rate, in {len(heading)} cells as the heading"
+            sentence = (
+                f"expected an intensity and a rate in {len(heading)} cells, as in the heading; got {','.join(row)}"
+            )
             raise InvalidOption(sentence, line=line) from None
     if kind == "sa" and period is None:
-        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period")
+        raise InvalidOption("a spectral acceleration requires {}, in s", "period")
     if kind != "sa" and period is not None:
-        raise InvalidOption(f"{{}} belongs to a spectral acceleration, and this curve is of {kind}", "period")
+        raise InvalidOption(
+            f"{{}} applies only to spectral acceleration, but the intensity measure of this curve is {kind}", "period"
+        )
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
     with np.errstate(over="ignore"):  # infinite values are rejected later
         return factor * intensity, rate, measure
@@ -264,19 +269,22 @@ def _parse_openquake(lines: list[str], site: int, period: float | None) -> tuple
     levels = {k: cell.strip()[4:] for k, cell in enumerate(header) if cell.strip().startswith("poe-")}
     if kind not in _OPENQUAKE_MEASURES or not levels:
         raise InvalidOption(
-            f"no hazard curve of {', '.join(_OPENQUAKE_MEASURES)}: imt is {fields.get('imt', 'not given')}"
+            f"the imt of a hazard curve must be one of {', '.join(_OPENQUAKE_MEASURES)}; got "
+            f"{fields.get('imt', 'none')}"
         )
     if site >= len(rows):
-        raise InvalidOption(f"there is no site {site}; it holds {len(rows)}, counted from 0")
+        raise InvalidOption(f"there is no site {site}; the file contains {len(rows)}, counted from 0")
     try:
         intensity = np.array([float(level) for level in levels.values()])
         probabilities = np.array([float(rows[site][k]) for k in levels])
         years = float(fields["investigation_time"])
         spectral_period = float(period_text.rstrip(")")) if kind == "SA" else None
     except (ValueError, IndexError, KeyError) as error:
-        raise InvalidOption(f"site {site}: {error}; it is not a whole hazard curve") from None
+        raise InvalidOption(f"the hazard curve of site {site} is incomplete or damaged: {error}") from None
     if period not in (None, spectral_period):
-        raise InvalidOption(f"{{}} is {period:g} s, and this curve is of {fields['imt']}: leave it out", "period")
+        raise InvalidOption(
+            f"{{}} is {period:g} s, but the intensity measure of this curve is {fields['imt']}; omit it", "period"
+        )
     measure_name, factor = _OPENQUAKE_MEASURES[kind]
     measure = Measure(measure_name) if spectral_period is None else Measure("sa", spectral_period)
     # Probabilities printed as 0 or 1 contain no information on the rate.

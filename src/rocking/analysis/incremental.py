@@ -120,7 +120,10 @@ def incremental_dynamic_analysis(
     slenderness = compute_slenderness(bodies)
     values = compute_intensities(motion_list, measure)
     if never_rests(bodies):
-        raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
+        raise InvalidOption(
+            "{} must be below 1 for an incremental dynamic analysis, because otherwise the block never comes to rest",
+            "restitution",
+        )
     relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model}
     lowest_uplift = _find_lowest_uplift(bodies, motion_list, values, measure, model)
@@ -307,7 +310,9 @@ def _find_lowest_uplift(
     )
     lowest = float(np.min(factors * values[:, None] / compute_units(blocks, measure, model)))
     if math.isinf(lowest):
-        raise InvalidOption("no motion lifts a block at any level: none pushes towards a side as its weight allows")
+        raise InvalidOption(
+            "no motion lifts a block at any level, because of direction or vertical component; use other motions"
+        )
     return lowest
 
 
@@ -505,7 +510,7 @@ def critical_scale(
     '3.256134'
     """
     if check_motion(motion) is None:
-        raise InvalidOption("there is no {} to scale: give one", "motion")
+        raise InvalidOption("a critical scale requires a {}; got None", "motion")
     low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
     checks.positive(low, "bounds", InvalidOption)
 

@@ -42,7 +42,9 @@ def number_groups(labels: object, name: str, count: int, item: str = "outcome") 
     """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
     entries = checks.items(labels, name, InvalidOption)
     if len(entries) != count or not all(isinstance(label, Hashable) for label in entries):
-        raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {item}", name, value=labels)
+        raise InvalidOption(
+            f"{{}} must contain {count} labels (numbers or texts), one for each {item}", name, value=labels
+        )
     return number_labels([(k,) if _is_missing(label) else label for k, label in enumerate(entries)])
 
 
@@ -115,7 +117,7 @@ def normalise_weights(weights: ArrayLike | None, count: int) -> Floats:
         return np.ones(count)
     values = checks.numbers(weights, "weights", InvalidOption)
     if values.shape != (count,) or not (np.all(np.isfinite(values) & (values >= 0.0)) and np.any(values > 0.0)):
-        raise InvalidOption(f"{{}} must be {count} numbers of 0 or more, not all 0, one for each block", "weights")
+        raise InvalidOption(f"{{}} must contain {count} nonnegative numbers, not all 0, one for each block", "weights")
     values = values / values.max()  # otherwise sums of very large or very small weights overflow
     return np.asarray(values * (count / values.sum()))
 
@@ -149,7 +151,9 @@ def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integer
     if isinstance(labels, str) and labels == BY_STATION:
         labels = stations
         if not any(stations):
-            raise InvalidOption(f"{{}} {BY_STATION} is for records that name theirs: give each a label", "clusters")
+            raise InvalidOption(
+                f"{{}} {BY_STATION} requires records that name their station; give a label for each motion", "clusters"
+            )
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -139,9 +139,10 @@ def overturning_map(
 
     Notes
     -----
-    By dimensional analysis, one pulse is simulated with blocks of different p for the frequencies. Changes of mode
-    between neighbouring amplitudes of the grid are located by bisection. Changes between amplitudes of equal mode are
-    not detected.
+    By dimensional analysis, the outcome depends on the frequency of the pulse only through 2 pi f/p. Therefore one
+    pulse is simulated with blocks of different p in place of pulses of different frequencies. Changes of mode between
+    neighbouring amplitudes of the grid are located by bisection. Changes between amplitudes of equal mode are not
+    detected.
 
     References
     ----------
@@ -165,7 +166,7 @@ def overturning_map(
     require_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption(
-            "a block with {} 1 never comes to rest; an overturning map needs one below 1", "restitution"
+            "{} must be below 1 for an overturning map, because otherwise the block never comes to rest", "restitution"
         )
     min_p = min(side.p for side in block.sides)
     create_pulse, frequency = _create_pulse_function(pulse, parameters), min_p / (2.0 * math.pi)
@@ -176,9 +177,8 @@ def overturning_map(
         pairs = (unit, scaled_pulse), (unit.vertical, scaled_pulse.vertical)
         if not all(_is_alike(first, second, amplitude, ratio) for first, second in pairs):
             raise InvalidOption(
-                "the {} must have one shape: a function of amplitude and frequency whose motion is proportional to the "
-                f"amplitude, and over in half the time at twice the frequency; that of {frequency:g} Hz is another one "
-                f"than that of {ratio * frequency:g} Hz",
+                "the {} must have the same shape at all frequencies: proportional to the amplitude, and half as long "
+                f"at twice the frequency; the shapes at {frequency:g} Hz and at {ratio * frequency:g} Hz differ",
                 "pulse",
             )
     p, alpha, restitution = (
@@ -385,7 +385,7 @@ def _create_pulse_function(
     if callable(pulse):
         if parameters:
             raise InvalidOption(
-                f"{{}} is a function, so no parameters are accepted; got {', '.join(parameters)}: bind them to it",
+                f"{{}} is a function, so that no parameters are accepted; got {', '.join(parameters)}; set them in it",
                 "pulse",
                 value=parameters,
             )

@@ -153,23 +153,23 @@ def explain_missing_fit(data: Outcomes, format_intensity: Callable[[float], str]
     if not exceeded_z.size or not other_z.size:
         quantifier, remedy = ("no", "stronger") if not exceeded_z.size else ("every", "weaker")
         return (
-            f"{quantifier} outcome of {count} exceeds the limit, {_describe_range(z, format_intensity)}: "
-            f"{remedy} motions are needed"
+            f"{quantifier} outcome of {count} exceeds the limit, {_describe_range(z, format_intensity)}; "
+            f"use {remedy} motions"
         )
     if z.min() == z.max():
-        return f"all outcomes are at one intensity, {format_intensity(math.exp(z[0]))}: others are needed"
+        return f"all outcomes are at one intensity, {format_intensity(math.exp(z[0]))}; use several intensities"
     if other_z.max() <= exceeded_z.min() + _compute_overlap(z):
         low, high = math.exp(other_z.max()), math.exp(exceeded_z.min())
         start, rest = ("below", "above it") if low >= high else ("up to", f"from {format_intensity(high)} on")
         gap = f"{start} {format_intensity(low)} and all do {rest}"
         return (
-            f"the outcomes are separated, none exceeds the limit {gap}: the fragility is a step there, and motions "
-            "near it are needed"
+            f"the outcomes are separated, none exceeds the limit {gap}, so that the fragility is a step; use more "
+            "motions near it"
         )
     if not _is_rising(data.alone())[0]:
         return (
-            "the outcomes contradict a curve that rises, the limit is exceeded no more often at higher intensities: "
-            "another measure or more motions are needed"
+            "the fitted curve does not rise, because the limit is exceeded no more often at higher intensities; use "
+            "another measure or more motions"
         )
     return None
 

@@ -230,7 +230,7 @@ def compute_risk(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure:
     """Integrate fragility curves of a measure over a hazard curve."""
     if not isinstance(hazard, HazardCurve):
         raise InvalidOption(
-            f"a HazardCurve is needed, not a {type(hazard).__name__}: make one with HazardCurve(intensity, rate), "
+            f"a HazardCurve is required, not a {type(hazard).__name__}; create one with HazardCurve(intensity, rate), "
             "or read one with HazardCurve.read(path)",
             value=hazard,
         )
@@ -251,8 +251,8 @@ def check_measure(hazard: HazardCurve, measure: Measure) -> None:
     """Raise an InvalidOption if the measures of a hazard curve and a fragility differ."""
     if measure != hazard.measure:
         raise InvalidOption(
-            f"the fragility is against {measure.label}, the hazard curve of {hazard.measure.label}; "
-            "fit the one against the other's measure"
+            f"the fragility and the hazard curve must have the same measure; got {measure.label} and "
+            f"{hazard.measure.label}; fit the fragility against the measure of the hazard curve"
         )
 
 

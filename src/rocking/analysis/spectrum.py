@@ -67,8 +67,9 @@ def rocking_spectrum(
     ----------
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         Grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), the dimensions of the spectrum.
-        Other blocks, for example from a calibration, and a grid with `p`, `size` or `weights` are an ensemble, resized
-        together (`Blocks.with_p_scaled`) so that its median p equals each of `p`.
+        Blocks without a grid, for example from a calibration, or a grid with `p`, `size` or `weights` are treated as an
+        ensemble: for each value of `p`, all blocks are resized by one factor (`Blocks.with_p_scaled`) so that their
+        median p equals this value.
     motions : optional
         As for `simulate_many`.
     p : array_like, optional
@@ -102,9 +103,9 @@ def rocking_spectrum(
     Notes
     -----
     The peak of an overturning block is infinite. Fractiles are interpolated between the ordered peaks, and are infinite
-    if that share of the motions, or the next motion above it, overturns. For an ensemble, fractiles are the lowest
-    peaks that the share of the weight does not exceed. Its peaks are normalised by the smaller slenderness of the
-    blocks at rest.
+    if that share of the motions, or the next motion above it, overturns. For an ensemble, the fractile of a share is
+    the lowest peak for which the peaks up to it have at least this share of the total weight. The peaks of an ensemble
+    are normalised by the smaller slenderness of the blocks at rest.
 
     References
     ----------
@@ -124,7 +125,7 @@ def rocking_spectrum(
     options: dict[str, Any] = {"model": model, "chattering": chattering}
     bodies, motions = gather_bodies(blocks), list_motions(motions)
     if not isinstance(bodies, Blocks):
-        raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {bodies.kind}")
+        raise InvalidOption(f"a spectrum requires blocks, because only blocks have a size; got {bodies.kind}")
     if (axes := bodies.axes) is not None and p is None and size is None and weights is None:
         checks.grid_size({"motions": len(motions), "blocks": len(bodies)}, InvalidOption)
         names, shape = (*(name for name in axes if name != "p"), "p"), [*map(len, axes.values())]

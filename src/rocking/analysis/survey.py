@@ -304,7 +304,9 @@ def survey(
     """
     named_motions = index_motions(motions)
     if not require_body(block).coordinate.limit:
-        raise InvalidOption(f"a survey is of a block, which has a balance, not of a {type(block).__name__}")
+        raise InvalidOption(
+            f"a survey requires a Block, because only a block has an unstable equilibrium; got {type(block).__name__}"
+        )
     if friction is not None:
         check_friction(friction)
     responses = []

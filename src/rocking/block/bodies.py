@@ -102,13 +102,15 @@ class Blocks:
         if terms:
             arguments |= {**_TERMS, **terms}
             if unknown := [*terms.keys() - _TERMS.keys()]:
-                raise InvalidBlock(f"blocks have no {{}}; terms of restraints are {', '.join(_TERMS)}", unknown[0])
+                raise InvalidBlock(
+                    f"blocks have no parameter {{}}; the terms of restraints are {', '.join(_TERMS)}", unknown[0]
+                )
         try:
             columns = [_expand_sides(checks.numbers(values, name, InvalidBlock)) for name, values in arguments.items()]
             arrays = dict(zip(arguments, np.broadcast_arrays(*columns), strict=True))
         except ValueError:
             raise InvalidBlock(
-                "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with one n",
+                "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with the same n",
                 "p", "alpha", "restitution",
             ) from None  # fmt: skip
         g = check_gravity(gravity)
@@ -367,8 +369,8 @@ def resolve_p(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> Ar
     if size is not None and p is None:
         g = checks.positive(gravity, "gravity", InvalidBlock, "m/s^2")
         return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidBlock))
-    phrase = "one of" if p is None else "not both of"
-    raise InvalidBlock(f"give {phrase} {{}} (rad/s) and {{}} (half diagonals, m)", "p", "size")
+    suffix = "" if p is None else ", not both"
+    raise InvalidBlock(f"give either {{}} (rad/s) or {{}} (half diagonals, m){suffix}", "p", "size")
 
 
 def _expand_sides(array: Floats) -> Floats:
@@ -390,8 +392,8 @@ def _compute_restitutions(p: Floats, alpha: Floats) -> Floats:
     stocky = np.flatnonzero(~(factors > 0.0).all(axis=1))
     if len(stocky):
         raise InvalidBlock(
-            f"conserving angular momentum gives block {stocky[0]} a restitution of {factors[stocky[0]].min():.3g}: it "
-            "is too stocky to rock that way; give {} a value or a pair in (0, 1]",
+            f"conservation of angular momentum gives block {stocky[0]} a restitution of "
+            f"{factors[stocky[0]].min():.3g}, because it is too stocky; set {{}} to a value or a pair in (0, 1]",
             "restitution",
         )
     return check_sides(factors, "restitution")

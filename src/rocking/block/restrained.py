@@ -92,7 +92,7 @@ class RestrainedBlock(Rocking):
         restitution: float | Sequence[float] | Restitution | None = None,
     ) -> None:
         if isinstance(block, RestrainedBlock):
-            raise InvalidBlock("this block already has restraints; give all of them together, after the Block")
+            raise InvalidBlock("this block already has restraints; give a Block and all restraints together")
         free_block, is_one_sided = require_block(block), checks.boolean(one_sided, "one_sided", InvalidBlock)
         _check_restraints(restraints, free_block)
         tilt = checks.finite(lean, "lean", InvalidBlock)

@@ -424,7 +424,8 @@ class Restitution:
     seed : int, optional
         Whole number from 0 to 2^53, preferably different for each body. The factor depends only on the seed and the
         number of the impact. Therefore it is the same under any ground motion, for a body alone or among others. After
-        a rest the count continues from the resolved impacts, of which a finer scheme has more.
+        a rest, the numbering continues from the last simulated impact. The later factors therefore depend on the
+        chattering scheme, because a finer scheme simulates more impacts before the rest.
 
     Raises
     ------

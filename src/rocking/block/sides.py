@@ -175,7 +175,7 @@ def impact_restitution(
         h, k = check_length(height, "height"), check_length(radius_of_gyration, "radius_of_gyration")
     else:
         raise InvalidBlock(
-            "give either {} of a rectangular block, or {}, {} and {} of a body",
+            "give either {} for a rectangular block, or {}, {} and {} for another body",
             "alpha", "distances", "height", "radius_of_gyration",
         )  # fmt: skip
     kappa = checks.fraction(contact, "contact", InvalidBlock, below=math.nextafter(1.0, 2.0))
@@ -186,13 +186,16 @@ def impact_restitution(
     factors = (_compute_factor(arms, inertia, kappa, count), _compute_factor(arms[::-1], inertia, kappa, count))
     if min(factors) <= 0.0:
         raise InvalidBlock(
-            f"angular momentum leaves this body a restitution of {min(factors):.3g}: it is too stocky to rock that way"
+            f"conservation of angular momentum gives this body a restitution of {min(factors):.3g}, because it is too "
+            "stocky; use a more slender one"
         )
     short, long = sorted(arms)
     ratio = math.sqrt((inertia + long * long) / (inertia + short * short))  # ratio of the speeds without energy loss
     min_kappa = inertia * (ratio - 1.0) / (long * (long + ratio * short))
     if kappa < min_kappa:
-        raise InvalidBlock(f"{{}} must be at least {min_kappa:.4g} for this body, which would gain energy", "contact")
+        raise InvalidBlock(
+            f"{{}} must be at least {min_kappa:.4g}, because this body would otherwise gain energy", "contact"
+        )
     return factors
 
 
@@ -293,14 +296,14 @@ def choose_restitutions(restitution: object, conserved: Sequence[float]) -> tupl
     if restitution is None:
         if min(conserved) <= 0.0:
             raise InvalidBlock(
-                f"conserving angular momentum gives this block a restitution of {min(conserved):.3g}: it is too stocky "
-                "to rock that way; correct its sizes if they are swapped, or give {} a value in (0, 1]",
+                f"conservation of angular momentum gives this block a restitution of {min(conserved):.3g}, because it "
+                "is too stocky; correct its sizes if they are swapped, or set {} to a value in (0, 1]",
                 "restitution",
             )
         return conserved[0], conserved[1]
     if hasattr(restitution, "maximum"):  # a Restitution, whose module imports this one
         raise InvalidBlock(
-            "{} of a Block must be a number or a pair; give a law to RestrainedBlock(block, restitution=...)",
+            "{} of a Block must be a number or a pair; for a law, use RestrainedBlock(block, restitution=...)",
             "restitution",
         )
     plus, minus = (check_parameter(value, "restitution") for value in check_pair(restitution, "restitution"))
@@ -345,9 +348,9 @@ def describe_missing_body(p: Floats, alpha: Floats) -> str:
         100.0 * math.expm1(float(values[0])) for values in _compare_sides(p[None], np.cos(alpha)[None])
     )
     return (
-        f"no rigid body has p = {p[0]:g} and {p[1]:g} rad/s on sides of alpha = {alpha[0]:g} and {alpha[1]:g} rad: its "
-        f"p would differ by less than {bound:.2g} %, not by {difference:.2g} %; give p and alpha with more digits, or "
-        "give {} a value in (0, 1]"
+        f"no rigid body has p = {p[0]:g} and {p[1]:g} rad/s on sides of alpha = {alpha[0]:g} and {alpha[1]:g} rad; its "
+        f"p must differ by less than {bound:.2g} %, not by {difference:.2g} %; give p and alpha with more digits, or "
+        "set {} to a value in (0, 1]"
     )
 
 

@@ -144,8 +144,8 @@ class Block(Rocking):
         s = checks.finite(offset, "offset", InvalidBlock)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
             raise InvalidBlock(
-                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}; for a block with its mass "
-                "farther out, the pivots and the radius of gyration must be given",
+                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}; for a larger one, give the "
+                "pivots and the radius of gyration",
                 "offset",
                 value=offset,
             )
@@ -493,10 +493,10 @@ class Block(Rocking):
 def require_block(block: object, requirement: str = "a free Block") -> Block:
     """Return the block, or raise `InvalidBlock` that names the required object."""
     if not isinstance(block, Block):
-        hint = "make one with Block(width=, height=), in m"
+        hint = "create one with Block(width=, height=), in m"
         if hasattr(block, "rose"):
             hint = "use solid.block(azimuth), the block that a Solid is in one vertical plane"
-        raise InvalidBlock(f"{requirement} is needed, not a {type(block).__name__}: {hint}")
+        raise InvalidBlock(f"{requirement} is required, not a {type(block).__name__}; {hint}")
     return block
 
 

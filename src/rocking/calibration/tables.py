@@ -102,7 +102,7 @@ def read_ensemble(path: Path) -> Ensemble:
     ]
     missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
     if missing:
-        raise table.create_error(f"not the ensemble.csv of a calibration: {' and '.join(missing)} missing")
+        raise table.create_error(f"expected the ensemble.csv of a calibration, with columns {' and '.join(missing)}")
     model_names: dict[str, Model] = {name: name for name in get_args(Model)}
     models = {
         table.convert(line, row["model"], model_names.__getitem__, "linear or nonlinear") for line, row in table.rows
@@ -136,7 +136,7 @@ def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Tabl
         raise UnreadableRecord(text, path=str(path), line=1)
     for line, row in rows:
         if len(row) != len(columns):
-            mismatch = f"{format_count(len(row), 'cell')} under {format_count(len(columns), 'column')}"
+            mismatch = f"this row has {format_count(len(row), 'cell')} for {format_count(len(columns), 'column')}"
             raise UnreadableRecord(f"{mismatch}; correct it", path=str(path), line=line)
     return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
@@ -145,7 +145,9 @@ def _create_tests(table: _Table, **metadata: Any) -> list[ShakeTest]:
     """Create the tests of a table with these columns."""
     specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
     if len(specimens) > 1:
-        raise table.create_error(f"the tests are of {format_count(len(specimens), 'specimen')}; use a table for each")
+        raise table.create_error(
+            f"the table contains tests of {format_count(len(specimens), 'specimen')}; use one table for each"
+        )
     overturned, motions = table.booleans("overturned"), _load_row_motions(table, **metadata)
     names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
     return [ShakeTest(*row) for row in zip(motions, overturned, names, groups, strict=True)]
@@ -286,7 +288,7 @@ def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[
         raise InvalidOption("a spectral acceleration requires {}, in s", "period", path=str(table.path))
     if measure.name not in ("pga", kind):  # "pga" is the default
         raise InvalidOption(
-            f"{{}} is {measure.name}, but the outcomes are given by {kind}: leave it out",
+            f"{{}} is {measure.name}, but the intensities of the outcomes are {kind}; omit it",
             "measure",
             path=str(table.path),
         )

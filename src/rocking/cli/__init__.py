@@ -132,9 +132,9 @@ def _format_error(error: Exception, words: list[str]) -> str:
     if isinstance(error, MissingArgumentError) and (missing := error.argument) is not None:
         is_given = any(word.partition("=")[0] in missing.names for word in words)
         requirement = (
-            f"{missing.name} needs a value"
+            f"{missing.name} requires a value"
             if is_given
-            else f"{_format_command(words)} needs {_format_argument(missing)}"
+            else f"{_format_command(words)} requires {_format_argument(missing)}"
         )
         return f"{requirement}; see {_format_command(words)} --help"
     if isinstance(error, CycloptsError):

@@ -258,7 +258,7 @@ def _create_slender_block(options: BlockOptions) -> Block:
     values = options.read_values()
     if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
         raise InvalidBlock(
-            "the restitution of two different sides follows from {} and {} of both: also set {}", "p", "alpha", "p"
+            "the restitution of two different sides depends on {} and {} of both; also set {}", "p", "alpha", "p"
         )
     block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_SHAPES)
     note_likely_mistakes([block])

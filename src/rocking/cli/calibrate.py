@@ -106,13 +106,15 @@ def calibrate(
         if isinstance(table, MeasuredHistory):
             conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
         for name in [name for name, value in conflicting.items() if value]:
-            kind = "outcomes" if isinstance(table, MeasuredHistory) else "a history"
-            raise InvalidOption(f"{{}} requires a table of {kind}, which this is not", name)
+            kinds = ("outcomes", "a history") if isinstance(table, MeasuredHistory) else ("a history", "outcomes")
+            raise InvalidOption(f"{{}} requires a table of {kinds[0]}, but this table contains {kinds[1]}", name)
         records = predict if motion is None else (motion,)
         motions = _read_motions(records, file, "motion" if isinstance(table, MeasuredHistory) else "predict")
         if isinstance(table, MeasuredHistory):
             if len(motions) > 1:
-                raise InvalidOption("a history has one motion of the base: use {}, or a single {}", "motion", "pulse")
+                raise InvalidOption(
+                    "a history requires a single motion of the base; use {}, or one {}", "motion", "pulse"
+                )
             base_motion = next(iter(motions.values()), None)
             arguments |= {"initial_rotation": rotation, "seed": seed}
             result: Calibration | HistoryCalibration = calibrate_history(
@@ -138,7 +140,7 @@ def _read_motions(records: Sequence[str], file: ScaledPulseOptions, option: str)
     """Read records and pulses and reject options of motions if there are none."""
     motions = {name: file.motion(name) for name in records} | file.pulses()
     for name in {} if motions else file.supplied("scale", "pga", "pgv", "sa", "vertical"):
-        raise InvalidOption("{} requires motions from {} or {}: add one, or omit it", name, option, "pulse")
+        raise InvalidOption("{} requires a motion; add one with {} or {}, or omit it", name, option, "pulse")
     return motions
 
 

@@ -203,7 +203,7 @@ def _read_hazard(file: Path | None, site: int, years: float, period: float | Non
     if file is None:
         for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
             if is_given:
-                raise InvalidOption("{} requires a curve from {}: add one, or omit it", name, "hazard")
+                raise InvalidOption("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
         return None
     curve = HazardCurve.read(file, site=site, period=period)
     for sentence in hazard_notes(curve.intensity, curve.measure):

@@ -64,7 +64,9 @@ def mesh(
     """
     with output.folder() as folder:
         if restitution is not None and azimuth is None:
-            raise InvalidOption("{} requires blocks from {}: add one, or omit it", "restitution", "azimuth")
+            raise InvalidOption(
+                "{} applies only to blocks created by {}; add such a block, or omit it", "restitution", "azimuth"
+            )
         solid = Solid.from_mesh(
             file,
             density=None if density is None else read_densities(density, "density"),

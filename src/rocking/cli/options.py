@@ -425,7 +425,7 @@ def read_positive_acceleration(text: str, name: str) -> float:
     """Read a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
     if not read_acceleration(text, name) > 0.0:
         raise InvalidOption(
-            f"{{}} must be positive; got {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
+            f"{{}} must be positive; got {text.strip()}; use {{}} -1 to reverse a motion", name, "scale", value=text
         )
     return read_noted_acceleration(text, name)
 

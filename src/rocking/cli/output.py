@@ -137,7 +137,7 @@ def subfolder(folder: Path, name: str) -> Path:
     try:
         (folder / name).mkdir(exist_ok=True)
     except OSError as error:
-        raise OutputError(f"this folder cannot be made: {error.strerror}", path=str(folder / name)) from error
+        raise OutputError(f"this folder cannot be created: {error.strerror}", path=str(folder / name)) from error
     return folder / name
 
 

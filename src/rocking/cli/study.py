@@ -110,7 +110,7 @@ def run(
     for unit, reason in [*report.failed.items()][:_MAX_REPORTED]:
         note(f"{unit} failed: {reason}")
     if report.failed:
-        raise StudyError(f"{format_count(len(report.failed), 'unit')} failed; run the study again to try again")
+        raise StudyError(f"{format_count(len(report.failed), 'unit')} failed; run the study again to repeat them")
     if report.stopped:
         sys.exit(128 + signal.SIGTERM)
 
@@ -178,7 +178,11 @@ def export(
         Write the scales between which this outcome of a block changes instead.
     """
     if file.suffix not in WRITERS:
-        raise InvalidOption(f"a study is exported to {', '.join(WRITERS)}, not to {file.name}", "file", value=file)
+        raise InvalidOption(
+            f"the name of an exported file must end with one of {', '.join(WRITERS)}; got {file.name}",
+            "file",
+            value=file,
+        )
     WRITERS[file.suffix](Study(folder), file, critical=critical)
     print(f"written to {file}")
 

@@ -137,7 +137,7 @@ def mapping(value: object, name: str, error: Error, example: str) -> Mapping[Any
     """Return `value`, or raise `error` unless it is a nonempty mapping."""
     if not isinstance(value, Mapping) or not value:
         raise error(
-            f"{{}} must be a mapping with one entry or more, as {example}, not {short_repr(value)}", name, value=value
+            f"{{}} must be a mapping with at least one entry, as {example}, not {short_repr(value)}", name, value=value
         )
     return value
 
@@ -154,13 +154,13 @@ def grid_size(sizes: Mapping[str, int], error: Error, max_points: int = 10_000_0
     points = math.prod(sizes.values())
     if points > max_points:
         axes = " x ".join(f"{size} {name}" for name, size in sizes.items())
-        raise error(f"{axes} make a grid of {points:,} points; at most {max_points:,} can be computed: take fewer")
+        raise error(f"a grid of {axes} has {points:,} points; use at most {max_points:,}")
 
 
 def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return real numbers (possibly not finite) as an array of the same shape, or raise `error`."""
     if np.ma.is_masked(values):
-        raise error("{} must be numbers throughout, but some are masked", name, value=values)
+        raise error("{} must not contain masked values", name, value=values)
     try:
         array = np.asarray(values)
         if array.dtype.kind == "O":
@@ -177,7 +177,7 @@ def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
 def booleans_or_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return real numbers, or truth values as 1 and 0, like `numbers`."""
     if np.ma.is_masked(values):
-        raise error("{} must be given throughout, but some are masked", name, value=values)
+        raise error("{} must not contain masked values", name, value=values)
     array = np.asarray(values)
     return array.astype(np.float64) if array.dtype.kind == "b" else numbers(values, name, error)
 
@@ -194,7 +194,7 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return positive finite numbers in increasing order, or raise `error`."""
     array = positive_numbers(values, name, error)
     if not np.all(np.diff(array) > 0.0):
-        raise error("{} must increase from one to the next", name, value=values)
+        raise error("{} must be in increasing order", name, value=values)
     return array
 
 

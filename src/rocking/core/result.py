@@ -239,8 +239,8 @@ class DatasetResult(Result):
         """
         for name in labels.keys() & {*self.POOLED}:
             raise InvalidOption(
-                f"some numbers of this result are of all its values of {name} together; compute a part of them anew, "
-                "or take what is of each from `data`",
+                f"this result contains numbers aggregated over {name}; repeat the analysis for a part, or select from "
+                "`data`",
                 value=labels,
             )
         selection = {name: np.atleast_1d(values) for name, values in labels.items()}
@@ -253,7 +253,7 @@ class DatasetResult(Result):
         except (KeyError, TypeError, ValueError, IndexError):
             names = ", ".join(map(str, data.sizes))
             raise InvalidOption(
-                f"there is nothing at {checks.short_repr(labels)}; the dimensions are {names}", value=labels
+                f"no values match {checks.short_repr(labels)}; the dimensions are {names}", value=labels
             ) from None
         return type(self)(self._restrict(data))
 

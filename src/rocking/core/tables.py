@@ -254,7 +254,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
         target = destination.resolve()  # a link remains, and its target is replaced
         if not target.parent.is_dir():
             raise OutputError(
-                f"cannot be written: there is no folder {target.parent}; make it, or choose another", path=str(path)
+                f"cannot be written: there is no folder {target.parent}; create it, or choose another", path=str(path)
             )
         temporary = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:_SUFFIX_LENGTH]}.part{target.suffix}")
         try:
@@ -269,7 +269,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise OutputError(
-            f"cannot be written: {reason}; nothing of it was kept; choose another place", path=str(path)
+            f"cannot be written: {reason}; no partial file remains; choose another location", path=str(path)
         ) from error
 
 
@@ -299,7 +299,7 @@ def write_excel(path: str | Path, sheets: Mapping[str, pd.DataFrame]) -> None:
             for name, frame in sheets.items():
                 frame.to_excel(workbook, sheet_name=name, freeze_panes=(1, 0), index=False, float_format="%.15g")
     except ImportError:
-        raise InvalidOption(f"a workbook needs openpyxl: {describe_install('excel')}, or write CSV") from None
+        raise InvalidOption(f"an Excel workbook requires openpyxl: {describe_install('excel')}, or write CSV") from None
     write_bytes(path, content.getvalue())
 
 

@@ -330,7 +330,7 @@ class ImpactOscillator(LinearBody):
         stop = checks.finite(self.stop, "stop", InvalidBlock)
         if self.second_stop is not None and not checks.finite(self.second_stop, "second_stop", InvalidBlock) > -stop:
             raise InvalidBlock(
-                f"{{}} = {self.second_stop:g} m must be above -{{}} = {-stop:g} m, the position of the first",
+                f"{{}} = {self.second_stop:g} m must be above -{{}} = {-stop:g} m, the position of the first stop",
                 "second_stop", "stop", value=self.second_stop,
             )  # fmt: skip
 
@@ -515,8 +515,8 @@ def simulate(
 def _require_linear_body(body: object) -> LinearBody:
     if not isinstance(body, LinearBody):
         raise InvalidBlock(
-            "a BouncingBall, ImpactOscillator or InvertedPendulum of rocking.dynamics is needed, not "
-            f"{type(body).__name__}; blocks go to rocking.simulate"
+            "a BouncingBall, ImpactOscillator or InvertedPendulum of rocking.dynamics is required, not "
+            f"{type(body).__name__}; use rocking.simulate for blocks"
         )
     return body
 

@@ -101,8 +101,9 @@ def continue_orbit(
     one leave the unit circle only through 1 or -1. Therefore no Neimark-Sacker bifurcation occurs with restitution
     below 1.
 
-    The motion must be specified over its least period. Over two periods, orbits of twice the period and those from
-    which they bifurcate are of one kind, and a long step may jump between them.
+    The motion must be specified over its least period. If it is specified over two periods, both an orbit and the orbit
+    of twice the period that bifurcates from it are fixed points of the map, and a long step may jump from one to the
+    other.
 
     References
     ----------

@@ -119,7 +119,7 @@ class PeriodicForcing:
             if np.any(leads_into_stop):
                 x, v = float(coordinate[leads_into_stop][0]), float(velocity[leads_into_stop][0])
                 raise InvalidOption(
-                    f"{{}} must not lead into a stop; got {v:g} m/s at {x:g} m: change its sign, or begin in front "
+                    f"{{}} must not point into a stop; got {v:g} m/s at {x:g} m; change its sign, or begin in front "
                     "of the stop", velocities or name, value=v,
                 )  # fmt: skip
         records = state.new_states(len(flat), 0)

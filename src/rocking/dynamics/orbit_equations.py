@@ -123,7 +123,10 @@ class OrbitEquations:
         scale = compute_scale(strobe)
         if not np.all(np.abs(strobe(orbit.state, orbit.period) - orbit.state) / scale < 1e-8):
             raise InvalidOption(
-                f"the orbit does not belong to {{}} at {{}} = {value:g}", "family", "value", value=value
+                f"the orbit is not periodic for {{}} at {{}} = {value:g}; use the body and motion of the orbit",
+                "family",
+                "value",
+                value=value,
             )
         sizes, kind = np.array([*scale, bounds[1] - bounds[0]]), determine_kind(strobe, orbit.state, orbit.period)
         equations = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, bounds)  # type: ignore[arg-type]
@@ -141,7 +144,9 @@ class OrbitEquations:
     def _create_half_map(self, value: float) -> HalfMap:
         strobe = self.create_map(value)
         if not has_mirror_symmetry(strobe):
-            raise InvalidOption(f"the family has no mirror images at {{}} = {value:g}", "value", value=value)
+            raise InvalidOption(
+                f"the body and motion have no mirror symmetry at {{}} = {value:g}", "value", value=value
+            )
         return HalfMap(strobe)
 
     def is_mirrored_throughout(self, value: float) -> bool:

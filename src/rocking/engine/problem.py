@@ -132,7 +132,7 @@ def set_start(
         range_text = f"from {low:g} to {high:g} {unit}" if high > low else f"at least {low:g} {unit}"
         value, rate_value = (float(np.broadcast_to(values, u.shape)[k]) for values in (position, speed))
         raise InvalidOption(
-            f"{{}} must be {range_text}, in front of the body's stop, and {{}} must not point into it; they are "
+            f"{{}} must be {range_text}, in front of the body's stop, and {{}} must not point into it; got "
             f"{value:g} {unit} and {rate_value:g} {unit}/s",
             argument,
             "initial_velocity",

@@ -116,8 +116,9 @@ class AsymptoticTime(ChatteringScheme):
     Parameters
     ----------
     critical : {"eq76", "eq77", "exact"}
-        Critical amplitude of the scheme: a fit of the paper, or exact. For amplitudes between the two the scheme rests
-        falsely, or not at all.
+        Critical amplitude of the scheme: a fit of the paper, or exact. For amplitudes between the two, the block rests
+        although chattering is incomplete (fit above the exact value), or does not rest although chattering is complete
+        (fit below it).
 
     Raises
     ------

@@ -163,7 +163,7 @@ def check_components(bodies: Bodies, motion: Motion | None) -> None:
     """Raise an error if a motion has a vertical component although the bodies move along a line."""
     if motion is not None and motion.vertical is not None and bodies[0].coordinate.unit != ROTATION.unit:
         raise InvalidMotion(
-            f"this {bodies[0].description} moves along one line; give a motion without a vertical component"
+            f"this {bodies[0].description} moves along one line; use a motion without a vertical component"
         )
 
 

@@ -38,15 +38,15 @@ def find_shape(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
     candidates = {needed: allowed for needed, allowed in candidates.items() if allowed & {*provided}} or candidates
     started = [needed for needed in candidates if {*needed} & {*provided}] or [*candidates]
     if not provided:
-        raise InvalidBlock(f"a block is needed: give {name_either(candidates)}", *itertools.chain(*candidates))
+        raise InvalidBlock(f"a block is required; give {name_either(candidates)}", *itertools.chain(*candidates))
     if any(not {*provided} <= candidates[needed] for needed in started):
         sentence = (
-            f"{name_all(provided)} belong to different descriptions of a block; give one: {name_either(candidates)}"
+            f"{name_all(provided)} are from different descriptions of a block; give only {name_either(candidates)}"
         )
         raise InvalidBlock(sentence, *provided, *itertools.chain(*candidates))
     hint = f"; {_FREQUENCY_PARAMETER}" if provided == ["alpha"] and "p" in started[0] else ""
     raise InvalidBlock(
-        f"a block needs more than {name_all(provided)}: give {name_either(started)}{hint}",
+        f"a block requires more than {name_all(provided)}; give {name_either(started)}{hint}",
         *provided,
         *itertools.chain(*started),
     )
@@ -101,7 +101,7 @@ def check_parameters(factory: Callable[..., object], provided: Iterable[str], ow
             raise InvalidOption(f"{owner} has no {escape_braces(name)}; {hint}", *names, name)
     missing = [name for name, item in parameters.items() if item.default is item.empty and name not in {*provided}]
     if missing:
-        raise InvalidOption(f"{owner} needs {' and '.join(missing)} as well", *names)
+        raise InvalidOption(f"{owner} also requires {' and '.join(missing)}", *names)
 
 
 def name_all(names: Sequence[str]) -> str:

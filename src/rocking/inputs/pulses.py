@@ -66,7 +66,7 @@ class PulseFamily:
     def parameter(self, name: str) -> Input:
         """Return the declaration of a parameter."""
         if name not in self._defaults:
-            hint = checks.suggest(name, [*self._defaults], f"it takes {_join_names(self._defaults)}")
+            hint = checks.suggest(name, [*self._defaults], f"it accepts {_join_names(self._defaults)}")
             raise InvalidOption(f"the pulse {self.name} has no {name}; {hint}")
         return _VELOCITY if name == "amplitude" and self.is_of_velocity else PARAMETERS[name]
 
@@ -84,7 +84,7 @@ class PulseFamily:
             self.parameter(name)
         missing = [name for name in self.needed if name not in values]
         if missing:
-            raise InvalidOption(f"the pulse {self.name} needs {_join_names(missing)} as well")
+            raise InvalidOption(f"the pulse {self.name} also requires {_join_names(missing)}")
         return self.make(**{name: _round_count(value) if name == "lobes" else value for name, value in values.items()})
 
     @cached_property
@@ -157,7 +157,9 @@ def split_pulse(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
         elif texts:
             [*texts.values()][-1].append(name)  # another value of the previous parameter
         else:
-            raise InvalidOption(f"a pulse is written NAME:PARAMETER=VALUE,PARAMETER=VALUE, but {part!r} has no name")
+            raise InvalidOption(
+                f"a pulse must have the form NAME:PARAMETER=VALUE,PARAMETER=VALUE, but {part!r} has no name"
+            )
     return family, texts
 
 
@@ -165,7 +167,7 @@ def _read_value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:
     quantity = family.quantity(parameter)
     label = f"the {parameter} of a {family.name} pulse"
     if len(texts) > 1 and not (family.make is pulses.n_lobe and parameter == "amplitude"):
-        raise InvalidOption(f"{label} is one value, not {', '.join(texts)}")
+        raise InvalidOption(f"{label} must be one value, not {', '.join(texts)}")
     if quantity is None:
         return texts[0]
     values = [quantity(text, label) for text in texts]

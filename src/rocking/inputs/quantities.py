@@ -69,7 +69,7 @@ def read_number(text: str, name: str) -> float:
     """Return a number without a unit."""
     value, unit = _split_unit(text)
     if value is None or unit:
-        raise InvalidOption(f"{{}} takes a number, not {text.strip()!r}", name, value=text)
+        raise InvalidOption(f"{{}} must be a number, not {text.strip()!r}", name, value=text)
     return value
 
 
@@ -80,19 +80,19 @@ def _create_reader(units: Mapping[str, Unit], expected: str) -> Quantity:
         value, spelling = _split_unit(text)
         unit = units.get(normalise_spelling(spelling))
         if value is None or unit is None:
-            raise InvalidOption(f"{{}} takes {expected}, not {text.strip()!r}", name, value=text)
+            raise InvalidOption(f"{{}} must be {expected}, not {text.strip()!r}", name, value=text)
         return value * unit.multiplier / unit.divisor
 
     return read
 
 
-read_acceleration: Final = _create_reader(UNITS["acceleration"], "an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2)")
-read_angle: Final = _create_reader(UNITS["angle"], "an angle as 12deg or 0.2 (rad)")
-read_duration: Final = _create_reader(UNITS["duration"], "a time as 1.5 (s)")
-read_frequency: Final = _create_reader(UNITS["frequency"], "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
-read_position: Final = _create_reader(UNITS["position"], "a length as 0.2, 0.2m or 20cm")
-read_rate: Final = _create_reader(UNITS["rate"], "an angular velocity as 2, 2rad/s or 5deg/s")
-read_velocity: Final = _create_reader(UNITS["velocity"], "a velocity as 40cm/s or 0.4 (m/s)")
+read_acceleration: Final = _create_reader(UNITS["acceleration"], "an acceleration, as 0.5g, 4.9m/s2 or 4.9 (m/s^2)")
+read_angle: Final = _create_reader(UNITS["angle"], "an angle, as 12deg or 0.2 (rad)")
+read_duration: Final = _create_reader(UNITS["duration"], "a time, as 1.5 (s)")
+read_frequency: Final = _create_reader(UNITS["frequency"], "a frequency, as 2Hz, 12.6rad/s or 2 (Hz)")
+read_position: Final = _create_reader(UNITS["position"], "a length, as 0.2, 0.2m or 20cm")
+read_rate: Final = _create_reader(UNITS["rate"], "an angular velocity, as 2, 2rad/s or 5deg/s")
+read_velocity: Final = _create_reader(UNITS["velocity"], "a velocity, as 40cm/s or 0.4 (m/s)")
 
 
 def read_length(text: str, name: str) -> float:
@@ -110,19 +110,20 @@ def read_tilt(text: str, name: str) -> float:
         return value
     if abs(value) < 90.0 and not _split_unit(text)[1]:
         raise InvalidOption(
-            f"{{}} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?", name
+            f"{{}} must be below pi/2 rad; got {text.strip()}, which is read as rad; did you mean {text.strip()}deg?",
+            name,
         )
     raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name, value=text)
 
 
 def read_sides(text: str, name: str, quantity: Quantity = read_number) -> float | list[float]:
     """Return one number, or a list of two: side + and side -."""
-    return _read_one_or_two(text, name, quantity, "a number, or two with a comma between (side +, side -)")
+    return _read_one_or_two(text, name, quantity, "a number, or two numbers separated by a comma (side +, side -)")
 
 
 def read_bounds(text: str, name: str, quantity: Quantity = read_number) -> float | tuple[float, ...]:
     """Return one known number, or two: the lowest and highest plausible values."""
-    expected = "a number, if it is known, or two with a comma between, the lowest and the highest thinkable"
+    expected = "a known number, or the lowest and the highest plausible number, separated by a comma"
     numbers = _read_one_or_two(text, name, quantity, expected)
     return tuple(numbers) if isinstance(numbers, list) else numbers
 
@@ -130,7 +131,7 @@ def read_bounds(text: str, name: str, quantity: Quantity = read_number) -> float
 def _read_one_or_two(text: str, name: str, quantity: Quantity, expected: str) -> float | list[float]:
     numbers = [quantity(part, name) for part in text.split(",")]
     if len(numbers) > 2:
-        raise InvalidOption(f"{{}} takes {expected}, not {text!r}", name, value=text)
+        raise InvalidOption(f"{{}} must be {expected}, not {text!r}", name, value=text)
     return numbers[0] if len(numbers) == 1 else numbers
 
 
@@ -149,18 +150,18 @@ def read_array(text: str, name: str, quantity: Quantity = read_number) -> Floats
         return np.array([quantity(part, name) for part in text.split(",")])
     if len(parts) not in (3, 4) or not parts[2].strip().isdecimal() or (len(parts) == 4 and parts[3] != "log"):
         raise InvalidOption(
-            f"{{}} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}", name, value=text
+            f"{{}} must be numbers, as 1,2,5, or a range START:STOP:COUNT[:log], not {text!r}", name, value=text
         )
     start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
     if not 2 <= count <= _MAX_COUNT:
-        sentence = f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MAX_COUNT}, not {text!r}"
+        sentence = f"{{}} must be a range START:STOP:COUNT with a COUNT from 2 to {_MAX_COUNT}, not {text!r}"
         raise InvalidOption(sentence, name, value=text)
     if not math.isfinite(stop - start):
-        raise InvalidOption(f"{{}}: a range needs finite ends, not {text!r}", name, value=text)
+        raise InvalidOption(f"{{}} must be a range with finite ends, not {text!r}", name, value=text)
     if len(parts) == 3:
         return _round_decimals(np.linspace(start, stop, count))
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
-        raise InvalidOption(f"{{}}: a range with :log needs positive ends, not {text!r}", name, value=text)
+        raise InvalidOption(f"{{}} must be a range with positive ends because of :log, not {text!r}", name, value=text)
     return _round_decimals(np.geomspace(start, stop, count))
 
 
@@ -168,7 +169,7 @@ def read_level_at_period(text: str, name: str, quantity: Quantity = read_acceler
     """Return an acceleration, m/s^2, and a period, s, from "0.4g@1.0"."""
     level, at, period = text.partition("@")
     if not at:
-        raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
+        raise InvalidOption(f"{{}} must be an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
     return quantity(level, name), read_duration(period, name)
 
 
@@ -180,7 +181,9 @@ def read_scaling(
     if not options:
         return None
     if len(options) > 1:
-        raise InvalidOption(f"{' and '.join(['{}'] * len(options))} scale the same motion; give one of them", *options)
+        raise InvalidOption(
+            f"{' and '.join(['{}'] * len(options))} scale the same motion; use only one of them", *options
+        )
     ((name, value),) = options.items()
     if name == "pga":
         return checks.finite(quantity(str(value), name), name, InvalidOption), Measure("pga")
@@ -216,7 +219,7 @@ def read_densities(text: str, name: str) -> float | dict[str, float]:
         part, equals, value = entry.rpartition("=")
         if not equals:
             raise InvalidOption(
-                f"{{}} takes a number, or PART=NUMBER with commas between, not {escape_braces(repr(text))}",
+                f"{{}} must be a number, or PART=NUMBER separated by commas, not {escape_braces(repr(text))}",
                 name,
                 value=text,
             )

@@ -26,7 +26,7 @@ class Tables:
         except OSError as error:
             raise StudyError(f"the file cannot be read: {error.strerror or error}", path=str(self.file)) from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise StudyError(f"this is no TOML file: {error}; correct it", path=str(self.file)) from None
+            raise StudyError(f"this is not a valid TOML file: {error}; correct it", path=str(self.file)) from None
 
     def table(self, table: str, occurrence: int = 0) -> Any:
         """Return the content of a table (in a list of tables, by its occurrence), empty if the table is missing."""

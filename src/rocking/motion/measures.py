@@ -131,7 +131,7 @@ class MotionMeasures:
         """
         start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
         if not 0.0 <= start < end <= 1.0:
-            sentence = f"a significant duration needs 0 <= {{}} < {{}} <= 1, not {start:g} and {end:g}"
+            sentence = f"a significant duration requires 0 <= {{}} < {{}} <= 1; got {start:g} and {end:g}"
             raise InvalidMotion(sentence, "start", "end", value=(start, end))
         start_time, end_time = find_significant_span(self, start, end)
         return end_time - start_time
@@ -167,9 +167,11 @@ class MotionMeasures:
             raise InvalidMotion("the {} of a spectral acceleration must be a positive number of seconds", "period")
         duration_text = f"the duration, {self.duration:.6g} s"
         if np.any(periods < 1e-6 * self.duration):
-            raise InvalidMotion(f"a {{}} below a millionth of {duration_text}, takes too long: use pga", "period")
+            sentence = f"a {{}} shorter than one millionth of {duration_text}, would take too long to compute; use pga"
+            raise InvalidMotion(sentence, "period")
         if np.any(periods > 1e6 * self.duration):
-            raise InvalidMotion(f"a {{}} above a million times {duration_text}, says nothing: use pgd", "period")
+            sentence = f"a {{}} longer than one million times {duration_text}, gives only the displacement; use pgd"
+            raise InvalidMotion(sentence, "period")
         damping_ratio = check_damping(damping, InvalidMotion)
         frequencies = np.ravel(2.0 * np.pi / periods)
         peaks = np.empty_like(frequencies)

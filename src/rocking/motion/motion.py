@@ -57,8 +57,9 @@ class Motion(Processable):
     Raises
     ------
     InvalidMotion
-        If the arrays do not describe a piecewise polynomial, its degree is above 20, or a number exceeds the supported
-        range (accelerations up to 1e30 m/s^2, also over a piece extended to 1e-9 s, durations from 1e-9 to 1e15 s).
+        If the arrays have incompatible shapes, invalid breakpoints or numbers that are not finite, if the degree is
+        above 20, or if the motion exceeds the supported range: durations from 1e-9 to 1e15 s, and accelerations up to
+        1e30 m/s^2, also of pieces extended to 1e-9 s.
 
     See Also
     --------

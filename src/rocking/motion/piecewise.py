@@ -257,14 +257,14 @@ def sine_cosine_from_quarters(quarters: Floats, rest: Floats) -> tuple[Floats, F
 def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
     """Return checked breakpoints and coefficients of a motion as read-only copies."""
     ends = _convert_array(breakpoints, "breakpoints", 1)
-    hint = ": of samples make a motion with Motion.from_samples(acceleration, dt)"
+    hint = "; for samples, use Motion.from_samples(acceleration, dt)"
     rows = _convert_array(coefficients, "coefficients", 2, hint)
     for array, name in ((ends, "breakpoints"), (rows, "coefficients")):
         if not np.all(np.isfinite(array)):
             raise InvalidMotion("the {} of a motion must be finite numbers", name)
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
         raise InvalidMotion(
-            "a motion of n pieces needs n + 1 {} and {} of shape (n, degree + 1), not "
+            "a motion of n pieces requires n + 1 {} and {} of shape (n, degree + 1); got "
             f"{ends.shape} and {rows.shape}",
             "breakpoints",
             "coefficients",
@@ -287,8 +287,8 @@ def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Float
             raise InvalidMotion(TOO_STRONG)
         if not np.all(evaluate_pieces(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
             raise InvalidMotion(
-                f"a piece of a motion is too steep: shorter than {MIN_DURATION:g} s, it would pass "
-                f"{MAX_ACCELERATION:g} m/s^2 within that time: check units and times"
+                f"a piece of a motion is too steep: it would exceed {MAX_ACCELERATION:g} m/s^2 within "
+                f"{MIN_DURATION:g} s; check units and times"
             )
     for array in (ends, rows):
         array.setflags(write=False)
@@ -299,10 +299,12 @@ def check_samples(acceleration: ArrayLike) -> Floats:
     """Return accelerations, at least two and all finite."""
     values = _convert_array(acceleration, "accelerations", 1)
     if len(values) < 2:
-        raise InvalidMotion(f"a motion needs at least two samples, not {len(values)}")
+        raise InvalidMotion(f"a motion requires at least two samples; got {len(values)}")
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad):
-        raise InvalidMotion(f"sample {bad[0]} of the motion is {values[bad[0]]}: every sample must be a finite number")
+        raise InvalidMotion(
+            f"every sample of a motion must be a finite number; got {values[bad[0]]} at sample {bad[0]}"
+        )
     return values
 
 
@@ -318,7 +320,9 @@ def check_times(times: ArrayLike, count: int) -> Floats:
     """Return the times of this many samples, s."""
     values = _convert_array(times, "times", 1)
     if len(values) != count:
-        raise InvalidMotion(f"there are {len(values)} {{}} but {count} accelerations: give one for each", "times")
+        raise InvalidMotion(
+            f"{{}} must contain one value for each of the {count} accelerations; got {len(values)}", "times"
+        )
     if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
         raise InvalidMotion("the {} of a motion must be finite and increase strictly", "times")
     return values

@@ -94,12 +94,14 @@ class Processable(MotionMeasures):
             early, late = (self, other) if delay > 0.0 else (other, self)
             first, second = checks.short_repr(early.name), checks.short_repr(late.name)
             raise InvalidMotion(
-                f"by their files {second} begins {abs(delay):.6g} s after {first}: "
-                f"cut what comes first with processed(trim=({abs(delay):.6g}, {early.duration:.6g})) of the latter"
+                f"according to their files, {second} begins {abs(delay):.6g} s after {first}; remove the start of the "
+                f"latter with processed(trim=({abs(delay):.6g}, {early.duration:.6g}))"
             )
         target = checks.finite(azimuth, "azimuth", InvalidMotion)
         if self.vertical is not None and other.vertical not in (None, self.vertical):
-            raise InvalidMotion("each component has a vertical one: give it to one of the two with with_vertical")
+            raise InvalidMotion(
+                "the components have different vertical components; use with_vertical to add only one of them"
+            )
         first_factor, second_factor = compute_rotation_factors((first_azimuth, second_azimuth), target)
         breakpoints, (first_rows, second_rows) = piecewise.align_pieces(self, other)
         fields: dict[str, Any] = {"channel": f"{target:g} deg", "number": None, "azimuth": target, "reversed": False}
@@ -205,11 +207,11 @@ class Processable(MotionMeasures):
             low, high = _unpack_pair(band_pass, "band_pass")
             steps.append(lambda motion: _apply_band_pass(motion, low, high, 4 if order is None else order))
         elif order is not None:
-            raise InvalidMotion("{} belongs to {}; give that as well, or neither", "order", "band_pass")
+            raise InvalidMotion("{} requires {}; give both, or neither", "order", "band_pass")
         if resample is not None:
             steps.append(lambda motion: _resample(motion, resample))
         if window is None and not steps:
-            raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
+            raise InvalidMotion("at least one of trim, baseline, band_pass and resample is required")
         vertical = self.vertical
         if vertical is not None and window is not None and window[0] > vertical.duration - piecewise.MIN_DURATION:
             vertical = None  # the vertical motion has ended by then
@@ -240,7 +242,7 @@ def _unpack_pair(values: tuple[T, T], argument: str) -> tuple[T, T]:
     try:
         first, second = values
     except (TypeError, ValueError) as error:
-        raise InvalidMotion(f"{{}} takes two numbers, not {values!r}", argument, value=values) from error
+        raise InvalidMotion(f"{{}} must be two numbers, not {values!r}", argument, value=values) from error
     return first, second
 
 
@@ -251,7 +253,7 @@ def _find_window(motion: Piecewise, start: float, end: float) -> tuple[float, fl
     duration = float(motion.breakpoints[-1])
     if not 0.0 <= first < last <= duration * (1.0 + 1e-12):
         raise InvalidMotion(
-            f"{{}} needs 0 <= start < end <= {duration:.6g} s, the motion's duration, not {first:.6g} and {last:.6g}",
+            f"{{}} requires 0 <= start < end <= {duration:.6g} s, the duration; got {first:.6g} and {last:.6g}",
             "trim",
             value=(start, end),
         )
@@ -307,10 +309,15 @@ def _apply_band_pass(motion: Piecewise, low: float | None, high: float | None, o
         checks.positive(corner, "corner frequency", InvalidMotion, "Hz") for corner in (low, high) if corner is not None
     ]
     if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
-        sentence = f"{{}} needs (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one of them may"
-        raise InvalidMotion(f"{sentence} be None", "band_pass", value=(low, high))
+        sentence = (
+            f"{{}} must be (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one may be None"
+        )
+        raise InvalidMotion(sentence, "band_pass", value=(low, high))
     if corners[0] * duration < 0.1:
-        sentence = f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s"
+        sentence = (
+            f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s; use at least"
+        )
+        sentence += f" {0.1 / duration:.6g} Hz"
         raise InvalidMotion(sentence, value=(low, high))
     order = checks.integer(order, "order of a filter", InvalidMotion, 1, 12)
     kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
@@ -329,8 +336,8 @@ def _resample(motion: Piecewise, step: float) -> ProcessedPieces:
     duration = float(motion.breakpoints[-1])
     count = math.floor(duration / new_dt * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MAX_SAMPLES:
-        sentence = f"a step of {new_dt:.6g} s gives {count} samples of a motion of {duration:.6g} s: it needs from 2 to"
-        raise InvalidMotion(f"{sentence} {_MAX_SAMPLES}", value=step)
+        sentence = f"a step of {new_dt:.6g} s gives {count} samples of a motion of {duration:.6g} s; use a step that"
+        raise InvalidMotion(f"{sentence} gives 2 to {_MAX_SAMPLES}", value=step)
     times = np.minimum(new_dt * np.arange(count), duration)
     samples = piecewise.evaluate_at(motion.breakpoints, motion.coefficients, times)
     return _join_samples(samples, new_dt, f"resampled to a step of {new_dt:.6g} s")
@@ -339,10 +346,10 @@ def _resample(motion: Piecewise, step: float) -> ProcessedPieces:
 def _require_even_step(motion: Piecewise, argument: str) -> float:
     step = piecewise.find_even_step(motion)
     if step is None:
-        raise InvalidMotion("{} needs even samples: call processed(resample=...) on the motion first", argument)
+        raise InvalidMotion("{} requires samples at even steps; call processed(resample=...) first", argument)
     if piecewise.has_jumps(motion):
         raise InvalidMotion(
-            "{} needs samples joined by lines, but the motion jumps: call processed(resample=...) on it first", argument
+            "{} requires a motion that is linear between samples; call processed(resample=...) first", argument
         )
     return step
 
@@ -364,15 +371,15 @@ def _compute_floor_motion(
     natural_period = checks.positive(period, "period", InvalidMotion, "s")
     rate, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, InvalidMotion)
     if ringing is None and damping_ratio == 0.0:
-        raise InvalidMotion("a floor without {} moves for ever: give {}, s", "damping", "ringing")
+        raise InvalidMotion("the motion of a floor without {} does not decay; give {}, in s", "damping", "ringing")
     # By default a free oscillation continues until it has decayed to a thousandth.
     tail = -math.log(1e-3) / (damping_ratio * rate) if ringing is None else ringing
     tail = tail if ringing is None else checks.between(ringing, "ringing", InvalidMotion, 0.0, 1e15, "s")
     step = _MAX_ANGLE / rate
     if not (end + tail) / step <= 1e6:
         raise InvalidMotion(
-            f"{{}} = {natural_period:g} s is too short for a floor that is followed for {end + tail:.4g} s: give a "
-            "longer one, or a shorter time after the motion, {}",
+            f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s; use a longer one, or "
+            "a shorter {}",
             *("period", "ringing"),
             value=period,
         )
@@ -439,7 +446,7 @@ def _resolve_azimuths(first_motion: Processable, second_motion: Processable, rec
         if None in recorded:
             name = checks.short_repr((first_motion, second_motion)[recorded.index(None)].name)
             raise InvalidMotion(
-                f"the azimuth of {name} is not known: give {{}}=(first, second), "
+                f"the azimuth of {name} is unknown; give {{}}=(first, second), "
                 "the directions of both components in degrees clockwise from north",
                 "recorded",
             )
@@ -452,8 +459,8 @@ def _resolve_azimuths(first_motion: Processable, second_motion: Processable, rec
     angle = abs((second - first + 90.0) % 180.0 - 90.0)
     if angle < 15.0:
         raise InvalidMotion(
-            f"the components point to azimuths of {first:g} and {second:g} deg, along one line to {angle:g} deg: two "
-            "that are across each other are needed"
+            f"the components have azimuths of {first:g} and {second:g} deg, along one line within {angle:g} deg; use "
+            "two perpendicular components"
         )
     return first, second
 

@@ -78,11 +78,11 @@ class Measure:
         object.__setattr__(self, "damping", damping)
         if self.name == "sa":
             if self.period is None:
-                raise InvalidOption('{} "sa" needs {}, in s', "measure", "period")
+                raise InvalidOption('{} "sa" requires {}, in s', "measure", "period")
             object.__setattr__(self, "period", checks.positive(self.period, "period", InvalidOption, "s"))
         elif self.period is not None or damping != DAMPING:
             argument = "damping" if self.period is None else "period"
-            raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', argument, "measure")
+            raise InvalidOption(f'{{}} applies only to {{}} "sa", not to "{self.name}"', argument, "measure")
 
     @classmethod
     def parse(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
@@ -92,7 +92,7 @@ class Measure:
         if isinstance(measure, Measure):
             return measure
         if measure == "sa":
-            raise InvalidOption('{} "sa" needs a period: give rocking.Measure("sa", period=1.0), in s', "measure")
+            raise InvalidOption('{} "sa" requires a period, in s; use rocking.Measure("sa", period=1.0)', "measure")
         return cls(measure)
 
     @property
@@ -168,7 +168,7 @@ class Measure:
         """Return `value`, or raise an error for a motion `name` that is zero throughout."""
         value = self.value(motion)
         if not value > 0.0:
-            raise InvalidMotion(f"{name} is zero throughout: it has no {self.quantity}, and cannot be scaled to one")
+            raise InvalidMotion(f"{name} is zero throughout, so that it cannot be scaled to a {self.quantity}")
         return value
 
     @property
@@ -203,5 +203,5 @@ def check_intensities(values: ArrayLike) -> Floats:
     """Return the intensities of a curve as an array of the same shape."""
     intensities = checks.numbers(values, "intensities", InvalidOption)
     if not np.all(intensities >= 0.0):
-        raise InvalidOption("intensities must be numbers that are not negative")
+        raise InvalidOption("intensities must be nonnegative numbers")
     return intensities

@@ -92,7 +92,7 @@ def open_figure(
     short_title = _LONG_NUMBER.sub(lambda match: f"{float(match[0]):.4g}", title)
     if ax is not None:
         if not hasattr(ax, "get_figure"):
-            raise InvalidOption(f"{{}} must be axes of Matplotlib's to draw in, not {ax!r}", "ax", value=ax)
+            raise InvalidOption(f"{{}} must be Matplotlib axes, not {ax!r}", "ax", value=ax)
         figure = ax.get_figure(root=True)
         assert figure is not None
         ax.set_title(short_title, wrap=True)

@@ -212,7 +212,7 @@ def draw_blocks(
 ) -> Figure:
     """Draw a number for each block as the colour of a marker, in one or several panels with one colour scale."""
     if options.get("ax") is not None and len(panels) > 1:
-        raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
+        raise InvalidOption(f"{len(panels)} panels require a separate figure; omit ax, or select one panel")
     names, columns = [*panels], min(len(panels), _PANELS_PER_ROW)
     rows = [[*names[k : k + columns], *"." * (columns - len(names[k:]))] for k in range(0, len(names), columns)]
     all_values = np.concatenate([*panels.values()])

@@ -42,7 +42,7 @@ def list_motions(motions: Motions) -> list[Motion]:
     if isinstance(motions, Iterable) and not isinstance(motions, (Motion, str, Path, np.ndarray)):
         gathered = list(motions)
     if not gathered:
-        raise InvalidOption("{} must hold at least one motion", "motions")
+        raise InvalidOption("{} must contain at least one motion", "motions")
     for motion in gathered:
         if not isinstance(motion, Motion):
             raise InvalidMotion(_describe_wrong_type(motion))
@@ -89,9 +89,9 @@ def find_distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list
 def _describe_wrong_type(value: Any) -> str:
     if isinstance(value, (str, Path)):
         loader = "rocking.records.load" if str(value) in catalogue.names() else "rocking.read"
-        return f'a Motion is needed, not {str(value)!r}: load it with {loader}("{value}")'
+        return f'a Motion is required, not {str(value)!r}; load it with {loader}("{value}")'
     type_name = "None" if value is None else f"a {type(value).__name__}"
-    return f"a Motion is needed, not {type_name}: make one with Motion.from_samples(array, dt), in m/s^2 and s"
+    return f"a Motion is required, not {type_name}; create one with Motion.from_samples(array, dt), in m/s^2 and s"
 
 
 #: Name of a record on standard input.
@@ -136,7 +136,7 @@ def _is_file_or_record(vertical: str) -> bool:
 
 def reject_redundant_arguments(name: str, **arguments: object) -> None:
     """Raise an error if an argument specifies a property of a shipped record."""
-    text = "a shipped record is one channel, with its step and units; leave {} out"
+    text = "a shipped record has one channel, with known step and units; omit {}"
     for argument in (key for key, value in arguments.items() if value is not None):
         raise UnreadableRecord(text, argument, path=name)
 

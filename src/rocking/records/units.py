@@ -86,6 +86,6 @@ def choose_unit(units: str) -> Unit:
     """Return the unit named by a user."""
     unit = find_unit(units) if isinstance(units, str) else None
     if unit is None or unit.name not in UNIT_NAMES:
-        text = f"the {{}} {units!r} are not known; give one of {', '.join(UNIT_NAMES)}"
+        text = f"the {{}} {units!r} are unknown; use one of {', '.join(UNIT_NAMES)}"
         raise UnreadableRecord(text, "units", value=units)
     return unit

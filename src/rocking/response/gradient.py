@@ -164,7 +164,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     ['-0.00175', '-0.01310', '0.01048', '0.04288', '0.03351']
     """
     if not isinstance(response, Response):
-        raise InvalidOption("{} must be a response, as `rocking.simulate` returns it", "response", value=response)
+        raise InvalidOption("{} must be a Response, as rocking.simulate returns", "response", value=response)
     checks.choice(of, "of", InvalidOption, get_args(Quantity))
     if of == "peak":
         target = _target_peak(response, at)

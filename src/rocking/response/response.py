@@ -231,7 +231,7 @@ class Response(Simulated):
         if table == "histories":
             return self._build_histories(dt)
         if dt is not None:
-            raise InvalidOption(f"{{}} is the step of the histories; the {table} have none", "dt")
+            raise InvalidOption(f"{{}} is the step of the histories, and does not apply to {table}; omit it", "dt")
         return self._convert_table(table)
 
     def _convert_table(self, table: str) -> list[Column]:
@@ -247,7 +247,7 @@ class Response(Simulated):
         step = checks.positive(dt, "dt", InvalidOption, "s")
         if self.duration > _MAX_POINTS * step:
             problem = f"more than {_MAX_POINTS:,} points of {self.duration:g} s"
-            raise InvalidOption(f"{{}} = {step:g} s makes {problem}; use a longer step", "dt", value=dt)
+            raise InvalidOption(f"{{}} = {step:g} s gives {problem}; use a longer step", "dt", value=dt)
         times = create_times(self.duration, step)
         states = self.states(times)
         columns = [

@@ -88,7 +88,7 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
         shapes = [(node, geometry[key], transform) for node, transform, key in placements]
     if max_faces is not None and (count := sum(len(getattr(shape, "faces", ())) for _, shape, _ in shapes)) > max_faces:
         raise InvalidBlock(
-            f"holds {count} triangles, of which at most {max_faces} are read here: make the mesh coarser",
+            f"contains {count} triangles; use a coarser mesh of at most {max_faces}",
             path=path or name,
         )
     parts = tuple(
@@ -96,16 +96,16 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
     )
     if not parts:
         raise InvalidBlock(
-            "holds no faces: a mesh of triangles is needed, not points, lines or other text", path=path or name
+            "contains no faces; a mesh of triangles is required, not points, lines or other text", path=path or name
         )
     if not all(np.all(np.isfinite(part.vertices)) for part in parts):
-        raise InvalidBlock("has corners that are not finite numbers: export the mesh again", path=path or name)
+        raise InvalidBlock("has corners that are not finite numbers; export the mesh again", path=path or name)
     return MeshParts(parts, name, up)
 
 
 def _read_file(file: Path, path: str) -> Scene:
     if file.is_dir():
-        raise InvalidBlock("this is a folder, not a file: name the file in it", path=path)
+        raise InvalidBlock("this is a folder, not a file; choose a file in it", path=path)
     if not file.is_file():
         hint = f"; the mesh that ships is {', '.join(SHIPPED_MESHES)}" if not file.suffix else ""
         raise InvalidBlock(f"there is no such file{hint}", path=path)
@@ -137,10 +137,10 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
         return trimesh.load_scene(source, file_type=suffix, process=False, **options)
     except Exception as error:  # readers of foreign files raise any type
         formats = sorted(trimesh.available_formats())
-        message = f"it lacks {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
-        reason = f"{message or type(error).__name__}; is it whole, and what its name says?"
+        message = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())
+        reason = f"{message or type(error).__name__}; check that the file is complete and has the correct suffix"
         if suffix not in formats:
-            reason = f"is of no format that trimesh reads ({', '.join(formats)})"
+            reason = f"trimesh reads only the formats {', '.join(formats)}"
         raise InvalidBlock(f"cannot be read: {escape_braces(reason)}", path=path) from None
 
 
@@ -217,12 +217,14 @@ def compute_properties(
 ) -> tuple[dict[str, Any], list[Surface]]:
     """Return the arguments of `Solid`, and closed surfaces of its parts with the lowest corner at height 0."""
     if support is not None and tolerance is not None:
-        raise InvalidBlock("{} is how a support is looked for: leave it out where {} is given", "tolerance", "support")
+        raise InvalidBlock("{} is used only to find the support; omit it if {} is given", "tolerance", "support")
     scene = read_parts(mesh, max_faces)
     with np.errstate(over="ignore"):
         extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in scene.parts) * parse_length_unit(unit)
     if extent and not 1e-9 < extent < 1e9:
-        raise InvalidBlock(f"is {extent:.3g} m large, which no body is: correct {{}}", "unit", path=scene.name)
+        raise InvalidBlock(
+            f"is {extent:.3g} m large, outside the range of bodies; correct {{}}", "unit", path=scene.name
+        )
     sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", InvalidBlock)))
     clockwise = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])  # seen from above
     rotation = clockwise @ compute_upright_rotation(scene.up if up is None else up) * parse_length_unit(unit)

@@ -38,7 +38,7 @@ def merge_corners(name: str, vertices: Floats, faces: Integers) -> Surface:
     low = vertices.min(axis=0)
     size = float(np.max(vertices.max(axis=0) - low))
     if not size > 0.0:
-        raise InvalidBlock("all corners of the mesh are at one place")
+        raise InvalidBlock("all corners of the mesh coincide")
     grid_points = np.rint((vertices - low) / (1e-8 * size))
     _, first, merged_index = np.unique(grid_points, axis=0, return_index=True, return_inverse=True)
     merged = merged_index.reshape(-1)[faces]

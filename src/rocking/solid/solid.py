@@ -335,7 +335,7 @@ def _check_inertia(value: ArrayLike) -> Floats:
     is_symmetric = np.allclose(tensor, tensor.T, rtol=0.0, atol=rounding)
     if not (rounding > 0.0 and is_symmetric and smallest + middle >= largest - rounding and smallest > -rounding):
         raise InvalidBlock(
-            "{} is the tensor of no body: it must be symmetric, each principal moment at most the sum of the others",
+            "{} must be symmetric, with each principal moment at most the sum of the other two",
             "inertia_over_mass",
             value=value,
         )

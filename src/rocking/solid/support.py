@@ -70,7 +70,7 @@ def check_polygon(value: ArrayLike) -> Floats:
         raise InvalidBlock("{} must be corners of a polygon, each a finite (east, north) in m", "support", value=value)
     polygon = compute_hull(points)
     if polygon is None:
-        raise InvalidBlock("{} must have three corners or more that are not on one line", "support")
+        raise InvalidBlock("{} must have at least three corners that are not on one line", "support")
     return polygon
 
 

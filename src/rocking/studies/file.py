@@ -248,7 +248,7 @@ def _read_blocks_csv(tables: Tables, file: Path) -> Blocks:
         raise tables.create_error("blocks", "csv", f"{file} cannot be read: {reason}") from None
     if len(rows) < 2:
         raise tables.create_error(
-            "blocks", "csv", f"{file} contains no blocks: a heading and a row for each are required"
+            "blocks", "csv", f"{file} contains no blocks; a heading and a row for each block are required"
         )
     headings, known_names = rows[0][1], [name + suffix for name in BLOCK for suffix in ("", *_SIDE_SUFFIXES)]
     for name in headings:
@@ -261,7 +261,8 @@ def _read_blocks_csv(tables: Tables, file: Path) -> Blocks:
         with locate_errors(file, line):
             if len(row) != len(headings):
                 raise StudyError(
-                    f"{format_count(len(row), 'cell')} under {format_count(len(headings), 'column')}; correct it"
+                    f"this row has {format_count(len(row), 'cell')} for {format_count(len(headings), 'column')}; "
+                    "correct it"
                 )
             cells = dict(zip(headings, row, strict=True))
             texts = {
@@ -297,7 +298,9 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
     """Load the motions; return them, their records, and a sentence for each skipped record."""
     entries, folder = tables.table("motions"), tables.file.parent
     if "vertical" in entries and not entries.get("records"):
-        raise tables.create_error("motions", "vertical", "{} applies to records, and there are none", "vertical")
+        raise tables.create_error(
+            "motions", "vertical", "{} applies only to records; add a record, or omit it", "vertical"
+        )
     names_by_path: dict[str, str] = {}  # names in the file by path or record name
     for name in entries.get("records", []):
         with tables.locating_record_errors(name):

@@ -131,7 +131,7 @@ class Store:
         missing = len(self.grid) - len(self.find_done())
         if missing:
             raise StudyError(
-                f"units are missing, {missing} of {len(self.grid)}: run the study to its end first",
+                f"{missing} of {len(self.grid)} units are missing; complete the study first",
                 path=str(self.folder),
             )
 

@@ -362,7 +362,7 @@ def check_fractiles(fractiles: Sequence[float]) -> Floats:
     """Check that fractiles are between 0 and 1, and return them as an array."""
     shares = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
     if not shares.size:
-        raise InvalidOption("{} must contain at least one share of the motions, as [0.16, 0.5, 0.84]", "fractiles")
+        raise InvalidOption("{} must contain at least one number, as [0.16, 0.5, 0.84]", "fractiles")
     for value in shares:
         if not 0.0 < value < 1.0:
             sentence = f"each of {{}} must be between 0 and 1; got {value:g}"

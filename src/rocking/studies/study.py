@@ -455,7 +455,7 @@ def _parse_part(part: str) -> tuple[int, int]:
     number, slash, count = str(part).partition("/")
     if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
         raise InvalidOption(
-            f"{{}} must be the number of a share of the units and of all shares, as 3/10; got {part}",
+            f"{{}} must be the number of a part and the number of parts, as 3/10; got {part}",
             "part",
             value=part,
         )
@@ -557,4 +557,4 @@ def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[
 
 
 def _create_worker_error(reason: object) -> StudyError:
-    return StudyError(f"the workers are gone: {reason}; computed units are stored, run the study again")
+    return StudyError(f"the workers were lost: {reason}; computed units are stored, so run the study again")

@@ -177,10 +177,10 @@ def _recognise_format(source: Source) -> Recognised:
 def _unknown_format_error(source: Source) -> UnreadableRecord:
     if table_error := table.unreadable_table_error(source):
         return table_error
-    text = f"this is text in no format known here: none of its first {table.HEADING_LINES} lines holds numbers alone"
-    advice = "get the whole file, and write times in seconds"
+    text = f"the format of this text is unknown: none of its first {table.HEADING_LINES} lines contains only numbers"
+    advice = "use the complete file, with times in seconds"
     if source.is_binary:
-        text, advice = "this is a binary file in no format known here", "unpack an archive, save a workbook as CSV"
+        text, advice = "the format of this binary file is unknown", "unpack an archive, save a workbook as CSV"
     if not through_obspy.is_obspy_installed():
         advice += f", or if it is MiniSEED, SAC or another format that ObsPy reads, {describe_install('formats')}"
     return source.error(f"{text}; {advice}")
@@ -190,7 +190,9 @@ def _choose_channel(source: Source, channels: list[Channel], query: int | str | 
     listing = ", ".join(channel.label for channel in channels[:30])
     listing += f" and {len(channels) - 30} more" if len(channels) > 30 else ""
     if query is None and len(channels) > 1:
-        raise source.error(f"the file holds {len(channels)} channels; give {{}} as one of {listing}", None, "channel")
+        raise source.error(
+            f"the file contains {len(channels)} channels; give {{}} as one of {listing}", None, "channel"
+        )
     matching = channels if query is None else _match_channels(channels, query)
     if not matching:
         raise source.error(f"there is no {kind} {query!r}; give one of {listing}")

@@ -106,7 +106,7 @@ def resolve_timing(
     if gap is not None:
         raise missing_value_error(source, printed[gap], find_row(gap))
     if requested is not None:
-        raise source.error(f"the times are not evenly {requested:g} s apart; leave {{}} out", offset, "dt")
+        raise source.error(f"the times are not evenly {requested:g} s apart; omit {{}}", offset, "dt")
     return None, times
 
 
@@ -245,7 +245,7 @@ def create_channel(
 ) -> Channel:
     """Create the channel of numbers in a unit at an offset of a file."""
     if len(values) < 2:
-        raise source.error(f"{len(values)} values are too few for a record; get the whole file", offset)
+        raise source.error(f"{len(values)} values are too few for a record; use the complete file", offset)
     acceleration = unit.to_si(values)
     if np.isinf(acceleration).any():
         raise source.error("some values are too large for an acceleration; check the file and its units", offset)
@@ -274,5 +274,5 @@ def find_missing_value(values: Floats) -> int | None:
 
 def missing_value_error(source: Source, value: float, offset: int | None) -> UnreadableRecord:
     """Return the error for a missing value."""
-    text = f"{value:g} seems to stand for a missing value; get a record that has a value at every instant"
+    text = f"{value:g} seems to represent a missing value; use a record without missing values"
     return source.error(text, offset)

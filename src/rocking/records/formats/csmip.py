@@ -86,7 +86,7 @@ def _parse_pairs_header(header: Header) -> HeaderData:
 
 
 def _missing_count_error(header: Header) -> UnreadableRecord:
-    advice = "if the file is cut, get it again; if its layout is another one, write it as a text table"
+    advice = "if the file is incomplete, download it again; if its layout differs, write it as a text table"
     offset = header.lines[0].start if header.lines else header.end
     return header.source.error(f"no line of points and units ends this channel's header; {advice}", offset)
 
@@ -175,8 +175,8 @@ def _choose_step(header: Header, reals: Floats, points: int) -> float:
     # The duration is printed in whole seconds, in some files without the last interval.
     matching = [step for step in steps if not duration or abs(points * step - duration) <= 1.0 + step]
     if not matching:
-        text = f"real headers 34 and 62 give no step at which {points} points last as stated"
-        raise header.source.error(f"{text}; correct the header, or get the file again", data_line.start)
+        text = f"real headers 34 and 62 are inconsistent with {points} points and the stated duration"
+        raise header.source.error(f"{text}; correct the header, or download the file again", data_line.start)
     return matching[0]
 
 

@@ -53,7 +53,7 @@ class Header:
         lines = self.source.read_lines(self.end, count)
         if len(lines) < count:
             last = lines[-1].start if lines else self.end
-            raise self.source.error("the file ends within its header; get the whole file again", last)
+            raise self.source.error("the file ends within its header; download the complete file again", last)
         self.end = lines[-1].next_start if lines else self.end
         return lines
 
@@ -66,7 +66,8 @@ class Header:
         self.read_lines(1)
         match = pattern.search(self.lines[-1].text)
         if match is None:
-            raise self.source.error(f"{content} should stand here; get the file again", self.lines[-1].start)
+            sentence = f"expected {content} here; the file may be damaged, so download it again"
+            raise self.source.error(sentence, self.lines[-1].start)
         return match
 
     def read_until(self, pattern: re.Pattern[str], max_lines: int) -> re.Match[str] | None:
@@ -104,8 +105,8 @@ class Header:
         numbers = [parse_token(group.encode("latin-1")) or 0.0 for group in match.groups()] if match else [0.0]
         if not all(number > 0.0 for number in numbers):
             line = self.source.read_line(self.find_offset(key))
-            text = f"{escape_braces(repr(line.text))} gives no positive number; correct it, or get the record again"
-            raise self.source.error(text, line.start)
+            text = f"expected a positive number in {escape_braces(repr(line.text))}"
+            raise self.source.error(f"{text}; correct it, or download the record again", line.start)
         return numbers
 
 
@@ -160,7 +161,7 @@ class Format(NamedTuple):
                 channels.append(_build_channel(header, data, end, request))
             start = self._find_next(source, end)
         if not channels:
-            text = f"this {self.name} file holds {data.quantity.lower()!r}; give the file of the acceleration"
+            text = f"this {self.name} file contains {data.quantity.lower()!r}; use the file of the acceleration"
             raise source.error(text, data.offset)
         return channels
 
@@ -176,7 +177,7 @@ class Format(NamedTuple):
         line = source.find_first_line(end)
         while line is not None and not self.begins_channel(line):
             if not (_END_OF_DATA.match(line.text) or self.other_data.search(line.text)):
-                raise source.error("the title of another channel should stand here; correct the file", line.start)
+                raise source.error("expected the title of the next channel here; correct the file", line.start)
             line = source.find_first_line(find_numeric_end(source, line.next_start))
         return None if line is None else line.start
 
@@ -197,7 +198,7 @@ def _build_channel(header: Header, data: HeaderData, end: int, request: Request)
             facts["offset"] = f"kept, the mean is {float(unit.to_si(values).mean()) if len(values) else 0.0:.4g} m/s^2"
     if dt is None:
         if len(values) % 2 or len(values) < 4:
-            raise source.error("the values are no pairs of time and acceleration; correct the file", data.offset)
+            raise source.error("expected pairs of time and acceleration; correct the file", data.offset)
         dt, times = resolve_timing(source, request, values[0::2], SECOND, data.offset)
         values = values[1::2]
     fields = {"number": header.ordinal, "dt": dt, "times": times, **data.labels}
@@ -278,8 +279,8 @@ def read_values(source: Source, start: int, end: int, layout: Layout | None, sta
         tokens = _find_first_invalid(source, values_end, None), _find_first_invalid(source, columns_end, layout)
         raise invalid_number_error(source, *max(tokens, key=lambda token: token[1]))
     if not stated.fits(len(values)):
-        advice = "remove what does not belong to it" if len(values) > stated.values else "get the whole file again"
-        mismatch = f"{stated.stated_by} says {stated.values:.15g} values but {len(values)} follow"
+        advice = "remove the other values" if len(values) > stated.values else "download the complete file again"
+        mismatch = f"{stated.stated_by} specifies {stated.values:.15g} values, but {len(values)} follow"
         raise source.error(f"{mismatch}; {advice}, or correct that number", stated.offset)
     return values
 
@@ -288,9 +289,9 @@ def invalid_number_error(source: Source, token: bytes, offset: int) -> Unreadabl
     """Return the error for text that should be a finite number."""
     token_text, number = repr(token[:40].decode("latin-1")), parse_token(token)
     if b"," in token and parse_token(token.replace(b",", b".")) is not None:
-        return source.error(f"{token_text} is not a number; write decimal points in place of commas", offset)
+        return source.error(f"{token_text} is not a number; use a point as the decimal sign", offset)
     finite = "" if number is None or np.isfinite(number) else "finite "
-    return source.error(f"{token_text} is not a {finite}number; correct it or get the record again", offset)
+    return source.error(f"{token_text} is not a {finite}number; correct it, or download the record again", offset)
 
 
 def parse_token(token: bytes) -> float | None:

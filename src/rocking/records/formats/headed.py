@@ -154,7 +154,9 @@ def _parse_esm_header(header: Header) -> HeaderData:
     entries = {key: value.strip() for key, value in pairs if value.strip()}
     for key in _ESM_KEYS[:3]:
         if key not in entries:
-            raise header.source.error(f"the header gives no {key}; get the record again", header.find_offset(_ESM[key]))
+            raise header.source.error(
+                f"the header does not contain {key}; download the record again", header.find_offset(_ESM[key])
+            )
     (step,), (count,) = (header.find_positive_numbers(_ESM[key]) for key in ("SAMPLING_INTERVAL_S", "NDATA"))
     name = entries.get("STREAM", "acceleration")
     first_sample = entries.get("DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS", "")

@@ -122,7 +122,7 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
         raise UnreadableRecord(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
     data = _normalise_text(raw)
     if not data.strip():
-        raise UnreadableRecord("this file is empty; get the record again", path=name)
+        raise UnreadableRecord("this file is empty; download the record again", path=name)
     return Source(name, raw, data)
 
 
@@ -130,7 +130,7 @@ def _read_bytes(name: str) -> bytes:
     status = os.stat(name)  # noqa: PTH116 - Path() would turn an empty name into the current folder
     if not stat.S_ISREG(status.st_mode):
         text = "this is a folder" if stat.S_ISDIR(status.st_mode) else "this is not a regular file"
-        raise UnreadableRecord(f"{text}; name one record file", path=name)
+        raise UnreadableRecord(f"{text}; choose a record file", path=name)
     with open(name, "rb") as file:  # noqa: PTH123
         # A read allocates as much memory as requested.
         return file.read(min(status.st_size, SIZE_LIMIT) + 1)
@@ -177,9 +177,9 @@ class Request:
         """Return the step (s) that the file states at an offset, or raise an error."""
         # Files contain no more samples than bytes, so this also bounds the record's duration.
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
-            raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", offset)
+            raise source.error(f"the sampling step must be positive; got {stated:g} s; correct it", offset)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):
-            text = f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out"
+            text = f"the sampling step in the file is {stated:g} s, not {{}} {self.dt:g} s; omit {{}}"
             raise source.error(text, offset, "dt", "dt", value=self.dt)
         return stated
 
@@ -189,10 +189,10 @@ class Request:
         unit = find_unit(spelling) if isinstance(stated, str) else stated
         unit = unit or (None if spelling and self.several else self.unit)
         if unit is None:
-            unknown = f"the units {escape_braces(repr(spelling))} are not known"
-            fault = unknown if spelling else "the file does not say its units"
+            unknown = f"the units {escape_braces(repr(spelling))} are unknown"
+            fault = unknown if spelling else "the file does not state its units"
             raise source.error(f"{fault}; give {{}} as one of {', '.join(UNIT_NAMES)}", offset, "units")
         if self.unit is not None and not self.several and unit != self.unit:
-            text = f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out"
+            text = f"the units in the file are {unit.name}, not {{}} {self.unit.name!r}; omit {{}}"
             raise source.error(text, offset, "units", "units", value=self.unit.name)
         return unit

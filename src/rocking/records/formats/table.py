@@ -86,13 +86,16 @@ class _TextTable(NamedTuple):
         """Return the channels of the file: one, unless a heading names several."""
         source = self.source
         if self.damaged is not None:
-            text = f"{self.damaged[0][:40].decode('latin-1')!r} is not a number, in what looks like a row of them"
+            text = (
+                f"{self.damaged[0][:40].decode('latin-1')!r} is not a number, but this line resembles a row of numbers"
+            )
             raise source.error(f"{text}; correct it, or begin the line with # if it is a heading", self.damaged[1])
         if self.is_ambiguous:
             text = (
                 f"{source.read_line(self.start).text.strip()!r} may be one number with a decimal comma, or two numbers"
             )
-            raise source.error(f"{text}; write decimal points, or blanks between two numbers", self.start)
+            advice = "use a point as the decimal sign, and separate numbers by blanks"
+            raise source.error(f"{text}; {advice}", self.start)
         numbers = self._read_numbers().reshape(-1, self.columns)
         heading, dt = self.heading, request.dt
         is_assumed = heading.assumes_times and heading.has_names and heading.columns[0].kind == "time"
@@ -107,7 +110,7 @@ class _TextTable(NamedTuple):
         if self.heading.may_be_spectrum and (self.columns == 1 or times) and np.all(numbers[:, chosen] >= 0.0):
             text = "this seems to be a response spectrum: no value is negative, and no column is named 'time'"
             raise self.source.error(
-                f"{text}; give accelerations at times, or name their column so", self.heading.offset
+                f"{text}; use accelerations against time, or name the column 'time'", self.heading.offset
             )
         if not times:
             self._check_step(request.dt)
@@ -117,8 +120,8 @@ class _TextTable(NamedTuple):
         for number, column in enumerate(chosen, 1):
             _, name, unit, unknown_unit = self.heading.columns[column]
             if not (unit or is_overruled) and _NON_ACCELERATION_UNIT.fullmatch(unknown_unit):
-                text = f"the heading says {unknown_unit!r}, which is no unit of an acceleration"
-                raise self.source.error(f"{text}; give a table of accelerations", self.heading.offset)
+                text = f"the heading states {unknown_unit!r}, which is not a unit of acceleration"
+                raise self.source.error(f"{text}; use a table of accelerations", self.heading.offset)
             offset = self.heading.offset if unknown_unit else self.start
             fields = self._read_timing(request, numbers, column)
             heading_unit = unit.name if unit else unknown_unit if _OTHER_UNIT.fullmatch(unknown_unit) else ""
@@ -137,10 +140,9 @@ class _TextTable(NamedTuple):
         column = max((candidate for candidate in times if candidate < channel_column), default=times[0])
         _, _, unit, unknown_unit = self.heading.columns[column]
         if unit is None:
-            text = (
-                f"the unit of the times is not clear from {unknown_unit!r} in the heading; name it in their column, as"
-            )
-            raise self.source.error(f"{text} 'time (ms)': s, ms, us, ns, min, h or d", self.heading.offset)
+            text = f"the unit of the times is unclear from {unknown_unit!r} in the heading"
+            advice = "name s, ms, us, ns, min, h or d in their column, as 'time (ms)'"
+            raise self.source.error(f"{text}; {advice}", self.heading.offset)
         dt, instants = resolve_timing(self.source, request, numbers[:, column], unit, self.start, self._find_row_offset)
         return {"dt": dt, "times": instants, "start": float(unit.to_si(numbers[:1, column])[0])}
 
@@ -150,20 +152,20 @@ class _TextTable(NamedTuple):
             steps = np.diff(numbers[:, column])
             faults = np.flatnonzero(np.abs(steps - steps[:1]) > 1e-6)
             if len(faults):
-                text = "the number of this row does not follow that of the row before; get a record without gaps"
+                text = "the number of this row does not follow the previous one; use a record without gaps"
                 raise self.source.error(text, self._find_row_offset(int(faults[0]) + 1))
 
     def _check_step(self, dt: float | None) -> None:
         """Raise an error for a table without times if the step is missing or differs from its heading."""
-        reason = "the file does not say its sampling step"
+        reason = "the file does not state its sampling step"
         for line in itertools.takewhile(lambda line: line.start < self.start, self.source.read_lines(0, HEADING_LINES)):
             match = _STEP_STATEMENT.search(line.text)
             numbers = re.findall(NUMBER, match[1] or match[2]) if match else []
             stated = escape_braces(repr(line.text.strip()[:100]))
             if dt is not None and numbers and not any(_is_step(number, dt) for number in numbers):
-                text = f"the heading says {stated}, not {{}} {dt:g} s; correct one of them"
+                text = f"the heading states {stated}, not {{}} {dt:g} s; correct one of them"
                 raise self.source.error(text, line.start, "dt", value=dt)
-            reason = f"no column holds times, but the heading says {stated}" if numbers else reason
+            reason = f"no column contains times, but the heading states {stated}" if numbers else reason
         if dt is None:
             raise self.source.error(f"{reason}; give {{}} in seconds", self.start, "dt")
 
@@ -172,8 +174,8 @@ class _TextTable(NamedTuple):
         columns, channels = self.heading.columns, self.heading.find_columns("channel")
         if not channels or (self.heading.find_columns("spectrum") and not self.heading.find_columns("time")):
             others = ", ".join(repr(column.name) for column in columns)
-            text = f"the heading names no column of accelerations at times ({others}, of a spectrum?)"
-            raise self.source.error(f"{text}; give a table of accelerations at times", self.heading.offset)
+            text = f"the heading names no column of accelerations against time ({others}, perhaps a spectrum)"
+            raise self.source.error(f"{text}; use a table of accelerations against time", self.heading.offset)
         with_unit = [index for index in channels if columns[index].unit]
         return with_unit or [index for index in channels if not columns[index].unknown_unit] or channels
 
@@ -188,7 +190,7 @@ class _TextTable(NamedTuple):
                 if invalid := [token for token in tokens if convert_tokens([token]) is None]:
                     raise invalid_number_error(self.source, invalid[0], offset)
                 if len(tokens) != self.columns:
-                    text = f"columns in this row: {len(tokens)}, in others: {self.columns}; make all rows alike"
+                    text = f"all rows must have {self.columns} columns; got {len(tokens)} in this row"
                     raise self.source.error(text, offset)
             parts.append(values)
         return np.concatenate(parts)
@@ -201,7 +203,9 @@ class _TextTable(NamedTuple):
             line = data[start:end].strip()
             if line and not _COMMENT.match(line):
                 if len(line) > _ROW_LIMIT:
-                    raise self.source.error(f"this row is {len(line)} characters long; make all rows alike", start)
+                    raise self.source.error(
+                        f"this row is {len(line)} characters long, too long for a row of numbers; correct it", start
+                    )
                 if tokens := line.translate(self.translation).split():
                     yield tokens, start
             start = end + 1

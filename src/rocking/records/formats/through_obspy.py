@@ -53,18 +53,18 @@ def _read_channels(source: Source, name: str, request: Request) -> list[Channel]
             raise source.error(text)
     traces = _read_traces(source, name)
     if isinstance(traces, str):
-        raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
+        raise source.error(f"ObsPy's {name} reader cannot read this file ({traces}); download the record again")
     _reject_truncated(source, traces)
     for trace_id, pieces in Counter(str(trace.id) for trace in traces).most_common(1):
         if pieces > 1:
-            raise source.error(f"{trace_id} is in {pieces} pieces, with gaps or overlaps; get a record without gaps")
+            raise source.error(f"{trace_id} is in {pieces} pieces, with gaps or overlaps; use a record without gaps")
     return [_convert_trace(source, request, unit, trace, name, number) for number, trace in enumerate(traces, 1)]
 
 
 def _convert_trace(source: Source, request: Request, unit: Unit, trace: Any, name: str, number: int) -> Channel:
     stats = trace.stats
     if np.ma.is_masked(trace.data) or not np.issubdtype(trace.data.dtype, np.number):
-        raise source.error(f"trace {number} has gaps, or no numbers; get a record without gaps")
+        raise source.error(f"trace {number} has gaps or invalid numbers; use a record without gaps")
     with np.errstate(all="ignore"):
         values = np.asarray(trace.data, dtype=np.float64).reshape(len(trace.data)) * float(stats.calib)
     # SAC states azimuth and angle from the vertical, about 90 degrees if horizontal.
@@ -92,7 +92,7 @@ def _reject_truncated(source: Source, traces: Any) -> None:
     counts = [len(trace.data) for trace in traces]
     is_truncated = len(titles) == len(counts) and [*map(int, titles)] != counts
     if is_truncated or (len(lengths) == 1 and len(source.raw) % lengths.pop()):
-        raise source.error("the file does not hold as many values as it says; get the whole file again")
+        raise source.error("the file does not contain the stated number of values; download the complete file again")
 
 
 def _find_claiming_readers(source: Source) -> list[str]:
