@@ -68,8 +68,8 @@ def test_an_instant_outside_the_response_is_refused_by_the_name_of_its_field(exp
     for text, words in (
         ("-1", "from 0 to"),
         ("9999 s", "not 9999 s"),
-        ("soon", "a time as 1.5"),
-        ("", "a time as 1.5"),
+        ("soon", "a time, as 1.5"),
+        ("", "a time, as 1.5"),
     ):
         with pytest.raises(InvalidOption, match=words) as refused:
             readings.find_state(explorer, STATUE, text)

@@ -578,7 +578,7 @@ def test_the_command_prints_one_line_and_listens_here_alone():
         (("--address", "::ffff:0.0.0.0"), "every address"),
         (("tests",), "this folder contains no study; pass one record, and drop the other files on the page"),
         (("--address", "192.0.2.1"), "cannot be used"),
-        (("sine:amplitude=1",), "needs frequency and cycles"),
+        (("sine:amplitude=1",), "also requires frequency and cycles"),
     ],
 )
 def test_the_command_refuses_with_one_line(run, arguments, words, monkeypatch):

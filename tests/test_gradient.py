@@ -130,7 +130,7 @@ def test_what_cannot_be_differentiated_is_refused_in_a_sentence() -> None:
         _ = rocking.gradient(pulse).samples
     with pytest.raises(rocking.errors.InvalidOption, match="no vertical component"):
         _ = rocking.gradient(pulse).vertical_samples
-    with pytest.raises(rocking.errors.InvalidOption, match="must be a response"):
+    with pytest.raises(rocking.errors.InvalidOption, match="must be a Response"):
         rocking.gradient(BLOCK)
 
 
@@ -183,7 +183,7 @@ def test_scales_that_bracket_no_overturning_are_refused() -> None:
         rocking.critical_scale(BLOCK, record, (0.1, 0.2))
     with pytest.raises(rocking.errors.InvalidOption, match=r"overturns at the scale 8"):
         rocking.critical_scale(BLOCK, record, (8.0, 9.0))
-    with pytest.raises(rocking.errors.InvalidOption, match="no motion to scale"):
+    with pytest.raises(rocking.errors.InvalidOption, match="requires a motion; got None"):
         rocking.critical_scale(BLOCK, None, (8.0, 9.0))
 
 

@@ -98,7 +98,7 @@ def test_a_description_of_a_block_is_complete_or_refused(shape):
     values = dict.fromkeys(shape.needed, 0.3) | ({"pivots": (0.3, 0.3)} if "pivots" in shape.needed else {})
     assert eval(write_block_call(values), {"Block": Block}) == create_block(values)
     for name in shape.needed if len(shape.needed) > 1 else ():
-        with pytest.raises(RockingError, match="a block needs more than"):
+        with pytest.raises(RockingError, match="a block requires more than"):
             create_block({each: value for each, value in values.items() if each != name})
     for other in SHAPES:
         if other is not shape:

@@ -116,7 +116,7 @@ def test_a_write_that_fails_in_the_middle_leaves_what_was_there(tmp_path, monkey
 
     monkeypatch.setattr(os, "fsync", fails)
     with (
-        pytest.raises(errors.OutputError, match="No space left on device; nothing of it was kept"),
+        pytest.raises(errors.OutputError, match="No space left on device; no partial file remains"),
         atomic_file(file) as beside,
     ):
         beside.write_text("new")

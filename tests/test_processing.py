@@ -53,7 +53,7 @@ def test_jumps_survive_a_trim_and_are_not_dropped_by_what_works_on_samples():
     part = ended.processed(trim=(1.0, 4.0))
     assert_array_equal(part.acceleration([0.5, 0.999, 1.0, 2.0]), [1.0, 1.0, 0.0, 0.0])
     for options in ({"baseline": 0}, {"band_pass": (0.1, 0.5)}):
-        with pytest.raises(InvalidMotion, match="jumps: call processed\\(resample"):
+        with pytest.raises(InvalidMotion, match="linear between samples; call processed\\(resample"):
             ended.processed(**options)
     assert not ended.processed(resample=0.25).jumps
 

@@ -47,9 +47,9 @@ def test_a_channel_whose_header_has_lost_lines_does_not_pass_for_the_next_one(fo
     else:
         none = lost(record_files.csmip_v2(channels), "points of accel", "points of veloc")
         untitled = record_files.csmip_v2(channels).rpartition("Corrected accelerogram")
-        with pytest.raises(UnreadableRecord, match="title of another channel"):
+        with pytest.raises(UnreadableRecord, match="title of the next channel"):
             reading.read_record("a", (untitled[0] + untitled[2]).encode(), {})
-    with pytest.raises(UnreadableRecord, match=r"ends this channel's header|says 6 values but 0 follow"):
+    with pytest.raises(UnreadableRecord, match=r"ends this channel's header|specifies 6 values, but 0 follow"):
         reading.read_record("a", none.encode(), {})
 
 

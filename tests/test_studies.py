@@ -259,7 +259,7 @@ def test_workers_that_are_gone_end_the_run_and_another_one_goes_on(complete, tmp
     study = made(tmp_path)
     with (
         Broken(1) as pool,
-        pytest.raises(errors.StudyError, match="the workers are gone: a process ended abruptly; computed"),
+        pytest.raises(errors.StudyError, match="the workers were lost: a process ended abruptly; computed"),
     ):
         study.run(executor=pool)
     assert study.status.done <= 4

@@ -323,10 +323,7 @@ class BlockTable(DatasetResult):
             measure = _parse_measure(plotted.scale.attrs)
             is_factor = measure.name == "factor"
             name, unit = "factor" if is_factor else measure.short_name, measure.display_unit
-            names = [
-                f"{name} {measure.display_factor * value:.4g} {unit}".rstrip()
-                for value in plotted.scale.values
-            ]
+            names = [f"{name} {measure.display_factor * value:.4g} {unit}".rstrip() for value in plotted.scale.values]
             panels, missing = plotted.values, "overturns"
             label = f"{100.0 * float(plotted.fractile):g} % fractile of peak rotation over slenderness"
         else:
