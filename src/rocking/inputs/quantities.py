@@ -112,6 +112,7 @@ def read_tilt(text: str, name: str) -> float:
         raise InvalidOption(
             f"{{}} must be below pi/2 rad; got {text.strip()}, which is read as rad; did you mean {text.strip()}deg?",
             name,
+            value=text,
         )
     raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name, value=text)
 

@@ -321,7 +321,9 @@ def check_times(times: ArrayLike, count: int) -> Floats:
     values = _convert_array(times, "times", 1)
     if len(values) != count:
         raise InvalidMotion(
-            f"{{}} must contain one value for each of the {count} accelerations; got {len(values)}", "times"
+            f"{{}} must contain one value for each of the {count} accelerations; got {len(values)}",
+            "times",
+            value=times,
         )
     if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
         raise InvalidMotion("the {} of a motion must be finite and increase strictly", "times")
