@@ -177,7 +177,9 @@ class Request:
         """Return the step (s) that the file states at an offset, or raise an error."""
         # Files contain no more samples than bytes, so this also bounds the record's duration.
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
-            raise source.error(f"the sampling step must be positive; got {stated:g} s; correct it", offset, value=stated)
+            raise source.error(
+                f"the sampling step must be positive; got {stated:g} s; correct it", offset, value=stated
+            )
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):
             text = f"the sampling step in the file is {stated:g} s, not {{}} {self.dt:g} s; omit {{}}"
             raise source.error(text, offset, "dt", "dt", value=self.dt)

@@ -191,7 +191,7 @@ class _TextTable(NamedTuple):
                     raise invalid_number_error(self.source, invalid[0], offset)
                 if len(tokens) != self.columns:
                     text = f"all rows must have {self.columns} columns; got {len(tokens)} in this row"
-                    raise self.source.error(text, offset)
+                    raise self.source.error(text, offset, value=len(tokens))
             parts.append(values)
         return np.concatenate(parts)
 
