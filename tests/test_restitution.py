@@ -9,7 +9,7 @@ from kernel_records import rocking_block
 
 import rocking
 from rocking import Block, Restitution, RestrainedBlock, dynamics, impact_restitution, one_sided_restitution
-from rocking.block import housner_restitution
+from rocking.block.sides import housner_restitution
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels.events import draw_uniform, restitution_factor
 

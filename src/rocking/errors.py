@@ -14,6 +14,22 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     import pandas as pd
 
+__all__ = [
+    "DamagedStudy",
+    "InvalidBlock",
+    "InvalidMotion",
+    "InvalidOption",
+    "KernelsError",
+    "OutputError",
+    "OutsideFit",
+    "RockingError",
+    "StudyError",
+    "UnequalSides",
+    "Unfinished",
+    "Unfitted",
+    "UnreadableRecord",
+]
+
 #: Placeholder of an argument's name in a template, or an escaped "{}" from `literal`.
 _PLACEHOLDER: Final = re.compile(r"\{\{\}\}|\{\}")
 
@@ -317,7 +333,18 @@ class DamagedStudy(StudyError):
 
 
 class KernelsError(RockingError):
-    """The compiled kernels are missing, damaged, or built from other sources."""
+    """The compiled kernels are missing, damaged, or built from other sources.
+
+    See Also
+    --------
+    rocking.RockingError : Catch every error of the package.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> issubclass(rocking.errors.KernelsError, rocking.RockingError)
+    True
+    """
 
 
 class OutsideFit(UserWarning):

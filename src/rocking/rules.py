@@ -17,7 +17,8 @@ import numpy as np
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import compute_intensities
 from rocking.analysis.survey import RuleComparison
-from rocking.block import Block, Blocks, require_block
+from rocking.block import Block, Blocks
+from rocking.block.single import require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model

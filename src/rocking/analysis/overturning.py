@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.analysis.levels import Boundaries, find_boundaries
-from rocking.block import Block, Blocks, require_block
+from rocking.block import Block, Blocks
+from rocking.block.single import require_block
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import VERSION, Model

@@ -4,8 +4,8 @@ from rocking.block.bodies import Blocks
 from rocking.block.body import Bodies, Body, Coordinate
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Damper, Load, Restitution, Restraint, Spring, Tendon, Thrust
-from rocking.block.sides import Side, housner_restitution, impact_restitution, one_sided_restitution
-from rocking.block.single import Block, require_block
+from rocking.block.sides import Side, impact_restitution, one_sided_restitution
+from rocking.block.single import Block
 
 #: The same class, because restraints are arrays of terms.
 RestrainedBlocks = Blocks
@@ -26,8 +26,6 @@ __all__ = [
     "Spring",
     "Tendon",
     "Thrust",
-    "housner_restitution",
     "impact_restitution",
     "one_sided_restitution",
-    "require_block",
 ]

@@ -11,8 +11,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.block import Blocks, housner_restitution
-from rocking.block.sides import compute_eccentric_rectangles
+from rocking.block import Blocks
+from rocking.block.sides import compute_eccentric_rectangles, housner_restitution
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption

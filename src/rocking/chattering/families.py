@@ -12,7 +12,8 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 from rocking import pulses
-from rocking.block import Block, require_block
+from rocking.block import Block
+from rocking.block.single import require_block
 from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.errors import InvalidMotion, InvalidOption

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.block import require_block
+from rocking.block.single import require_block
 from rocking.chattering.families import Family, SimulationInput
 from rocking.core import checks
 from rocking.core.arrays import Integers, clear_rounding

@@ -9,8 +9,9 @@ from typing import cast
 
 import numpy as np
 
-from rocking.block import Block, require_block
+from rocking.block import Block
 from rocking.block.body import KINDS, Bodies, Body
+from rocking.block.single import require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, Model

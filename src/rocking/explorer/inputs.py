@@ -11,7 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from rocking.block import Block, require_block
+from rocking.block import Block
+from rocking.block.single import require_block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption

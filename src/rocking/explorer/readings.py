@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rocking.block import require_block
+from rocking.block.single import require_block
 from rocking.core.arrays import clear_rounding
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption

@@ -394,7 +394,7 @@ def create_study(
     ----------
     folder : path
         Folder of the study.
-    blocks, motions
+    blocks, motions : Blocks and Motion, or sequences of blocks and motions
         As for `simulate_many`.
     model, chattering, levels, measure, polarity, duration : optional
         As for `simulate_many`.
