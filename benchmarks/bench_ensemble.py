@@ -93,7 +93,7 @@ def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     """March every block to its end, as where lanes cannot be taken."""
     how = Certified()
     ground = prepare_ground(motion, blocks.gravity)
-    bodies = blocks.kernel_records(model, how.bounds(blocks, motion, model))
+    bodies = blocks.kernel_records(model, how.thresholds(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
     whole = lanes.build_pool(bodies, states, len(ground.pieces) - 1, 1.0, 0)
     lanes.march_blocks(ground, build_settings(blocks, model, how, None, record=False), state.new_scratch(), whole)

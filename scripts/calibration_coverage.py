@@ -95,7 +95,9 @@ def ranks(given: DataSet) -> dict[str, float]:
             given.overturned,
             model="linear",
             seed=given.seed,
-            **BOUNDS,
+            p=BOUNDS["p"],
+            alpha=BOUNDS["alpha"],
+            restitution=BOUNDS["restitution"],
             two_sided=given.space.two_sided,
             outlier_probability=LAPSE,
         )
