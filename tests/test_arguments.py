@@ -139,7 +139,7 @@ TAKES_ONE_THING = {
     "rules of a check": lambda value: rocking.rules.compare_rules(BLOCK, {"one": MOTION}, rules=value),
     "parameters of a map": lambda value: rocking.chattering.chattering_map(lambda a, b: None, value),
     "response of episodes": rocking.chattering.chattering_episodes,
-    "slenderness": rocking.block.housner_restitution,
+    "slenderness": rocking.block.sides.housner_restitution,
     "label of a part": lambda value: a_map().select(frequency=value),
     "limit_states": lambda value: rocking.fragility(BLOCK, [MOTION], limit_states=value),
     "polarity": lambda value: rocking.fragility(BLOCK, [MOTION], polarity=value),

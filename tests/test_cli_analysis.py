@@ -154,7 +154,7 @@ def test_a_fragility_that_nrml_does_not_hold_is_written_without(run, tmp_path):
     about = ["--ensemble", ensemble, "--measure", "pga_ratio", "--levels", "1:6:11", "--out", tmp_path / "out"]
     code, _, err = run("fragility", RECORD, OTHER, "ridgecrest-clc-090", *about)
     assert code == 0
-    assert "note: fragility.xml left out: pga_ratio counts in a block's own unit" in err
+    assert "note: fragility.xml left out: pga_ratio is in units of the block" in err
     written = {path.name for path in (tmp_path / "out").iterdir()}
     assert written == {"fragility.png", "fragility.pdf", "fragility.csv", "outcomes.csv", "result.json"}
 

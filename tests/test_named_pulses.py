@@ -53,7 +53,7 @@ def test_a_frequency_may_be_in_rad_per_second():
 MISTAKES = [
     ("sinus:amplitude=1", "there is no pulse 'sinus'; did you mean sine?"),
     ("zzz:amplitude=1", "there is no pulse 'zzz'; there are half-sine, .* and triangular"),
-    ("sine", "the pulse sine needs amplitude, frequency and cycles as well"),
+    ("sine", "the pulse sine also requires amplitude, frequency and cycles"),
     ("sine:amplitude=1,frequency=1", "the pulse sine also requires cycles"),
     ("sine:amplitude=1,frequncy=1", "has no frequncy; did you mean frequency?"),
     ("sine:amplitude=1,zzz=1", "has no zzz; it accepts amplitude, frequency, cycles and phase"),
