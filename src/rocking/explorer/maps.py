@@ -79,8 +79,9 @@ class MapGrid:
         return self.y.values.size, self.x.values.size
 
 
-#: Number of points of a task.
-_TASK_POINTS: Final = 256
+#: Number of points of a task: of a record, whose points are simulated together, and of another motion.
+_RECORD_POINTS: Final = 256
+_PULSE_POINTS: Final = 32
 
 
 class MapPart(NamedTuple):
@@ -336,7 +337,7 @@ def _list_tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
             refines = level > 0 and row % (2 * stride) == 0
             points.append(row * columns + np.arange(stride * refines, columns, stride * (1 + refines)))
         indices = np.concatenate(points)
-        for part in split_range(len(indices), _TASK_POINTS):
+        for part in split_range(len(indices), _PULSE_POINTS if grid.motion.dt is None else _RECORD_POINTS):
             yield Task(indices[part], grid.motion, factors[indices[part]], (stride,))
 
 
