@@ -95,7 +95,7 @@ def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     ground = prepare_ground(motion, blocks.gravity)
     bodies = blocks.kernel_records(model, how.thresholds(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
-    whole = lanes.build_pool(bodies, states, len(ground.pieces) - 1, 1.0, 0)
+    whole = lanes.build_pool(bodies, states, np.ones(len(blocks)), len(ground.pieces) - 1, 1.0, 0)
     lanes.march_blocks(ground, build_settings(blocks, model, how, None, record=False), state.new_scratch(), whole)
 
 

@@ -9,7 +9,7 @@ from oracles.problem import Problem
 import rocking
 from rocking import Blocks, Motion, simulate, simulate_many
 from rocking.engine.problem import prepare_ground
-from rocking.kernels.ground import component_coefficients
+from rocking.kernels.ground import component_coefficients, ground_error, stretch_range
 from rocking.simulation import ensemble
 from rocking.simulation.ensemble import Scales
 
@@ -70,18 +70,51 @@ def test_a_motion_times_a_factor_is_laid_out_as_the_scaled_motion(
         for ends, degree, error in zip((along, up), (2, 1), errors or (3e-3, 0.0), strict=True)
     )
     motion = horizontal if errors is None else horizontal.with_vertical(vertical)
-    found, expected = prepare_ground(motion, GRAVITY, factor), prepare_ground(motion.scaled(factor), GRAVITY)
-    assert found.error == pytest.approx(max(errors or (3e-3,)) * abs(factor) / GRAVITY, rel=1e-15)
-    assert found.error == pytest.approx(expected.error, rel=1e-15)
+    found = prepare_ground(motion, GRAVITY)._replace(factor=factor)
+    expected = prepare_ground(motion.scaled(factor), GRAVITY)
+    assert ground_error(found) == pytest.approx(max(errors or (3e-3,)) * abs(factor) / GRAVITY, rel=1e-15)
+    assert ground_error(found) == pytest.approx(ground_error(expected), rel=1e-15)
     assert (found.columns, found.first) == (expected.columns, expected.first)
-    assert_allclose(found.pieces, expected.pieces, rtol=1e-14, atol=1e-15)
-    assert_allclose(found.stretches, expected.stretches, rtol=1e-13, atol=1e-14)
+    pieces = np.arange(len(found.pieces))
+    for k, scaled in enumerate(component_coefficients(found, pieces)):
+        assert_allclose(scaled, component_coefficients(expected, pieces)[k], rtol=1e-14, atol=1e-15)
+    assert_allclose(found.pieces[:, :2], expected.pieces[:, :2])
+    for stretch in range(len(found.stretches)):
+        assert_allclose(stretch_range(found, stretch), stretch_range(expected, stretch), rtol=1e-13, atol=1e-14)
     if errors is not None:
         (_, lifts), (_, as_it_is) = (
             component_coefficients(each, np.arange(30)) for each in (found, prepare_ground(motion, GRAVITY))
         )
         assert np.abs(as_it_is).max() > 0.1
         assert_allclose(lifts, abs(factor) * as_it_is, rtol=1e-14)
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize("with_vertical", [False, True])
+def test_lanes_under_multiples_of_a_record_are_responses_to_the_scaled_record(model, with_vertical) -> None:
+    """To the last bit, though levels, polarities and blocks of a motion step together."""
+    record = rocking.records.load("el-centro-meloland-270")
+    if with_vertical:
+        record = record.with_vertical(rocking.records.load("el-centro-meloland-up"))
+    blocks = [
+        rocking.Block.from_parameters((p, 1.2 * p), (0.15, alpha), 0.9) for p, alpha in ((2.0, 0.15), (5.0, 0.25))
+    ]
+    levels = [0.3, 0.9, 1.7]
+    many = simulate_many(blocks, record, levels=levels, polarity="both", model=model, times=True)
+    names = ("peak_rotation", "residual_rotation", "first_rest", "last_rest", "peak_time")
+    for s, level in enumerate(levels):
+        for k, sign in enumerate((1.0, -1.0)):
+            scaled = record.scaled(sign * level)
+            for b, block in enumerate(blocks):
+                alone = simulate_many(block, scaled, model=model, times=True)
+                at = {"motion": 0, "scale": s, "polarity": k, "block": b}
+                for name in names:
+                    expected, found = alone[name].values.ravel()[0], many[name].isel(at).item()
+                    assert found == expected or (np.isnan(found) and np.isnan(expected)), (name, at)
+                response = rocking.simulate(block, scaled, model=model)
+                assert bool(many.overturned.isel(at)) is response.overturned
+                if not response.overturned:
+                    assert float(many.peak_rotation.isel(at)) == response.peak_rotation
 
 
 def test_a_scale_that_makes_a_motion_too_strong_is_refused_before_anything_is_simulated(

@@ -128,7 +128,7 @@ def test_a_map_comes_coarse_to_fine_and_whole(page):
     # Tasks begin coarse to fine, a few at a time: no part comes before more coarser ones than may be under way.
     order = np.array(strides)
     overtaken = [int(np.sum(order[k:] > stride)) for k, stride in enumerate(strides)]
-    assert sorted(set(strides)) == [1, 2, 4, 8] and len(strides) == 45
+    assert sorted(set(strides)) == [1, 2, 4, 8] and len(strides) == 20
     assert max(overtaken) < LOOKAHEAD * count_cores()
 
 

@@ -22,7 +22,7 @@ def is_complete(motion: rocking.Motion, thresholds: Pair, rest: float, *, uplift
     blocks, states = new_records(1, block.dtype), new_records(1, state.dtype)
     blocks[0], states[0] = block, state
     complete = np.zeros(1, dtype=bool)
-    write_completeness(prepare_ground(motion, 1.0, 1.0), blocks, states, new_scratch(), complete)
+    write_completeness(prepare_ground(motion, 1.0), np.ones(1), blocks, states, new_scratch(), complete)
     return bool(complete[0])
 
 

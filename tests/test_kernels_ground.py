@@ -20,6 +20,8 @@ from rocking.kernels.ground import (
     bound_piece,
     bound_window,
     build_ground,
+    coefficient,
+    ground_error,
     next_piece_beyond,
     shift_polynomial,
     write_local_series,
@@ -108,8 +110,8 @@ def test_value_and_slope_are_those_of_the_polynomial(coefficients: list[float], 
 
 def test_the_last_piece_has_no_end_and_no_motion() -> None:
     ground = laid_out(np.array([1.0, 3.0]), np.array([[2.0]]), 0.5, 0.25)
-    assert ground.pieces.tolist() == [[1.0, 2.0, 1.0, 0.0], [3.0, math.inf, 0.0, 0.0]]
-    assert ground.error == 0.125
+    assert ground.pieces.tolist() == [[1.0, 2.0, 2.0, 0.0], [3.0, math.inf, 0.0, 0.0]]
+    assert (coefficient(ground, 0, 0), ground_error(ground)) == (1.0, 0.125)
     assert laid_out(np.zeros(1), np.zeros((0, 2)), 1.0, 0.0).pieces.tolist() == [[0.0, math.inf, 0.0, 0.0]]
     assert bound_window(ground, 1, 0.3, 5.0, ANYTHING, work()) == (0.0, 0.0, 0.0, 0.0)
 

@@ -90,19 +90,20 @@ def stepped(
     fallen: float = QUARTER_TURN,
 ) -> list[Step]:
     """Take up to a group of blocks through one sample that starts with row[0] and changes by row[1] per second."""
-    pool: Pool = build_pool(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
+    pool: Pool = build_pool(blocks, states, np.ones(len(blocks)), 1, h, way.substeps if way.nonlinear else 0)
     for lane in range(len(blocks)):
         fill_lane(pool, lane, lane)
         if way.nonlinear:
             set_angles(pool, lane, lane)
     group = pool.groups[0]
     before = states.copy()
+    lift = None if way.weight is None else (way.weight[0] - 1.0, way.weight[1])
     if way.nonlinear:
-        busy = step_nonlinear(group, row, way.weight, h + late, h, way.substeps, fallen)
-    elif way.weight is not None:
-        busy = step_weighted(group, row, way.weight, h + late, way.substeps, fallen)
+        busy = step_nonlinear(group, row, lift, 1.0, h + late, h, way.substeps, fallen)
+    elif lift is not None:
+        busy = step_weighted(group, row, lift, 1.0, h + late, way.substeps, fallen)
     else:
-        busy = step_linear(group, row, h, late, fallen)
+        busy = step_linear(group, row, 1.0, h, late, fallen)
     events = np.array(group["event"][: len(blocks)], dtype=bool)
     assert busy == np.sum(group["event"])
     assert not np.any(group["event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes

@@ -345,7 +345,9 @@ def _simulate_point(point: SimulationInput) -> _MapPoint:
         if not math.isnan(times["upper"]):
             states, trail = state.new_states(1, 0), response.solution.trail
             states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, times["upper"]
-            results["complete_chattering"] = detect_complete_chattering(trail.ground, np.array([trail.block]), states)
+            results["complete_chattering"] = detect_complete_chattering(
+                trail.ground, np.ones(1), np.array([trail.block]), states
+            )
     return _MapPoint(
         int(classify_uplifts(results, last_exceedance)[0]), uplift, **times, rests=rests, overturned=response.overturned
     )

@@ -30,22 +30,19 @@ _REQUIREMENT = "a Block or another body"
 
 
 @functools.lru_cache(maxsize=8)
-def prepare_ground(motion: Motion | None, gravity: float, factor: float = 1.0) -> Ground:
-    """Create the ground of a motion multiplied by a factor, without pieces if there is no motion.
+def prepare_ground(motion: Motion | None, gravity: float) -> Ground:
+    """Create the ground of a motion, without pieces if there is no motion.
 
-    A negative factor applies to the horizontal component only. The last few results are cached, because their creation
-    takes as long as the simulation of a block.
+    Replace its factor for a scaled motion; a negative factor applies to the horizontal component only. The last few
+    results are cached, because their creation takes as long as the simulation of a block.
     """
     if motion is None:
         return ground.build_ground(_NO_BREAKPOINTS, _NO_COEFFICIENTS, 1.0, 0.0)
-    coefficients = motion.coefficients if factor == 1.0 else _freeze(motion.coefficients * factor)
     if motion.vertical is None:
-        return ground.build_ground(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
+        return ground.build_ground(motion.breakpoints, motion.coefficients, 1.0 / gravity, motion.error)
     (breakpoints, pushes), (_, lifts) = _align_components(motion)
     error = max(motion.error, motion.vertical.error)
-    return ground.build_ground(
-        breakpoints, pushes * factor, 1.0 / gravity, error * abs(factor), vertical=lifts * abs(factor)
-    )
+    return ground.build_ground(breakpoints, pushes, 1.0 / gravity, error, lifts)
 
 
 def find_common_step(motion: Motion) -> float | None:

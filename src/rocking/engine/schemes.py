@@ -81,7 +81,7 @@ class ChatteringScheme(ABC):
         return 0.0
 
     @abstractmethod
-    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float | Floats = 1.0) -> Floats:
         """Return the thresholds for the impacts of both sides of every body, shape (n, 2).
 
         The unit is the unit of the measure `code`. Without a motion the rocking is free; `factor` multiplies the
@@ -168,7 +168,7 @@ class AsymptoticTime(ChatteringScheme):
         """Create the scheme from the name of a critical amplitude."""
         return cls(value)  # type: ignore[arg-type]
 
-    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float | Floats = 1.0) -> Floats:
         """Return the chattering time of every side, s; infinite for incomplete chattering."""
         from rocking.kernels.sine.series import sum_eq65
 
@@ -181,7 +181,7 @@ class AsymptoticTime(ChatteringScheme):
             )
         parameters, eta = motion.description.parameters, bodies.restitution
         threshold = bodies.alpha if model == "linear" else np.tan(bodies.alpha)
-        amplitude = abs(factor * parameters["amplitude"]) / (bodies.gravity * threshold)
+        amplitude = np.abs(np.reshape(factor, (-1, 1)) * parameters["amplitude"]) / (bodies.gravity * threshold)
         frequency = 2.0 * np.pi * parameters["frequency"] / bodies.p
         critical, lossy = np.ones(frequency.shape), eta < 1.0
         critical[lossy] = compute_critical_amplitudes(self.critical, frequency[lossy], eta[lossy])
@@ -223,7 +223,7 @@ class Certified(ChatteringScheme):
         """The tolerance."""
         return self.tolerance
 
-    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float | Floats = 1.0) -> Floats:
         """Return zeros, because there is no threshold."""
         return np.zeros((len(bodies), 2))
 
@@ -257,7 +257,7 @@ class VelocityThreshold(ChatteringScheme):
 
     threshold: float = 5e-10
 
-    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float | Floats = 1.0) -> Floats:
         """Return the threshold of every side, in rad/s for a block."""
         return bodies.speed_thresholds(self.threshold)
 
@@ -326,7 +326,7 @@ class IntervalThreshold(ChatteringScheme):
 
     threshold: float = 1e-9
 
-    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+    def thresholds(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float | Floats = 1.0) -> Floats:
         """Return the threshold of every side, s."""
         return np.full((len(bodies), 2), self.threshold)
 

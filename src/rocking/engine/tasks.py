@@ -74,19 +74,24 @@ class Setup:
     def prepare(
         self,
         motion: Motion | None,
-        factor: float = 1.0,
+        factor: float | Floats = 1.0,
         *,
         record: bool = False,
         ground: Ground | None = None,
         name: str | None = None,
     ) -> Run:
-        """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments."""
+        """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments.
+
+        An array of factors, one for each body, leaves the factor of the ground at 1.
+        """
         bodies = self.bodies
         check_components(bodies, motion)
         settings = build_settings(bodies, self.model, self.chattering, self.duration, record=record)
         records = bodies.kernel_records(self.model, self.chattering.thresholds(bodies, motion, self.model, factor))
         if ground is None:
-            ground = prepare_ground(motion, bodies.gravity, factor)
+            ground = prepare_ground(motion, bodies.gravity)
+            if np.ndim(factor) == 0:
+                ground = ground._replace(factor=float(factor))
         states = state.new_states(len(bodies), 0)
         set_start(states, records, bodies, *self.start, name)
         return Run(ground, records, settings, states)
@@ -103,12 +108,12 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Some of the bodies under one scaled motion."""
+    """Some of the bodies under multiples of one motion."""
 
     bodies: slice | Integers
     motion: Motion
-    factor: float = 1.0
-    key: tuple[int, ...] = ()  # index of the outcomes for the caller
+    factor: float | Floats = 1.0  # of all bodies, or of each
+    key: tuple[int | Integers, ...] = ()  # index of the outcomes for the caller
 
 
 def simulate_tasks(setup: Setup, tasks: Iterable[Task]) -> Iterator[tuple[Task, NDArray[np.void]]]:
@@ -132,15 +137,9 @@ def split_bodies(count: int, motion: Motion) -> Iterator[slice]:
 
 
 def simulate_each(setup: Setup, motion: Motion, factors: Floats) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Yield outcomes of body k under the motion times factor k; bodies with equal factors are simulated together."""
-    order = np.argsort(factors, kind="stable")
-    starts = np.flatnonzero(np.diff(factors[order], prepend=np.nan) != 0.0)
-    groups = np.split(order, starts[1:])
-    tasks = (
-        Task(group[part], motion, float(factors[group[0]]))
-        for group in groups
-        for part in split_bodies(len(group), motion)
-    )
+    """Yield outcomes of body k under the motion times factor k."""
+    indices = np.arange(len(factors))
+    tasks = (Task(indices[part], motion, factors[part]) for part in split_bodies(len(factors), motion))
     yield from simulate_tasks(setup, tasks)
 
 
@@ -171,27 +170,30 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
     """Compute the outcomes of one task; they are invalid if it is ``cancelled`` on the way."""
     bodies = setup.bodies.select(task.bodies)
     ground, records, settings, states = replace(setup, bodies=bodies).prepare(task.motion, task.factor)
+    factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(states)).copy()
     states["budget"] = _FIRST_SLICE + _BUDGET_PER_PIECE * len(ground.pieces)
     step = find_common_step(task.motion)
-    for group, substeps in _group_bodies(ground, records, task.motion, setup.model):
+    for group, substeps in _group_bodies(ground, factors, records, task.motion, setup.model):
         if cancelled is not None and cancelled.is_set():
             break
-        _march_together(ground, settings, (records, states), group, step, substeps)
-    _resume_marches(ground, settings, records, states, cancelled)
+        _march_together(ground, settings, (records, states, factors), group, step, substeps)
+    _resume_marches(ground, settings, (records, states, factors), cancelled)
     outcomes = _collect_outcomes(states, task.motion.end)
     outcomes["peak_rotation"] = compute_peaks(states, records, bodies.stops)
     is_known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
     stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
     outcomes["residual_rotation"] = np.where(is_known, stop + (1.0 - 2.0 * side) * states["leaning_rotation"], np.nan)
-    outcomes["complete_chattering"] = detect_complete_chattering(ground, records, states)
+    outcomes["complete_chattering"] = detect_complete_chattering(ground, factors, records, states)
     return outcomes
 
 
-def _group_bodies(ground: Ground, records: Records, motion: Motion, model: Model) -> Iterator[tuple[Integers, int]]:
+def _group_bodies(
+    ground: Ground, factors: Floats, records: Records, motion: Motion, model: Model
+) -> Iterator[tuple[Integers, int]]:
     """Yield bodies that are simulated together, with their number of substeps; -1 for bodies simulated alone."""
     substeps, step = np.full(len(records), -1), find_common_step(motion)
     if step is not None:
-        width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * max_absolute_weight(ground))
+        width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * max_absolute_weight(ground, factors))
         substeps = np.where(
             width <= lanes.MAX_STEP, _count_substeps(width, model, motion.vertical is not None), -1.0
         ).astype(np.int64)
@@ -213,16 +215,16 @@ def _count_substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
 def _march_together(
     ground: Ground,
     settings: Record,
-    arrays: tuple[Records, Records],
+    arrays: tuple[Records, Records, Floats],
     indices: Integers,
     step: float | None,
     substeps: int,
 ) -> None:
     """Simulate some of the bodies in lanes, or one after the other if lanes do not support them."""
-    records, states = arrays
+    records, states, factors = arrays
     pieces = len(ground.pieces) - 1
     n_substeps = max(substeps, 0) if settings["nonlinear"] else 0
-    pool = lanes.build_pool(records[indices], states[indices], pieces, step or 1.0, n_substeps)
+    pool = lanes.build_pool(records[indices], states[indices], factors[indices], pieces, step or 1.0, n_substeps)
     if substeps < 0:
         lanes.march_blocks(ground, settings, state.new_scratch(), pool)
     else:
@@ -231,10 +233,13 @@ def _march_together(
 
 
 def _resume_marches(
-    ground: Ground, settings: Record, records: Records, states: Records, cancelled: threading.Event | None
+    ground: Ground,
+    settings: Record,
+    arrays: tuple[Records, Records, Floats],
+    cancelled: threading.Event | None,
 ) -> None:
     """Continue simulations that have used up their first slice of steps, up to their budget."""
-    empty_table, scratch = state.new_table(0), state.new_scratch()
+    (records, states, factors), empty_table, scratch = arrays, state.new_table(0), state.new_scratch()
     for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
         body_state = states[k]
         body_state["stop_piece"] = state.TO_THE_END
@@ -242,7 +247,8 @@ def _resume_marches(
             if cancelled is not None and cancelled.is_set():
                 return
             body_state["budget"] = SLICE
-            body_state["ending"] = march(ground, records[k], settings, empty_table, scratch, body_state)
+            scaled = ground._replace(factor=float(factors[k]))
+            body_state["ending"] = march(scaled, records[k], settings, empty_table, scratch, body_state)
             if int(body_state["ending"]) != state.Ending.PAUSED:
                 break
         else:
@@ -254,10 +260,10 @@ def count_slices(ground: Ground) -> int:
     return math.ceil((BUDGET + _BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
 
 
-def detect_complete_chattering(ground: Ground, records: Records, states: Records) -> Flags:
+def detect_complete_chattering(ground: Ground, factors: Floats, records: Records, states: Records) -> Flags:
     """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
-    write_completeness(ground, records, states, state.new_scratch(), complete)
+    write_completeness(ground, factors, records, states, state.new_scratch(), complete)
     return complete
 
 

@@ -16,7 +16,7 @@ from rocking.block import Blocks
 from rocking.block.sides import housner_restitution
 from rocking.chattering.duration import critical_amplitude
 from rocking.chattering.maps import UpliftOutcome, classify_uplifts, find_last_exceedance
-from rocking.core.arrays import Flags, Floats, Integers
+from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
@@ -79,6 +79,11 @@ class MapGrid:
         return self.y.values.size, self.x.values.size
 
 
+#: Number of points of a task: of a record, whose points are simulated together, and of another motion.
+_RECORD_POINTS: Final = 256
+_PULSE_POINTS: Final = 32
+
+
 class MapPart(NamedTuple):
     """Results at some points of a map."""
 
@@ -127,14 +132,15 @@ def simulate_grid(grid: MapGrid) -> Generator[MapPart]:
     setup = Setup(blocks, grid.case.model, Certified())
     exceedances: dict[tuple[tuple[float, float], float], float | None] = {}
     for task, results in simulate_tasks(setup, _list_tasks(grid, factors)):
-        indices = task.bodies
-        assert isinstance(indices, np.ndarray)
+        indices, stride = task.bodies, task.key[0]
+        assert isinstance(indices, np.ndarray) and isinstance(stride, int)
         alpha = blocks.alpha[indices]
-        thresholds = _compute_uplift_thresholds(alpha, grid)
+        conditions = np.column_stack([_compute_uplift_thresholds(alpha, grid), factors[indices]])
         outcome = np.empty(len(indices))
-        for threshold_pair in np.unique(thresholds, axis=0):
-            has_thresholds = (thresholds == threshold_pair).all(axis=1)
-            scaled_thresholds = _scale_thresholds(grid, threshold_pair / task.factor, task.factor)
+        for condition in np.unique(conditions, axis=0):
+            has_thresholds = (conditions == condition).all(axis=1)
+            factor = float(condition[-1])
+            scaled_thresholds = _scale_thresholds(grid, condition[:-1] / factor, factor)
             if scaled_thresholds not in exceedances:
                 exceedances[scaled_thresholds] = find_last_exceedance(grid.motion, *scaled_thresholds)
             outcome[has_thresholds] = classify_uplifts(results[has_thresholds], exceedances[scaled_thresholds])
@@ -148,7 +154,7 @@ def simulate_grid(grid: MapGrid) -> Generator[MapPart]:
             "mode": np.where(results["unfinished"], np.nan, classify_modes(results, grid.motion.duration)),
         }
         values = np.array([quantities[name] for name in QUANTITIES], np.float32)
-        yield MapPart(task.key[0], indices, values)
+        yield MapPart(stride, indices, values)
 
 
 def _scale_thresholds(grid: MapGrid, thresholds: Floats, factor: float) -> tuple[tuple[float, float], float]:
@@ -323,14 +329,16 @@ def _find_uplift_threshold(grid: MapGrid, alpha: float | None) -> float:
 
 
 def _list_tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
-    """Yield tasks by level and row; points of a task share the factor on the motion."""
+    """Yield tasks from coarse to fine levels, with few enough points for frequent updates of the page."""
     rows, columns = grid.shape
     for level, stride in enumerate((8, 4, 2, 1)):
+        points = []
         for row in range(0, rows, stride):
             refines = level > 0 and row % (2 * stride) == 0
-            index = row * columns + np.arange(stride if refines else 0, columns, 2 * stride if refines else stride)
-            for factor in np.unique(factors[index]):
-                yield Task(index[factors[index] == factor], grid.motion, float(factor), (stride, row))
+            points.append(row * columns + np.arange(stride * refines, columns, stride * (1 + refines)))
+        indices = np.concatenate(points)
+        for part in split_range(len(indices), _PULSE_POINTS if grid.motion.dt is None else _RECORD_POINTS):
+            yield Task(indices[part], grid.motion, factors[indices[part]], (stride,))
 
 
 def _change_block(texts: dict[str, str], grid: MapGrid, name: str, value: float) -> None:

@@ -14,7 +14,7 @@ from rocking.core.arrays import Floats
 from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import mean_factor
-from rocking.kernels.ground import has_vertical, sum_absolute_terms, vertical_component
+from rocking.kernels.ground import ground_error, has_vertical, sum_absolute_terms, vertical_component
 from rocking.kernels.restraints import apply_tendon_law, plastic_at_node
 from rocking.kernels.series import write_variation_coefficients
 from rocking.kernels.state import Record, Records, TendonLaw
@@ -116,7 +116,7 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
     )
     force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
     force = _ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
-    force += block.threshold_slope[side] * ground.error
+    force += block.threshold_slope[side] * ground_error(ground)
     change[3] += abs(change[0]) * (0.5 * _ROUNDING * (height + speed * t) + 0.5 * force * t * t)
     change[3] += abs(change[1]) * (0.5 * _ROUNDING * speed + force * t)
     change[3] += abs(change[0] * v + change[1] * w) * _ROUNDING * end

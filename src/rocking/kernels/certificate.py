@@ -24,6 +24,7 @@ from rocking.kernels.ground import (
     Ground,
     Window,
     bound_window,
+    ground_error,
     has_vertical,
     piece_length,
     piece_start,
@@ -164,7 +165,7 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
         return no_proof()
     write_local_series(ground, state.piece, state.offset, 1.0, set_zero(scratch.ground))
     write_weight_series(ground, state.piece, state.offset, set_zero(scratch.weight))
-    horizon = Horizon(motion_bounds, ground.error, ground.columns, upper, height, drag)
+    horizon = Horizon(motion_bounds, ground_error(ground), ground.columns, upper, height, drag)
     side_i = fit_restoring_parabola(block, settings, i, scratch, horizon)
     side_j = fit_restoring_parabola(block, settings, j, scratch, horizon)
     if block.variable_restitution:
@@ -192,7 +193,7 @@ def bound_motion(ground: Ground, block: Record, state: Record, window: float, sc
     if has_vertical(ground):
         limits = (-1.0, np.inf)
         bounds = bound_window(vertical_component(ground), state.piece, state.offset, window, limits, scratch.ground)
-        vertical = widen_for_error(bounds, ground.error)
+        vertical = widen_for_error(bounds, ground_error(ground))
     weight = 1.0 + vertical.high
     limits = (
         -block.threshold[0] * weight - block.restraint_threshold[0],
@@ -201,7 +202,7 @@ def bound_motion(ground: Ground, block: Record, state: Record, window: float, sc
     if block.two_stops:  # the other stop is out of reach
         limits = (limits[0], np.inf) if state.side == 0 else (-np.inf, limits[1])
     horizontal = bound_window(ground, state.piece, state.offset, window, limits, scratch.ground)
-    return MotionBounds(widen_for_error(horizontal, ground.error), vertical)
+    return MotionBounds(widen_for_error(horizontal, ground_error(ground)), vertical)
 
 
 class Horizon(NamedTuple):

@@ -1,8 +1,9 @@
-"""Ground acceleration for kernels: a polynomial on each piece, in units of g, and zero after the last.
+"""Ground acceleration for kernels: a polynomial on each piece, times a factor, in units of g, and zero after the last.
 
-A row of `Ground.pieces` contains the start (s), the length (s), and the coefficients in powers of the time since the
-start, of the horizontal and then of any vertical component. The last row has infinite length and zero acceleration, so
-that no function needs to check whether the motion is over. NaN propagates unchecked.
+A row of `Ground.pieces` contains the start (s), the length (s), and the coefficients of the motion in powers of the
+time since the start, of the horizontal and then of any vertical component. They are multiplied by the factor and the
+unit when they are read, so that many bodies under multiples of a motion share its pieces. The last row has infinite
+length and zero acceleration, so that no function needs to check whether the motion is over. NaN propagates unchecked.
 """
 
 from typing import NamedTuple
@@ -21,19 +22,21 @@ STRETCH = 16
 #: Largest number of pieces and whole stretches in a window.
 _MAX_WINDOW = 128
 
-#: Columns of a piece (start, length, first coefficient), and of the bounds on a stretch (as in `Window`).
+#: Columns of a piece (start, length, first coefficient), and of the the range of a stretch.
 _START, _LENGTH, _FIRST = 0, 1, 2
-_MIN, _MAX, _SLOPE, _JUMPS = 0, 1, 2, 3
+_MIN, _MAX = 0, 1
 
 
 class Ground(NamedTuple):
     """One component of a motion: the horizontal one, or that of `vertical_component`."""
 
     pieces: Floats  # pieces of the motion, one per row
-    stretches: Floats  # bounds on stretches of pieces, shape (stretches, components, 4)
-    error: float  # approximation error, g
+    stretches: Floats  # bounds on stretches of unscaled pieces, shape (stretches, components, 2)
+    error: float  # approximation error of the unscaled motion
     columns: int  # number of coefficients per component
     first: int  # first column of this component
+    factor: float  # factor on the motion
+    unit: float  # factor that converts coefficients and error to units of g
 
 
 class Window(NamedTuple):
@@ -55,26 +58,31 @@ def build_ground(
     components = [coefficients] if vertical is None else [coefficients, vertical]
     columns = max(2, *(component.shape[1] for component in components))
     pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
-    stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), len(Window._fields)))
-    ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
+    stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), 2))
+    ground = Ground(pieces, stretches, error, columns, _FIRST, 1.0, 1.0)
     for k, component in enumerate(components):
-        write_pieces(breakpoints, component, unit, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
-    return ground
+        write_pieces(breakpoints, component, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
+    return ground._replace(unit=unit)
 
 
 def component_coefficients(ground: Ground, pieces: Integers) -> list[Floats]:
     """Return the coefficients (g, g/s, ...) of a motion on some pieces: horizontal and, if present, vertical."""
-    columns = ground.columns
-    return [ground.pieces[pieces, _FIRST + k * columns :][:, :columns] for k in range(ground.stretches.shape[1])]
+    columns, factors = ground.columns, (ground.factor, abs(ground.factor))
+    return [
+        ground.pieces[pieces, _FIRST + k * columns :][:, :columns] * factors[k] * ground.unit
+        for k in range(ground.stretches.shape[1])
+    ]
 
 
-def max_absolute_weight(ground: Ground) -> float:
-    """Return the largest absolute weight in the ground's frame, divided by the weight at rest."""
-    return float(np.max(np.abs(1.0 + ground.stretches[:, 1:, _MIN : _MAX + 1]), initial=1.0))
+def max_absolute_weight(ground: Ground, factors: Floats) -> Floats:
+    """Return the largest absolute weight in the ground's frame under multiples, divided by the weight at rest."""
+    low, high = np.min(ground.stretches[:, 1:], initial=0.0), np.max(ground.stretches[:, 1:], initial=0.0)
+    scale = np.abs(factors) * ground.unit
+    return np.maximum.reduce([np.ones_like(scale), np.abs(1.0 + scale * low), np.abs(1.0 + scale * high)])
 
 
 @kernel
-def write_pieces(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground, A: Floats) -> None:
+def write_pieces(breakpoints: Floats, coefficients: Floats, ground: Ground, A: Floats) -> None:
     """Write the pieces of one component and the bounds on their stretches. ``A`` is scratch space."""
     pieces, count = ground.pieces, coefficients.shape[0]
     for k in range(count):
@@ -83,24 +91,37 @@ def write_pieces(breakpoints: Floats, coefficients: Floats, unit: float, ground:
     for j in range(coefficients.shape[1]):
         column = pieces[:, ground.first + j]
         for k in range(count):
-            column[k] = coefficients[k, j] * unit
+            column[k] = coefficients[k, j]
     pieces[count, _START] = breakpoints[count]
     pieces[count, _LENGTH] = np.inf
     for stretch in range(ground.stretches.shape[0]):
-        low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
+        low, high = np.inf, -np.inf
         for k in range(stretch * STRETCH, min((stretch + 1) * STRETCH, count + 1)):
             piece = bound_piece(ground, k, 0.0, pieces[k, _LENGTH], A)
-            low, high, steepest = min(low, piece.low), max(high, piece.high), max(steepest, piece.slope)
-            jumps += piece.jumps + jump_at_end(ground, k) if k < count else 0.0
+            low, high = min(low, piece.low), max(high, piece.high)
         row = ground.stretches[stretch, component_index(ground)]
-        row[_MIN], row[_MAX], row[_SLOPE], row[_JUMPS] = low, high, steepest, jumps
+        row[_MIN], row[_MAX] = low, high
 
 
 @inlined
-def stretch_bounds(ground: Ground, stretch: int) -> Window:
-    """Return the bounds on a stretch."""
+def stretch_range(ground: Ground, stretch: int) -> tuple[float, float]:
+    """Compute bounds on the acceleration in a stretch from those of the unscaled motion, wider by the rounding."""
     row = ground.stretches[stretch, component_index(ground)]
-    return Window(row[_MIN], row[_MAX], row[_SLOPE], row[_JUMPS])
+    scale = ground.factor * ground.unit
+    first, second = scale * row[_MIN], scale * row[_MAX]
+    rounding = ROUNDING * max(abs(first), abs(second))
+    return min(first, second) - rounding, max(first, second) + rounding
+
+
+@inlined
+def bound_stretch(ground: Ground, stretch: int, A: Floats) -> Window:
+    """Compute bounds on a stretch that ends before the last piece; ``A`` is scratch space."""
+    low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
+    for k in range(stretch * STRETCH, (stretch + 1) * STRETCH):
+        piece = bound_piece(ground, k, 0.0, piece_length(ground, k), A)
+        low, high, steepest = min(low, piece.low), max(high, piece.high), max(steepest, piece.slope)
+        jumps += piece.jumps + jump_at_end(ground, k)
+    return Window(low, high, steepest, jumps)
 
 
 @inlined
@@ -118,7 +139,22 @@ def has_vertical(ground: Ground) -> bool:
 @inlined
 def vertical_component(ground: Ground) -> Ground:
     """Return the vertical component of the motion."""
-    return Ground(ground.pieces, ground.stretches, ground.error, ground.columns, ground.first + ground.columns)
+    return Ground(
+        ground.pieces, ground.stretches, ground.error, ground.columns, ground.first + ground.columns,
+        abs(ground.factor), ground.unit,
+    )  # fmt: skip
+
+
+@inlined
+def scale_ground(ground: Ground, factor: float) -> Ground:
+    """Return the ground of the motion multiplied by a factor instead of its own."""
+    return Ground(ground.pieces, ground.stretches, ground.error, ground.columns, ground.first, factor, ground.unit)
+
+
+@inlined
+def ground_error(ground: Ground) -> float:
+    """Return the approximation error of the scaled motion, g."""
+    return (ground.error * abs(ground.factor)) * ground.unit
 
 
 @inlined
@@ -147,8 +183,14 @@ def piece_length(ground: Ground, piece: int) -> float:
 
 @inlined
 def coefficient(ground: Ground, piece: int, power: int) -> float:
-    """Return the coefficient of a power of the time within a piece."""
-    return ground.pieces[piece, ground.first + power]
+    """Return the coefficient of a power of the time within a piece, g/s^power."""
+    return (ground.pieces[piece, ground.first + power] * ground.factor) * ground.unit
+
+
+@inlined
+def unscaled_line(ground: Ground, piece: int) -> tuple[float, float]:
+    """Return the first two coefficients of a piece of the unscaled motion."""
+    return ground.pieces[piece, ground.first], ground.pieces[piece, ground.first + 1]
 
 
 @inlined
@@ -156,7 +198,7 @@ def acceleration(ground: Ground, piece: int, offset: float) -> float:
     """Compute the ground acceleration within a piece, g."""
     value = 0.0
     for k in range(ground.columns - 1, -1, -1):
-        value = value * offset + ground.pieces[piece, ground.first + k]
+        value = value * offset + coefficient(ground, piece, k)
     return value
 
 
@@ -165,7 +207,7 @@ def acceleration_rate(ground: Ground, piece: int, offset: float) -> float:
     """Compute the rate of the ground acceleration within a piece, g/s."""
     value = 0.0
     for k in range(ground.columns - 1, 0, -1):
-        value = value * offset + k * ground.pieces[piece, ground.first + k]
+        value = value * offset + k * coefficient(ground, piece, k)
     return value
 
 
@@ -209,10 +251,10 @@ def bound_piece(ground: Ground, piece: int, offset: float, duration: float, A: F
     """
     columns = ground.columns
     if columns == 2:
-        rate = ground.pieces[piece, ground.first + 1]
-        first = ground.pieces[piece, ground.first] + rate * offset
+        start, rate = coefficient(ground, piece, 0), coefficient(ground, piece, 1)
+        first = start + rate * offset
         last = first + rate * duration if rate != 0.0 else first
-        rounding = ROUNDING * (abs(ground.pieces[piece, ground.first]) + max(abs(first), abs(last)))
+        rounding = ROUNDING * (abs(start) + max(abs(first), abs(last)))
         return Window(min(first, last) - rounding, max(first, last) + rounding, abs(rate), rounding)
     degree = write_local_series(ground, piece, offset, 1.0, A)
     low = high = A[0]
@@ -234,7 +276,7 @@ def sum_absolute_terms(ground: Ground, piece: int, t: float) -> tuple[float, flo
     size = slope_size = 0.0
     for k in range(ground.columns - 1, -1, -1):
         slope_size = slope_size * t + size
-        size = size * t + abs(ground.pieces[piece, ground.first + k])
+        size = size * t + abs(coefficient(ground, piece, k))
     return size, slope_size
 
 
@@ -251,7 +293,7 @@ def bound_window(
         if spans_stretch(ground, piece, offset, duration):
             next_piece = piece + STRETCH
             remaining = piece_start(ground, next_piece) - piece_start(ground, piece)
-            bounds = stretch_bounds(ground, piece // STRETCH)
+            bounds = bound_stretch(ground, piece // STRETCH, A)
         else:
             next_piece = piece + 1
             remaining = piece_length(ground, piece) - offset
@@ -292,9 +334,9 @@ def next_piece_beyond(ground: Ground, piece: int, limits: tuple[float, float], r
     below, above = limits
     while piece < last_piece(ground):
         stretch = piece // STRETCH
-        weight = 1.0 + (stretch_bounds(vertical_component(ground), stretch).low if has_vertical(ground) else 0.0)
-        bounds = stretch_bounds(ground, stretch)
-        if bounds.low < below * weight + restraint[0] or bounds.high > above * weight + restraint[1]:
+        weight = 1.0 + (stretch_range(vertical_component(ground), stretch)[0] if has_vertical(ground) else 0.0)
+        low, high = stretch_range(ground, stretch)
+        if low < below * weight + restraint[0] or high > above * weight + restraint[1]:
             return piece
         piece = (stretch + 1) * STRETCH
     return last_piece(ground)

@@ -25,14 +25,15 @@ _LANES = ("f8", (WIDTH,))
 _SIDES = ("f8", (2,))
 
 #: Group of lanes: index of the block; whether its step may contain an event; u, u' and (nonlinear)
-#: sin and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation.
+#: sin and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation;
+#: factor on the motion.
 GROUP = np.dtype(
     [("block", "i8", (WIDTH,)), ("event", "i8", (WIDTH,))]
     + [
         (name, *_LANES)
         for name in (
             "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine",
-            "stiffness", "pull", "push", "first", "second", "third", "curve", "peak",
+            "stiffness", "pull", "push", "first", "second", "third", "curve", "peak", "factor",
         )
     ],
     align=True,
@@ -49,6 +50,12 @@ MaybeLine = TypeVar("MaybeLine", Line, None, Line | None)
 
 #: Largest bound on the next terms by the last ones, divided by the first two; the truncation is 1/100 of it.
 _NEXT_TERMS = 2.0**-46
+
+
+@inlined
+def scale_line(line: Line, factor: float, unit: float) -> Line:
+    """Return a line of the motion, multiplied by a factor, in units of g, rounded as `ground.coefficient`."""
+    return (line[0] * factor) * unit, (line[1] * factor) * unit
 
 
 @inlined
@@ -76,17 +83,17 @@ def is_event_free(
 
 
 @shared
-def step_linear(group: Record, push: Line, h: float, excess: float, overturn_angle: float) -> int:
+def step_linear(group: Record, push: Line, unit: float, h: float, excess: float, overturn_angle: float) -> int:
     """Step a group through one sample by Stumpff's functions (exact for any lam and h); return the number of events.
 
-    ``push`` is the ground acceleration and its slope. Because w = u'' then satisfies w'' = lam w, its extrema are at
-    the ends of the step (except for ``curve``). Rounding of sample times makes the sample longer than ``h`` by
-    ``excess``.
+    ``push`` is the acceleration of the unscaled motion and its slope. Because w = u'' then satisfies w'' = lam w, its
+    extrema are at the ends of the step (except for ``curve``). Rounding of sample times makes the sample longer than
+    ``h`` by ``excess``.
     """
-    start, slope = push
-    end = start + slope * h
     events = 0
     for lane in range(WIDTH):
+        start, slope = scale_line(push, group.factor[lane], unit)
+        end = start + slope * h
         u, v = group.u[lane], group.v[lane]
         lam, push_gain = group.stiffness[lane], group.push[lane]
         w = lam * u - (group.pull[lane] + push_gain * start)
@@ -125,12 +132,21 @@ def copy_states(group: Record, h: float) -> None:
 
 
 @inlined
-def line_during(line: MaybeLine, k: int, h: float) -> MaybeLine:
-    """Return the value at the start of the k-th substep of length h and the change during it, or None for None."""
-    if line is None:
-        return line
-    change = line[1] * h
-    return line[0] + k * change, change
+def push_during(push: Line, factor: float, unit: float, k: int, h: float) -> Line:
+    """Return the ground acceleration at the start of the k-th substep of length h, and its change."""
+    start, slope = scale_line(push, factor, unit)
+    change = slope * h
+    return start + k * change, change
+
+
+@inlined
+def weight_during(lift: MaybeLine, factor: float, unit: float, k: int, h: float) -> MaybeLine:
+    """Return the weight at the start of the k-th substep of length h, and its change; None without a lift."""
+    if lift is None:
+        return lift
+    start, slope = scale_line(lift, abs(factor), unit)
+    change = slope * h
+    return (1.0 + start) + k * change, change
 
 
 @inlined
@@ -148,32 +164,38 @@ def accept_states(group: Record, rate: float) -> int:
 
 
 @shared
-def step_weighted(group: Record, push: Line, weight: Line, length: float, substeps: int, overturn_angle: float) -> int:
+def step_weighted(
+    group: Record, push: Line, lift: Line, unit: float, length: float, substeps: int, overturn_angle: float
+) -> int:
     """Step a group of the linear model through one sample under varying weight; return the number of events.
 
-    ``push`` is the ground acceleration.
+    ``push`` and ``lift`` are the horizontal and vertical acceleration of the unscaled motion.
     """
     h = length / substeps
     copy_states(group, 1.0)
     for k in range(substeps):
-        take_weighted_substep(group, line_during(push, k, h), line_during(weight, k, h), h, overturn_angle)
+        take_weighted_substep(group, push, lift, unit, k, h, overturn_angle)
     return accept_states(group, 1.0)
 
 
 @shared
-def take_weighted_substep(group: Record, push: Line, weight: Line, h: float, overturn_angle: float) -> None:
-    """Move the copies through a substep of length h and mark the lanes in which an event may occur.
+def take_weighted_substep(
+    group: Record, push: Line, lift: Line, unit: float, k: int, h: float, overturn_angle: float
+) -> None:
+    """Move the copies through the k-th substep of length h and mark the lanes in which an event may occur.
 
     With z = h^2 (lam u - pull), r' = weight z - h^2 push. A term contributes to the second next and, as the weight
     changes, to the third. Therefore the last terms bound the truncation.
     """
-    w, d = weight
     square, rate = h * h, 1.0 / h
     for lane in range(WIDTH):
+        side_push = push_during(push, group.factor[lane], unit, k, h)
+        weight = weight_during(lift, group.factor[lane], unit, k, h)
+        w, d = weight
         u, v = group.next_u[lane], group.next_v[lane]
         q, gain = group.stiffness[lane] * square, group.push[lane] * square
         z0 = q * u - group.pull[lane] * square
-        terms, r10, r11 = weighted_velocity_terms(v * h, z0, q, (gain * push[0], gain * push[1]), weight)
+        terms, r10, r11 = weighted_velocity_terms(v * h, z0, q, (gain * side_push[0], gain * side_push[1]), weight)
         r1, r2, r3, r4, r5, r6, r7, r8, r9 = terms
         high = 0.125 * r8 + ((1.0 / 9.0) * r9 + (0.1 * r10 + (1.0 / 11.0) * r11))
         low = (1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + ((1.0 / 7.0) * r7 + high))))
@@ -194,32 +216,50 @@ def take_weighted_substep(group: Record, push: Line, weight: Line, h: float, ove
 
 @shared
 def step_nonlinear(
-    group: Record, push: Line, weight: Line | None, length: float, h: float, substeps: int, overturn_angle: float
+    group: Record,
+    push: Line,
+    lift: Line | None,
+    unit: float,
+    length: float,
+    h: float,
+    substeps: int,
+    overturn_angle: float,
 ) -> int:
     """Step a group of the nonlinear model through one sample and return the number of events.
 
-    ``push`` is the ground acceleration; a weight of None is constant. Due to rounded sample times, the sample has
-    ``length``, but the constants of the lanes are for ``h``.
+    ``push`` and ``lift`` are the horizontal and any vertical acceleration of the unscaled motion. Due to rounded
+    sample times, the sample has ``length``, but the constants of the lanes are for ``h``.
     """
     span = length / substeps
     copy_states(group, span)
     for k in range(substeps):
         scale = (length / h) ** 2
-        take_nonlinear_substep(group, line_during(push, k, span), line_during(weight, k, span), scale, overturn_angle)
+        take_nonlinear_substep(group, push, lift, unit, k, span, scale, overturn_angle)
     return accept_states(group, 1.0 / span)
 
 
 @shared
-def take_nonlinear_substep(group: Record, push: Line, weight: Line | None, scale: float, overturn_angle: float) -> None:
-    """Move the copies through one substep and mark the lanes in which an event may occur.
+def take_nonlinear_substep(
+    group: Record,
+    push: Line,
+    lift: Line | None,
+    unit: float,
+    k: int,
+    span: float,
+    scale: float,
+    overturn_angle: float,
+) -> None:
+    """Move the copies through the k-th substep and mark the lanes in which an event may occur.
 
-    ``push`` and ``weight`` include their changes. ``scale`` is the squared ratio of its length to the usual one. The
+    ``scale`` is the squared ratio of its length to the usual one. The
     addition theorem gives the sine and cosine of alpha - u.
     """
     for lane in range(WIDTH):
         u, r1 = group.next_u[lane], group.next_v[lane]
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
-        side_push = (group.push[lane] * push[0], group.push[lane] * push[1])
+        weight = weight_during(lift, group.factor[lane], unit, k, span)
+        lane_push = push_during(push, group.factor[lane], unit, k, span)
+        side_push = (group.push[lane] * lane_push[0], group.push[lane] * lane_push[1])
         l2 = group.stiffness[lane] * scale
         terms, angles = nonlinear_velocity_terms(r1, (s0, c0), l2, side_push, weight)
         _, r2, r3, r4, r5, r6, r7, r8, r9 = terms

@@ -1,9 +1,10 @@
 """Simulation of many blocks under one evenly sampled record: together, or one by one where an event may occur.
 
-A lane contains one block. All lanes step through a sample together, in loops that vectorise. A lane whose step may
-contain an event (an impact, a new peak, an overturning) is left unchanged, and `march` simulates its block during that
-sample. Bounds decide, never sampling (`lane_steps.is_event_free`). The arithmetic of a lane depends only on its block
-and the motion, never on other lanes. A block with a NaN is always simulated by `march`.
+A lane contains one block and the factor on its motion. All lanes step through a sample together, in loops that
+vectorise. A lane whose step may contain an event (an impact, a new peak, an overturning) is left unchanged, and `march`
+simulates its block during that sample. Bounds decide, never sampling (`lane_steps.is_event_free`). The arithmetic of a
+lane depends only on its block, its factor and the motion, never on other lanes. A block with a NaN is always simulated
+by `march`.
 """
 
 import math
@@ -16,11 +17,12 @@ from rocking.kernels.compiled import inlined, kernel
 from rocking.kernels.events import raise_peak
 from rocking.kernels.ground import (
     Ground,
-    coefficient,
     has_vertical,
     last_piece,
     piece_length,
     piece_start,
+    scale_ground,
+    unscaled_line,
     vertical_component,
 )
 from rocking.kernels.lane_steps import GROUP, STEP_CONSTANTS, WIDTH, step_linear, step_nonlinear, step_weighted
@@ -46,6 +48,7 @@ class Pool(NamedTuple):
     blocks: Records  # bodies
     states: Records  # state of each block
     steps: Records  # step constants of each block
+    factors: Floats  # factor on the motion of each block
     groups: Records  # groups of lanes
     first_waiting: Integers  # for each piece, the first block that waits for it; -1: none
     next_waiting: Integers  # for each block, the next one that waits for the same piece; -1: none
@@ -55,7 +58,7 @@ class Pool(NamedTuple):
     overturn_angle: float  # smallest rotation at which a block overturns
 
 
-def build_pool(blocks: Records, states: Records, pieces: int, h: float, substeps: int) -> Pool:
+def build_pool(blocks: Records, states: Records, factors: Floats, pieces: int, h: float, substeps: int) -> Pool:
     """Return a pool in which every block waits for the first piece; ``substeps`` is 0 in the linear model."""
     count = len(blocks)
     groups = _allocate_aligned(-(-count // WIDTH), GROUP)
@@ -67,7 +70,7 @@ def build_pool(blocks: Records, states: Records, pieces: int, h: float, substeps
     next_waiting[-1] = -1
     first_waiting[0] = 0
     return Pool(
-        blocks, states, compute_step_constants(blocks, h, substeps), groups, first_waiting, next_waiting,
+        blocks, states, compute_step_constants(blocks, h, substeps), factors, groups, first_waiting, next_waiting,
         np.zeros(count, dtype=np.int64), new_record(COUNTS, waiting=count), new_table(0),
         float(blocks["overturn_angle"].min()),
     )  # fmt: skip
@@ -118,6 +121,7 @@ def fill_lane(pool: Pool, lane: int, index: int) -> None:
     state, steps = pool.states[index], pool.steps[index]
     side = state.side
     group.block[slot] = index
+    group.factor[slot] = pool.factors[index]
     group.u[slot] = state.u
     group.v[slot] = state.v
     group.peak[slot] = state.peak
@@ -248,17 +252,16 @@ def step_group(
     ground: Ground, settings: Record, group: Record, piece: int, substeps: int, overturn_angle: float
 ) -> int:
     """Step a group through one sample and return the number of lanes with possible events."""
-    push = (coefficient(ground, piece, 0), coefficient(ground, piece, 1))
+    push, unit = unscaled_line(ground, piece), ground.unit
     length, h = piece_length(ground, piece), piece_length(ground, 0)
     if has_vertical(ground):
-        vertical = vertical_component(ground)
-        weight = (1.0 + coefficient(vertical, piece, 0), coefficient(vertical, piece, 1))
+        lift = unscaled_line(vertical_component(ground), piece)
         if settings.nonlinear:
-            return step_nonlinear(group, push, weight, length, h, substeps, overturn_angle)
-        return step_weighted(group, push, weight, length, substeps, overturn_angle)
+            return step_nonlinear(group, push, lift, unit, length, h, substeps, overturn_angle)
+        return step_weighted(group, push, lift, unit, length, substeps, overturn_angle)
     if settings.nonlinear:
-        return step_nonlinear(group, push, None, length, h, substeps, overturn_angle)
-    return step_linear(group, push, h, length - h, overturn_angle)
+        return step_nonlinear(group, push, None, unit, length, h, substeps, overturn_angle)
+    return step_linear(group, push, unit, h, length - h, overturn_angle)
 
 
 @inlined
@@ -286,7 +289,8 @@ def march_until(ground: Ground, settings: Record, scratch: Record, pool: Pool, i
     """March a block up to a piece and return whether it rocks at its start; if not, queue it for its next uplift."""
     state = pool.states[index]
     state.stop_piece = stop_piece
-    state.ending = march(ground, pool.blocks[index], settings, pool.table, scratch, state)
+    scaled = scale_ground(ground, pool.factors[index])
+    state.ending = march(scaled, pool.blocks[index], settings, pool.table, scratch, state)
     if state.ending != Ending.RUNNING:
         return False
     if state.side >= 0 and state.piece == stop_piece and state.offset == 0.0:

@@ -15,7 +15,7 @@ from rocking.core.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import relative_speed_slope, restitution_factor
-from rocking.kernels.ground import ROUNDING, Ground, piece_length, piece_start
+from rocking.kernels.ground import ROUNDING, Ground, component_coefficients, piece_length, piece_start
 from rocking.kernels.march import march
 from rocking.kernels.series import write_variation_coefficients
 from rocking.kernels.state import AT_REST, Ending, Record, Records
@@ -187,7 +187,7 @@ def build_step_rows(ground: Ground, block: Record) -> Floats:
     """
     pieces = (len(ground.pieces) - 3) // 2
     rows = np.zeros((2, pieces, _COLUMNS))
-    length, coefficients = ground.pieces[:pieces, 1], ground.pieces[:pieces, 2 : 2 + ground.columns]
+    length, coefficients = ground.pieces[:pieces, 1], component_coefficients(ground, np.arange(pieces))[0]
     if any(np.any(block[name]) for name in ("restraint_threshold", "added_weight", "spring")):
         return np.zeros((2, 0, _COLUMNS))
     for side in range(2):

@@ -32,11 +32,11 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
 
     count = array(1, dtype=np.int64)
     flags, singles = array(1, dtype=np.bool_), array(1, dtype=np.float32)
-    sample = ground.Ground(array(3, 4), array(1, 1, 4), 0.0, 2, 2)
+    sample = ground.Ground(array(3, 4), array(1, 1, 2), 0.0, 2, 2, 1.0, 1.0)
     block, settings, scratch = state.new_record(state.BLOCK), state.new_record(state.SETTINGS), state.new_scratch()
     blocks, states, table = state.new_records(1, state.BLOCK), state.new_states(1, 1), state.new_table(1)
     trail = Trail(sample, block, settings, state.new_records(1, state.NODE_ROW))
-    pool = build_pool(blocks, states, 1, 1.0, 0)
+    pool = build_pool(blocks, states, array(1), 1, 1.0, 0)
     problem = PeriodicProblem(sample, block, settings, table, array(2, 1, 10))
     sequences = (fixed(), fixed(), fixed())
     statuses = array(1, dtype=np.int8)
@@ -58,9 +58,9 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
             array(3, 2),
             array(1, 2),
         ),
-        "uplift.write_completeness": (sample, blocks, states, scratch, flags),
+        "uplift.write_completeness": (sample, fixed(1), blocks, states, scratch, flags),
         "uplift.write_next_uplifts": (trail, scratch, array()),
-        "ground.write_pieces": (fixed(3), fixed(2, 2), 1.0, sample, array()),
+        "ground.write_pieces": (fixed(3), fixed(2, 2), sample, array()),
         "lanes.run_lanes": (sample, settings, scratch, pool, 0),
         "lanes.march_blocks": (sample, settings, scratch, pool),
         "oscillator.write_peak_displacements": (fixed(3), fixed(2, 2), fixed(), 0.05, array(), array()),

@@ -18,6 +18,7 @@ from rocking.kernels.ground import (
     next_piece_beyond,
     piece_length,
     piece_start,
+    scale_ground,
     shift_polynomial,
     vertical_component,
     write_local_series,
@@ -221,11 +222,14 @@ _RETURN = 2.0**-40
 
 
 @kernel
-def write_completeness(ground: Ground, blocks: Records, states: Records, scratch: Record, complete: Flags) -> None:
+def write_completeness(
+    ground: Ground, factors: Floats, blocks: Records, states: Records, scratch: Record, complete: Flags
+) -> None:
     """Write whether the chattering after the first uplift was complete, for each block that started at rest."""
     for k in range(blocks.shape[0]):
         state = states[k]
-        complete[k] = state.rests > 0 and not exceeds_threshold_again(ground, blocks[k], scratch, state)
+        scaled = scale_ground(ground, factors[k])
+        complete[k] = state.rests > 0 and not exceeds_threshold_again(scaled, blocks[k], scratch, state)
 
 
 @inlined

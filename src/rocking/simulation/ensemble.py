@@ -230,11 +230,12 @@ def build_setup(product: Product, bodies: slice | None = None) -> Setup:
 
 def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
     """Divide a product into tasks for the engine with keys (motion, scale, polarity)."""
+    shape, signs = product.shape[1:], np.asarray(product.signs, dtype=float)
     for m, motion in enumerate(product.motions):
-        for s, factor in enumerate(product.scales.factors(motion).tolist()):
-            for k, sign in enumerate(product.signs):
-                for part in split_bodies(len(product.bodies), motion):
-                    yield Task(part, motion, perturbation * (sign * factor), (m, s, k))
+        factors = product.scales.factors(motion)
+        for part in split_bodies(math.prod(shape), motion):
+            s, k, block = np.unravel_index(np.arange(part.start, part.stop), shape)
+            yield Task(block, motion, perturbation * (signs[k] * factors[s]), (m, s, k))
 
 
 def build_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:

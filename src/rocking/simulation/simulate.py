@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.engine.problem import compute_peaks, prepare_ground, require_body, set_start
+from rocking.engine.problem import compute_peaks, require_body, set_start
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import SLICE, Setup, count_slices
 from rocking.errors import InvalidOption
@@ -111,10 +111,8 @@ def compute_response(
 ) -> Response:
     """Compute a response like `simulate`, with `name` for the initial coordinate in errors."""
     scheme, bodies, motion = chattering_scheme(chattering), require_body(block).as_bodies(), check_motion(motion)
-    setup, ground = Setup(bodies, model, scheme, duration, initial), None
-    if factor != 1.0:  # repeated simulations leave the cache unchanged
-        ground = prepare_ground.__wrapped__(motion, block.gravity, factor)
-    run = setup.prepare(motion, factor, record=True, ground=ground, name=name)
+    setup = Setup(bodies, model, scheme, duration, initial)
+    run = setup.prepare(motion, factor, record=True, name=name)
     if factor != 1.0:
         set_start(run.states, run.records, bodies, *_scale_start(initial, factor, run.records, bodies.stops[0]), name)
     trail, start = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
