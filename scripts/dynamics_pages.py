@@ -82,13 +82,9 @@ def hogan_figure(branches):
     block, family = HOGAN_BLOCK, shaken(HOGAN_BLOCK, HOGAN_RATIO)
     alpha, restitution = block.alpha, block.restitution
     start = next(each for each in stable_orbits(family, 4.5, 1, "linear") if each.symmetric).state
+    values, starts = np.linspace(4.5, 7.3, 561), start * [1.0, 1.0001]
     diagram = dynamics.bifurcation_diagram(
-        family,
-        np.linspace(4.5, 7.3, 561),
-        start * [1.0, 1.0001],
-        transient_periods=600,
-        recorded_periods=48,
-        model="linear",
+        family, values, starts, transient_periods=600, recorded_periods=48, model="linear"
     ).data
     look = {"color": INK, "markersize": 4.5, "markerfacecolor": "white"}
     with open_figure(None, (7.4, 3.5)) as drawn:
