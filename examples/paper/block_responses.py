@@ -44,7 +44,7 @@ _BLOCK: Final = ("p", "alpha")
 
 
 class _Scheme(NamedTuple):
-    """A scheme: what it is called in statements and in legends, and the scheme."""
+    """Chattering scheme, with its names in statements and in legends."""
 
     words: str
     label: str
