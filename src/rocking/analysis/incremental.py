@@ -137,13 +137,10 @@ def incremental_dynamic_analysis(
     def find_overturned(column: Integers, level: Floats) -> Integers:
         is_overturned = np.empty(column.size, dtype=np.int64)
         motion, block = np.divmod(column, len(bodies))
-        for m in np.unique(motion):
-            selected = motion == m
-            factor = level[selected] * factors[m, block[selected]]
-            # Use the scheme of the levels, which determines how often the restitution is drawn.
-            setup = Setup(bodies.select(block[selected]), model, Certified())
-            for task, outcomes in simulate_each(setup, motion_list[m], factor):
-                is_overturned[np.flatnonzero(selected)[task.bodies]] = outcomes["overturned"]
+        # Use the scheme of the levels, which determines how often the restitution is drawn.
+        setup = Setup(bodies, model, Certified())
+        for k, outcomes in simulate_each(setup, motion_list, block, motion, level * factors[motion, block]):
+            is_overturned[k] = outcomes["overturned"]
         return is_overturned
 
     overturned_grid = table.overturned.transpose("level", "motion", "block").values

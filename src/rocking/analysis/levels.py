@@ -18,7 +18,7 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.core.tables import format_count
 from rocking.engine.problem import gather_bodies
-from rocking.engine.tasks import Setup, Task, describe_missing, simulate_tasks
+from rocking.engine.tasks import Setup, describe_missing, simulate_each
 from rocking.errors import InvalidOption, Message
 from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, compose_label
@@ -304,16 +304,14 @@ def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLi
     indices = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
     _, motion, block, _ = np.unravel_index(indices, overturned.shape)
     factor, original = np.broadcast_to(factors, overturned.shape).ravel()[indices], overturned.ravel()[indices]
-    scales = list_factors(RELATIVE, COUNT)
-    tasks = (
-        Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
-        for k, (m, b) in enumerate(zip(motion, block, strict=True))
-        for scale in (scales[0], scales[-1])
-    )
-    results = simulate_tasks(setup, tasks)
-    changed = {task.key for task, outcomes in results if outcomes["overturned"][0] != original[task.key[0]]}
+    scales, count = np.array(list_factors(RELATIVE, COUNT))[[0, -1]], len(indices)
+    has_changed = np.zeros(count, dtype=bool)
+    for k, outcomes in simulate_each(
+        setup, motions, np.tile(block, 2), np.tile(motion, 2), np.outer(scales, factor).ravel()
+    ):
+        has_changed[k % count] |= outcomes["overturned"] != original[k % count]
     sample = format_count(len(indices), "outcome")
-    return f"undecided within {format_percent(scales[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
+    return f"undecided within {format_percent(scales[-1] - 1.0)} of the motion: {has_changed.sum()} of a sample of {sample}"
 
 
 @dataclass(frozen=True, eq=False)

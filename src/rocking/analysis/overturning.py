@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
@@ -194,9 +194,8 @@ def overturning_map(
     ) -> tuple[Integers, Floats]:
         """Simulate the block of each column at its level, and return modes and peak rotations."""
         records = np.empty(column.size, dtype=OUTCOME)
-        selection = replace(setup, bodies=setup.bodies.select(column))
-        for task, outcomes in simulate_each(selection, unit, threshold * level):
-            records[task.bodies] = outcomes
+        for k, outcomes in simulate_each(setup, [unit], column, np.zeros_like(column), threshold * level):
+            records[k] = outcomes
             advance(len(outcomes))
         return np.where(records["unfinished"], OverturningMode.UNFINISHED, classify_modes(records, unit.end)), records[
             "peak_rotation"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -13,12 +13,12 @@ from rocking.block import Block
 from rocking.block.body import KINDS, Bodies, Body
 from rocking.block.single import require_block
 from rocking.core import checks
-from rocking.core.arrays import Floats
+from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, Model
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
-from rocking.kernels.ground import Ground
+from rocking.kernels.ground import Ground, Grounds
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 
@@ -43,6 +43,27 @@ def prepare_ground(motion: Motion | None, gravity: float) -> Ground:
     (breakpoints, pushes), (_, lifts) = _align_components(motion)
     error = max(motion.error, motion.vertical.error)
     return ground.build_ground(breakpoints, pushes, 1.0 / gravity, error, lifts)
+
+
+class GroundGroup(NamedTuple):
+    """Motions with equally many components and coefficients."""
+
+    indices: Integers  # index of each in the original order
+    grounds: Grounds
+    steps: Floats  # common step of each motion; infinite if it is not evenly sampled
+
+
+@functools.lru_cache(maxsize=4)
+def prepare_grounds(motions: tuple[Motion, ...], gravity: float) -> list[GroundGroup]:
+    """Create the grounds of motions, in groups; the last few results are cached."""
+    grounds = [prepare_ground(motion, gravity) for motion in motions]
+    steps = np.array([find_common_step(motion) or math.inf for motion in motions])
+    layouts = np.array([(item.columns, item.stretches.shape[1], np.isinf(step)) for item, step in zip(grounds, steps, strict=True)])
+    groups = []
+    for layout in np.unique(layouts, axis=0):
+        indices = np.flatnonzero((layouts == layout).all(axis=1))
+        groups.append(GroundGroup(indices, ground.join_grounds([grounds[k] for k in indices]), steps[indices]))
+    return groups
 
 
 def find_common_step(motion: Motion) -> float | None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,12 @@ from rocking.block.single import ROTATION
 from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import Model
 from rocking.core.tables import format_count
-from rocking.core.threads import map_in_threads
-from rocking.engine.problem import build_settings, compute_peaks, find_common_step, prepare_ground, set_start
+from rocking.core.threads import map_in_threads, thread_count
+from rocking.engine.problem import build_settings, compute_peaks, prepare_ground, prepare_grounds, set_start
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidMotion, Unfinished
 from rocking.kernels import lanes, state
-from rocking.kernels.ground import Ground, max_absolute_weight
+from rocking.kernels.ground import Ground, Grounds, max_absolute_weights, select_ground
 from rocking.kernels.lane_steps import WIDTH
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
@@ -51,13 +51,14 @@ _BUDGET_PER_PIECE: Final = 4
 SLICE: Final = 50_000
 _FIRST_SLICE: Final = 5_000
 
-#: Number of bodies simulated together: the capacity of the fastest cache, or fewer for a long motion, so that one call
-#: of a kernel takes at most half a second.
-_GROUP_SIZE: Final = 16 * WIDTH
-_GROUP_PIECES: Final = 20_000_000
+#: Largest number of simulations and of their pieces in a call of a kernel, which takes at most half a second.
+_CALL_SIZE: Final = 512
+_CALL_PIECES: Final = 20_000_000
 
-#: Steps of all bodies in one task: enough to amortise the call, few enough to stop soon after an interrupt.
+#: Largest number of steps of all simulations in one task, enough to amortise the call and few enough to stop soon after
+#: an interrupt, and of pieces of its motions.
 _TASK_STEPS: Final = 8_000_000
+_TASK_PIECES: Final = 500_000
 
 
 @dataclass(frozen=True)
@@ -108,19 +109,20 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Some of the bodies under multiples of one motion."""
+    """Simulations of bodies under multiples of motions."""
 
-    bodies: slice | Integers
-    motion: Motion
-    factor: float | Floats = 1.0  # of all bodies, or of each
-    key: tuple[int | Integers, ...] = ()  # index of the outcomes for the caller
+    bodies: slice | Integers  # body of each
+    motions: tuple[Motion, ...]
+    factor: float | Floats = 1.0  # of all motions, or of each simulation
+    motion: Integers | None = None  # index of the motion of each; None: the first of all
+    key: Any = ()  # index of the outcomes for the caller
 
 
 def simulate_tasks(setup: Setup, tasks: Iterable[Task]) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Simulate tasks, and yield their outcomes in order: structured arrays (`OUTCOME`), one row per body.
+    """Simulate tasks, and yield their outcomes in order: structured arrays (`OUTCOME`), one row per simulation.
 
-    Tasks are consumed as needed, slightly ahead of the results. The outcome of a body depends only on the body and its
-    motion, bit for bit, not on its task. An interrupt cancels the remaining tasks.
+    Tasks are consumed as needed, slightly ahead of the results. An outcome depends only on the body, the motion and the
+    factor, bit for bit, not on the task. An interrupt cancels the remaining tasks.
     """
     cancelled = threading.Event()
 
@@ -130,17 +132,46 @@ def simulate_tasks(setup: Setup, tasks: Iterable[Task]) -> Iterator[tuple[Task, 
     yield from map_in_threads(run_task, tasks, cancelled=cancelled)
 
 
-def split_bodies(count: int, motion: Motion) -> Iterator[slice]:
-    """Divide ``count`` bodies into ranges of the size of a task."""
-    size = _GROUP_SIZE * max(1, _TASK_STEPS // (_GROUP_SIZE * len(motion.coefficients)))
-    yield from split_range(count, size)
+def split_simulations(motions: Sequence[Motion], counts: Integers) -> Iterator[slice]:
+    """Divide simulations, so many for each motion in turn, into ranges of the size of a task.
+
+    A range contains either part of the simulations under one motion, or all of those under some.
+    """
+    pieces = np.array([len(motion.coefficients) for motion in motions])
+    max_steps = max(1, min(_TASK_STEPS, int(pieces @ counts) // (2 * thread_count())))
+    start = stop = steps = motion_pieces = 0
+    for length, count in zip(pieces.tolist(), counts.tolist(), strict=True):
+        if stop > start and (steps + length * count > max_steps or motion_pieces + length > _TASK_PIECES):
+            yield slice(start, stop)
+            start, steps, motion_pieces = stop, 0, 0
+        size = max(WIDTH, max_steps // max(length, 1))
+        while count > size:
+            yield slice(start, start + size)
+            start, stop, count = start + size, stop + size, count - size
+        stop, steps, motion_pieces = stop + count, steps + length * count, motion_pieces + length
+    if stop > start:
+        yield slice(start, stop)
 
 
-def simulate_each(setup: Setup, motion: Motion, factors: Floats) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Yield outcomes of body k under the motion times factor k."""
-    indices = np.arange(len(factors))
-    tasks = (Task(indices[part], motion, factors[part]) for part in split_bodies(len(factors), motion))
-    yield from simulate_tasks(setup, tasks)
+def simulate_each(
+    setup: Setup, motions: Sequence[Motion], bodies: Integers, motion: Integers, factors: Floats
+) -> Iterator[tuple[Integers, NDArray[np.void]]]:
+    """Yield indices k and outcomes of ``bodies[k]`` under the motion of index ``motion[k]`` times ``factors[k]``."""
+    order = np.argsort(motion, kind="stable")
+    tasks = (
+        create_task(bodies[part], motions, motion[part], factors[part], part)
+        for part in (order[part] for part in split_simulations(motions, np.bincount(motion, minlength=len(motions))))
+    )
+    for task, outcomes in simulate_tasks(setup, tasks):
+        yield task.key, outcomes
+
+
+def create_task(
+    bodies: Integers, motions: Sequence[Motion], motion: Integers, factors: Floats, key: Any = ()
+) -> Task:
+    """Create a task of simulations under some of the motions, from the indices of bodies and motions."""
+    first, last = int(motion.min()), int(motion.max())
+    return Task(bodies, tuple(motions[first : last + 1]), factors, motion - first, key)
 
 
 def require_finished(unfinished: bool) -> None:
@@ -169,86 +200,108 @@ def check_components(bodies: Bodies, motion: Motion | None) -> None:
 def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = None) -> NDArray[np.void]:
     """Compute the outcomes of one task; they are invalid if it is ``cancelled`` on the way."""
     bodies = setup.bodies.select(task.bodies)
-    ground, records, settings, states = replace(setup, bodies=bodies).prepare(task.motion, task.factor)
-    factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(states)).copy()
-    states["budget"] = _FIRST_SLICE + _BUDGET_PER_PIECE * len(ground.pieces)
-    step = find_common_step(task.motion)
-    for group, substeps in _group_bodies(ground, factors, records, task.motion, setup.model):
-        if cancelled is not None and cancelled.is_set():
-            break
-        _march_together(ground, settings, (records, states, factors), group, step, substeps)
-    _resume_marches(ground, settings, (records, states, factors), cancelled)
-    outcomes = _collect_outcomes(states, task.motion.end)
+    motion = np.zeros(len(bodies), dtype=np.int64) if task.motion is None else task.motion
+    factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(bodies)).copy()
+    settings = build_settings(bodies, setup.model, setup.chattering, setup.duration, record=False)
+    records = bodies.kernel_records(setup.model, _compute_thresholds(setup, bodies, task.motions, motion, factors))
+    states = state.new_states(len(bodies), 0)
+    set_start(states, records, bodies, *setup.start)
+    complete = np.empty(len(bodies), dtype=bool)
+    for group in prepare_grounds(task.motions, bodies.gravity):
+        members = np.flatnonzero(np.isin(motion, group.indices))
+        index = np.searchsorted(group.indices, motion[members])
+        batch = _Batch(group.grounds, index, factors[members], records[members], states[members])
+        batch.states["budget"] = _FIRST_SLICE + _BUDGET_PER_PIECE * np.diff(group.grounds.first_pieces)[index]
+        for part, substeps in _split_batch(batch, group.steps, setup.model):
+            if cancelled is not None and cancelled.is_set():
+                break
+            batch.states[part] = _march_together(settings, batch.select(part), substeps)
+        _resume_marches(settings, batch, cancelled)
+        states[members], are_complete = batch.states, np.empty(len(members), dtype=bool)
+        write_completeness(*batch, state.new_scratch(), are_complete)
+        complete[members] = are_complete
+    outcomes = _collect_outcomes(states, np.array([motion.end for motion in task.motions])[motion])
     outcomes["peak_rotation"] = compute_peaks(states, records, bodies.stops)
     is_known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
     stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
     outcomes["residual_rotation"] = np.where(is_known, stop + (1.0 - 2.0 * side) * states["leaning_rotation"], np.nan)
-    outcomes["complete_chattering"] = detect_complete_chattering(ground, factors, records, states)
+    outcomes["complete_chattering"] = complete
     return outcomes
 
 
-def _group_bodies(
-    ground: Ground, factors: Floats, records: Records, motion: Motion, model: Model
-) -> Iterator[tuple[Integers, int]]:
-    """Yield bodies that are simulated together, with their number of substeps; -1 for bodies simulated alone."""
-    substeps, step = np.full(len(records), -1), find_common_step(motion)
-    if step is not None:
-        width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * max_absolute_weight(ground, factors))
-        substeps = np.where(
-            width <= lanes.MAX_STEP, _count_substeps(width, model, motion.vertical is not None), -1.0
-        ).astype(np.int64)
-    substeps[records["restrained"] | records["two_stops"]] = -1
-    size = min(_GROUP_SIZE, max(1, _GROUP_PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
+def _compute_thresholds(
+    setup: Setup, bodies: Bodies, motions: Sequence[Motion], motion: Integers, factors: Floats
+) -> Floats:
+    """Compute the thresholds of the chattering scheme for each simulation, shape (n, 2)."""
+    if len(motions) == 1 or setup.chattering.code != state.RestRule.TIME:
+        return setup.chattering.thresholds(bodies, motions[0], setup.model, factors)
+    thresholds = np.empty((len(bodies), 2))
+    for m in np.unique(motion):
+        members = np.flatnonzero(motion == m)
+        thresholds[members] = setup.chattering.thresholds(
+            bodies.select(members), motions[m], setup.model, factors[members]
+        )
+    return thresholds
+
+
+class _Batch(NamedTuple):
+    """Simulations under similar motions, as kernels accept them."""
+
+    grounds: Grounds
+    motion: Integers  # index of the motion of each
+    factors: Floats
+    records: Records
+    states: Records
+
+    def select(self, indices: Integers) -> _Batch:
+        """Return some of the simulations, copied."""
+        return _Batch(self.grounds, *(array[indices] for array in self[1:]))
+
+
+def _split_batch(batch: _Batch, steps: Floats, model: Model) -> Iterator[tuple[Integers, int]]:
+    """Yield simulations for one call of a kernel, with their number of substeps; -1 for bodies simulated alone.
+
+    ``steps`` are the sampling steps of the motions, infinite without one.
+    """
+    stiffness = np.abs(batch.records["stiffness"]).max(axis=1)
+    width = steps[batch.motion] * np.sqrt(stiffness * max_absolute_weights(batch.grounds, batch.motion, batch.factors))
+    with_vertical = batch.grounds.stretches.shape[1] > 1
+    in_lanes = (width <= lanes.MAX_STEP) & ~(batch.records["restrained"] | batch.records["two_stops"])
+    width = np.where(in_lanes, width, 0.0)
+    if model == "nonlinear" or with_vertical:  # otherwise one formula covers a sample
+        substeps = np.ceil(width / (lanes.MAX_SUBSTEP if model == "nonlinear" else lanes.MAX_WEIGHTED_SUBSTEP))
+    else:
+        substeps = np.zeros(len(width))
+    substeps = np.where(in_lanes, substeps, -1.0).astype(np.int64)
+    pieces = int(np.diff(batch.grounds.first_pieces).max(initial=1))
     for count in np.unique(substeps):
         indices = np.flatnonzero(substeps == count)
-        for part in split_range(len(indices), size):
+        for part in split_range(len(indices), _CALL_SIZE if count < 0 else max(WIDTH, _CALL_PIECES // pieces)):
             yield indices[part], int(count)
 
 
-def _count_substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
-    """Compute the substeps per sample in lanes, for each sqrt(|lam W|) h; 0 if one formula covers the sample."""
-    if model == "nonlinear":
-        return np.ceil(width / lanes.MAX_SUBSTEP)
-    return np.ceil(width / lanes.MAX_WEIGHTED_SUBSTEP) if with_vertical else np.zeros(len(width))
-
-
-def _march_together(
-    ground: Ground,
-    settings: Record,
-    arrays: tuple[Records, Records, Floats],
-    indices: Integers,
-    step: float | None,
-    substeps: int,
-) -> None:
-    """Simulate some of the bodies in lanes, or one after the other if lanes do not support them."""
-    records, states, factors = arrays
-    pieces = len(ground.pieces) - 1
-    n_substeps = max(substeps, 0) if settings["nonlinear"] else 0
-    pool = lanes.build_pool(records[indices], states[indices], factors[indices], pieces, step or 1.0, n_substeps)
+def _march_together(settings: Record, batch: _Batch, substeps: int) -> Records:
+    """Run simulations in lanes, or one after the other if lanes do not support them, and return their states."""
+    count = max(substeps, 0) if settings["nonlinear"] else 0
+    pool = lanes.build_pool(*batch, float(settings["stop"]), count)
     if substeps < 0:
-        lanes.march_blocks(ground, settings, state.new_scratch(), pool)
+        lanes.march_blocks(settings, state.new_scratch(), pool)
     else:
-        lanes.run_lanes(ground, settings, state.new_scratch(), pool, substeps)
-    states[indices] = pool.states
+        lanes.run_lanes(settings, state.new_scratch(), pool, substeps)
+    return batch.states
 
 
-def _resume_marches(
-    ground: Ground,
-    settings: Record,
-    arrays: tuple[Records, Records, Floats],
-    cancelled: threading.Event | None,
-) -> None:
+def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event | None) -> None:
     """Continue simulations that have used up their first slice of steps, up to their budget."""
-    (records, states, factors), empty_table, scratch = arrays, state.new_table(0), state.new_scratch()
-    for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
-        body_state = states[k]
+    empty_table, scratch = state.new_table(0), state.new_scratch()
+    for k in np.flatnonzero(np.isin(batch.states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
+        body_state, ground = batch.states[k], select_ground(batch.grounds, batch.motion[k], float(batch.factors[k]))
         body_state["stop_piece"] = state.TO_THE_END
         for _ in range(count_slices(ground)):
             if cancelled is not None and cancelled.is_set():
                 return
             body_state["budget"] = SLICE
-            scaled = ground._replace(factor=float(factors[k]))
-            body_state["ending"] = march(scaled, records[k], settings, empty_table, scratch, body_state)
+            body_state["ending"] = march(ground, batch.records[k], settings, empty_table, scratch, body_state)
             if int(body_state["ending"]) != state.Ending.PAUSED:
                 break
         else:
@@ -260,14 +313,7 @@ def count_slices(ground: Ground) -> int:
     return math.ceil((BUDGET + _BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
 
 
-def detect_complete_chattering(ground: Ground, factors: Floats, records: Records, states: Records) -> Flags:
-    """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
-    complete = np.empty(len(states), dtype=bool)
-    write_completeness(ground, factors, records, states, state.new_scratch(), complete)
-    return complete
-
-
-def _collect_outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
+def _collect_outcomes(states: Records, motion_end: Floats) -> NDArray[np.void]:
     outcomes = np.empty(len(states), dtype=OUTCOME)
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED

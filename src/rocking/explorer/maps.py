@@ -338,7 +338,7 @@ def _list_tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
             points.append(row * columns + np.arange(stride * refines, columns, stride * (1 + refines)))
         indices = np.concatenate(points)
         for part in split_range(len(indices), _PULSE_POINTS if grid.motion.dt is None else _RECORD_POINTS):
-            yield Task(indices[part], grid.motion, factors[indices[part]], (stride,))
+            yield Task(indices[part], (grid.motion,), factors[indices[part]], key=stride)
 
 
 def _change_block(texts: dict[str, str], grid: MapGrid, name: str, value: float) -> None:

@@ -6,6 +6,7 @@ unit when they are read, so that many bodies under multiples of a motion share i
 length and zero acceleration, so that no function needs to check whether the motion is over. NaN propagates unchecked.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ STRETCH = 16
 _MAX_WINDOW = 128
 
 #: Columns of a piece (start, length, first coefficient), and of the the range of a stretch.
-_START, _LENGTH, _FIRST = 0, 1, 2
+START, LENGTH, FIRST = 0, 1, 2
 _MIN, _MAX = 0, 1
 
 
@@ -37,6 +38,18 @@ class Ground(NamedTuple):
     first: int  # first column of this component
     factor: float  # factor on the motion
     unit: float  # factor that converts coefficients and error to units of g
+
+
+class Grounds(NamedTuple):
+    """Several motions with the same number of components and of coefficients."""
+
+    pieces: Floats  # pieces of all motions, one motion after the other
+    stretches: Floats  # bounds on their stretches, likewise
+    first_pieces: Integers  # first row of each motion in `pieces`, and their number
+    first_stretches: Integers  # likewise in `stretches`
+    errors: Floats  # approximation error of each unscaled motion
+    columns: int  # number of coefficients per component
+    unit: float  # factor that converts coefficients and errors to units of g
 
 
 class Window(NamedTuple):
@@ -57,28 +70,52 @@ def build_ground(
     """
     components = [coefficients] if vertical is None else [coefficients, vertical]
     columns = max(2, *(component.shape[1] for component in components))
-    pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
+    pieces = np.zeros((len(coefficients) + 1, FIRST + columns * len(components)))
     stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), 2))
-    ground = Ground(pieces, stretches, error, columns, _FIRST, 1.0, 1.0)
+    ground = Ground(pieces, stretches, error, columns, FIRST, 1.0, 1.0)
     for k, component in enumerate(components):
-        write_pieces(breakpoints, component, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
+        write_pieces(breakpoints, component, ground._replace(first=FIRST + k * columns), np.zeros(columns))
     return ground._replace(unit=unit)
+
+
+def join_grounds(grounds: Sequence[Ground]) -> Grounds:
+    """Join horizontal components of motions with the same components, columns and unit; factors are left out."""
+    return Grounds(
+        np.concatenate([ground.pieces for ground in grounds]),
+        np.concatenate([ground.stretches for ground in grounds]),
+        np.cumsum([0, *(len(ground.pieces) for ground in grounds)]),
+        np.cumsum([0, *(len(ground.stretches) for ground in grounds)]),
+        np.array([ground.error for ground in grounds]),
+        grounds[0].columns,
+        grounds[0].unit,
+    )
+
+
+@inlined
+def select_ground(grounds: Grounds, motion: int, factor: float) -> Ground:
+    """Return one of the motions, multiplied by a factor."""
+    pieces = grounds.pieces[grounds.first_pieces[motion] : grounds.first_pieces[motion + 1]]
+    stretches = grounds.stretches[grounds.first_stretches[motion] : grounds.first_stretches[motion + 1]]
+    return Ground(pieces, stretches, grounds.errors[motion], grounds.columns, FIRST, factor, grounds.unit)
 
 
 def component_coefficients(ground: Ground, pieces: Integers) -> list[Floats]:
     """Return the coefficients (g, g/s, ...) of a motion on some pieces: horizontal and, if present, vertical."""
     columns, factors = ground.columns, (ground.factor, abs(ground.factor))
     return [
-        ground.pieces[pieces, _FIRST + k * columns :][:, :columns] * factors[k] * ground.unit
+        ground.pieces[pieces, FIRST + k * columns :][:, :columns] * factors[k] * ground.unit
         for k in range(ground.stretches.shape[1])
     ]
 
 
-def max_absolute_weight(ground: Ground, factors: Floats) -> Floats:
-    """Return the largest absolute weight in the ground's frame under multiples, divided by the weight at rest."""
-    low, high = np.min(ground.stretches[:, 1:], initial=0.0), np.max(ground.stretches[:, 1:], initial=0.0)
-    scale = np.abs(factors) * ground.unit
-    return np.maximum.reduce([np.ones_like(scale), np.abs(1.0 + scale * low), np.abs(1.0 + scale * high)])
+def max_absolute_weights(grounds: Grounds, motions: Integers, factors: Floats) -> Floats:
+    """Return the largest absolute weight in the ground's frame under each multiple, divided by the weight at rest."""
+    if grounds.stretches.shape[1] == 1:
+        return np.ones(len(factors))
+    scale, first = np.abs(factors) * grounds.unit, grounds.first_stretches[:-1]
+    low, high = np.minimum.reduceat(grounds.stretches[:, 1, 0], first), np.maximum.reduceat(grounds.stretches[:, 1, 1], first)
+    weights = [1.0 + scale * np.minimum(low, 0.0)[motions], 1.0 + scale * np.maximum(high, 0.0)[motions]]
+    return np.maximum(1.0, np.abs(weights).max(axis=0))
 
 
 @kernel
@@ -86,18 +123,18 @@ def write_pieces(breakpoints: Floats, coefficients: Floats, ground: Ground, A: F
     """Write the pieces of one component and the bounds on their stretches. ``A`` is scratch space."""
     pieces, count = ground.pieces, coefficients.shape[0]
     for k in range(count):
-        pieces[k, _START] = breakpoints[k]
-        pieces[k, _LENGTH] = breakpoints[k + 1] - breakpoints[k]
+        pieces[k, START] = breakpoints[k]
+        pieces[k, LENGTH] = breakpoints[k + 1] - breakpoints[k]
     for j in range(coefficients.shape[1]):
         column = pieces[:, ground.first + j]
         for k in range(count):
             column[k] = coefficients[k, j]
-    pieces[count, _START] = breakpoints[count]
-    pieces[count, _LENGTH] = np.inf
+    pieces[count, START] = breakpoints[count]
+    pieces[count, LENGTH] = np.inf
     for stretch in range(ground.stretches.shape[0]):
         low, high = np.inf, -np.inf
         for k in range(stretch * STRETCH, min((stretch + 1) * STRETCH, count + 1)):
-            piece = bound_piece(ground, k, 0.0, pieces[k, _LENGTH], A)
+            piece = bound_piece(ground, k, 0.0, pieces[k, LENGTH], A)
             low, high = min(low, piece.low), max(high, piece.high)
         row = ground.stretches[stretch, component_index(ground)]
         row[_MIN], row[_MAX] = low, high
@@ -127,7 +164,7 @@ def bound_stretch(ground: Ground, stretch: int, A: Floats) -> Window:
 @inlined
 def component_index(ground: Ground) -> int:
     """Return the index of the component in bounds on stretches: 0 horizontal, 1 vertical."""
-    return 0 if ground.first == _FIRST else 1
+    return 0 if ground.first == FIRST else 1
 
 
 @inlined
@@ -143,12 +180,6 @@ def vertical_component(ground: Ground) -> Ground:
         ground.pieces, ground.stretches, ground.error, ground.columns, ground.first + ground.columns,
         abs(ground.factor), ground.unit,
     )  # fmt: skip
-
-
-@inlined
-def scale_ground(ground: Ground, factor: float) -> Ground:
-    """Return the ground of the motion multiplied by a factor instead of its own."""
-    return Ground(ground.pieces, ground.stretches, ground.error, ground.columns, ground.first, factor, ground.unit)
 
 
 @inlined
@@ -172,25 +203,19 @@ def last_piece(ground: Ground) -> int:
 @inlined
 def piece_start(ground: Ground, piece: int) -> float:
     """Return the start time of a piece."""
-    return ground.pieces[piece, _START]
+    return ground.pieces[piece, START]
 
 
 @inlined
 def piece_length(ground: Ground, piece: int) -> float:
     """Return the length of a piece; infinite for the last."""
-    return ground.pieces[piece, _LENGTH]
+    return ground.pieces[piece, LENGTH]
 
 
 @inlined
 def coefficient(ground: Ground, piece: int, power: int) -> float:
     """Return the coefficient of a power of the time within a piece, g/s^power."""
     return (ground.pieces[piece, ground.first + power] * ground.factor) * ground.unit
-
-
-@inlined
-def unscaled_line(ground: Ground, piece: int) -> tuple[float, float]:
-    """Return the first two coefficients of a piece of the unscaled motion."""
-    return ground.pieces[piece, ground.first], ground.pieces[piece, ground.first + 1]
 
 
 @inlined

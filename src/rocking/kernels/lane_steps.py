@@ -4,8 +4,6 @@ A step marks and counts the lanes in which an event may occur (always with NaN, 
 the others that have a block. Weights are in the ground's frame, divided by the weight at rest.
 """
 
-from typing import TypeVar
-
 import numpy as np
 
 from rocking.kernels.compiled import inlined, shared
@@ -24,16 +22,22 @@ WIDTH = 32
 _LANES = ("f8", (WIDTH,))
 _SIDES = ("f8", (2,))
 
-#: Group of lanes: index of the block; whether its step may contain an event; u, u' and (nonlinear)
-#: sin and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation;
-#: factor on the motion.
+#: Group of lanes. Index of the simulation (-1: none); row of its sample and first row that lanes do not step; increment
+#: of the row by a step (0 without a simulation); whether the step is still to be taken, was impossible, may be repeated
+#: in shorter substeps. Length of the sample, and accelerations (horizontal, vertical) of the unscaled motion at its start
+#: and their slopes. u, u' and (nonlinear) sin and cos(alpha - u) before and after the step; constants of the present side
+#: (`STEP_CONSTANTS`); largest rotation; rotation of overturning; usual length of a sample; factor on the motion.
 GROUP = np.dtype(
-    [("block", "i8", (WIDTH,)), ("event", "i8", (WIDTH,))]
+    [
+        (name, "i8", (WIDTH,))
+        for name in ("simulation", "row", "end_row", "increment", "event", "blocked", "truncated", "retry")
+    ]
     + [
         (name, *_LANES)
         for name in (
-            "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine",
-            "stiffness", "pull", "push", "first", "second", "third", "curve", "peak", "factor",
+            "length", "push_start", "push_slope", "lift_start", "lift_slope",
+            "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine", "stiffness", "pull", "push",
+            "first", "second", "third", "curve", "peak", "overturn_angle", "h", "factor",
         )
     ],
     align=True,
@@ -46,16 +50,22 @@ STEP_CONSTANTS = np.dtype(
     [(name, *_SIDES) for name in ("stiffness", "pull", "push", "first", "second", "third", "curve")], align=True
 )
 
-MaybeLine = TypeVar("MaybeLine", Line, None, Line | None)
-
 #: Largest bound on the next terms by the last ones, divided by the first two; the truncation is 1/100 of it.
 _NEXT_TERMS = 2.0**-46
 
 
 @inlined
-def scale_line(line: Line, factor: float, unit: float) -> Line:
-    """Return a line of the motion, multiplied by a factor, in units of g, rounded as `ground.coefficient`."""
-    return (line[0] * factor) * unit, (line[1] * factor) * unit
+def push_line(group: Record, lane: int, unit: float) -> Line:
+    """Return the ground acceleration at the start of a sample and its slope, g, rounded as `ground.coefficient`."""
+    factor = group.factor[lane]
+    return (group.push_start[lane] * factor) * unit, (group.push_slope[lane] * factor) * unit
+
+
+@inlined
+def weight_line(group: Record, lane: int, unit: float) -> Line:
+    """Return the weight at the start of a sample, divided by the weight at rest, and its slope."""
+    factor = abs(group.factor[lane])
+    return 1.0 + (group.lift_start[lane] * factor) * unit, (group.lift_slope[lane] * factor) * unit
 
 
 @inlined
@@ -83,16 +93,16 @@ def is_event_free(
 
 
 @shared
-def step_linear(group: Record, push: Line, unit: float, h: float, excess: float, overturn_angle: float) -> int:
+def step_linear(group: Record, unit: float) -> int:
     """Step a group through one sample by Stumpff's functions (exact for any lam and h); return the number of events.
 
-    ``push`` is the acceleration of the unscaled motion and its slope. Because w = u'' then satisfies w'' = lam w, its
-    extrema are at the ends of the step (except for ``curve``). Rounding of sample times makes the sample longer than
-    ``h`` by ``excess``.
+    Because w = u'' then satisfies w'' = lam w, its extrema are at the ends of the step (except for ``curve``). Rounding
+    of sample times makes some samples longer or shorter than h.
     """
     events = 0
     for lane in range(WIDTH):
-        start, slope = scale_line(push, group.factor[lane], unit)
+        h = group.h[lane]
+        start, slope = push_line(group, lane, unit)
         end = start + slope * h
         u, v = group.u[lane], group.v[lane]
         lam, push_gain = group.stiffness[lane], group.push[lane]
@@ -101,6 +111,7 @@ def step_linear(group: Record, push: Line, unit: float, h: float, excess: float,
         u1 = u + (h * v + (group.second[lane] * w + group.third[lane] * j))
         v1 = v + (group.first[lane] * w + group.second[lane] * j)
         w1 = lam * u1 - (group.pull[lane] + push_gain * end)
+        excess = group.length[lane] - h
         u1 += excess * v1
         v1 += excess * w1
         min_w, max_w = min(min(w, w1), 0.0), max(max(w, w1), 0.0)
@@ -108,10 +119,11 @@ def step_linear(group: Record, push: Line, unit: float, h: float, excess: float,
         # Eight times ``curve`` is h^2; its product with the smallest w is h times the smallest change of the rate.
         change = (8.0 * curve * min_w, 8.0 * curve * max_w)
         is_free = is_event_free(
-            (u, u1), h * v, curve * max_w, -(curve * min_w), change, group.peak[lane], overturn_angle
+            (u, u1), h * v, curve * max_w, -(curve * min_w), change, group.peak[lane], group.overturn_angle[lane]
         )
         group.u[lane] = u1 if is_free else u
         group.v[lane] = v1 if is_free else v
+        group.row[lane] += group.increment[lane] if is_free else 0
         group.event[lane] = not is_free
         events += not is_free
     return events
@@ -121,76 +133,64 @@ def step_linear(group: Record, push: Line, unit: float, h: float, excess: float,
 
 
 @inlined
-def copy_states(group: Record, h: float) -> None:
-    """Copy the state of all lanes, with the velocity per time h."""
+def begin_step(group: Record) -> None:
+    """Declare the step of every lane as still to be taken."""
+    for lane in range(WIDTH):
+        group.event[lane] = group.retry[lane] = 1
+
+
+@inlined
+def copy_states(group: Record, substeps: int, scaled: bool) -> None:
+    """Copy the state of all lanes; if ``scaled``, with the velocity per substep."""
     for lane in range(WIDTH):
         group.next_u[lane] = group.u[lane]
-        group.next_v[lane] = group.v[lane] * h
+        group.next_v[lane] = group.v[lane] * (group.length[lane] / substeps) if scaled else group.v[lane]
         group.next_sine[lane] = group.sine[lane]
         group.next_cosine[lane] = group.cosine[lane]
-        group.event[lane] = 0
+        group.blocked[lane] = group.truncated[lane] = 0
 
 
 @inlined
-def push_during(push: Line, factor: float, unit: float, k: int, h: float) -> Line:
-    """Return the ground acceleration at the start of the k-th substep of length h, and its change."""
-    start, slope = scale_line(push, factor, unit)
-    change = slope * h
-    return start + k * change, change
-
-
-@inlined
-def weight_during(lift: MaybeLine, factor: float, unit: float, k: int, h: float) -> MaybeLine:
-    """Return the weight at the start of the k-th substep of length h, and its change; None without a lift."""
-    if lift is None:
-        return lift
-    start, slope = scale_line(lift, abs(factor), unit)
-    change = slope * h
-    return (1.0 + start) + k * change, change
-
-
-@inlined
-def accept_states(group: Record, rate: float) -> int:
-    """Copy the new states of lanes without an event, and return the number of the other lanes."""
-    events = 0
+def accept_states(group: Record, substeps: int, scaled: bool) -> tuple[int, int]:
+    """Copy the new states of lanes without an event; return the numbers of other lanes, and of those to be repeated."""
+    events = retries = 0
     for lane in range(WIDTH):
-        has_event = group.event[lane]
-        group.u[lane] = group.u[lane] if has_event else group.next_u[lane]
-        group.v[lane] = group.v[lane] if has_event else group.next_v[lane] * rate
-        group.sine[lane] = group.sine[lane] if has_event else group.next_sine[lane]
-        group.cosine[lane] = group.cosine[lane] if has_event else group.next_cosine[lane]
-        events += has_event
-    return events
+        is_free = (group.retry[lane] != 0) & (group.blocked[lane] == 0)
+        rate = 1.0 / (group.length[lane] / substeps) if scaled else 1.0
+        group.u[lane] = group.next_u[lane] if is_free else group.u[lane]
+        group.v[lane] = group.next_v[lane] * rate if is_free else group.v[lane]
+        group.sine[lane] = group.next_sine[lane] if is_free else group.sine[lane]
+        group.cosine[lane] = group.next_cosine[lane] if is_free else group.cosine[lane]
+        group.row[lane] += group.increment[lane] if is_free else 0
+        group.event[lane] = 0 if is_free else group.event[lane]
+        group.retry[lane] &= group.truncated[lane]
+        events += group.event[lane]
+        retries += group.retry[lane]
+    return events, retries
 
 
 @shared
-def step_weighted(
-    group: Record, push: Line, lift: Line, unit: float, length: float, substeps: int, overturn_angle: float
-) -> int:
-    """Step a group of the linear model through one sample under varying weight; return the number of events.
-
-    ``push`` and ``lift`` are the horizontal and vertical acceleration of the unscaled motion.
-    """
-    h = length / substeps
-    copy_states(group, 1.0)
+def step_weighted(group: Record, unit: float, substeps: int) -> int:
+    """Step a group of the linear model through one sample under varying weight; return the number of events."""
+    begin_step(group)
+    copy_states(group, substeps, scaled=False)
     for k in range(substeps):
-        take_weighted_substep(group, push, lift, unit, k, h, overturn_angle)
-    return accept_states(group, 1.0)
+        take_weighted_substep(group, unit, k, substeps)
+    return accept_states(group, substeps, scaled=False)[0]
 
 
 @shared
-def take_weighted_substep(
-    group: Record, push: Line, lift: Line, unit: float, k: int, h: float, overturn_angle: float
-) -> None:
-    """Move the copies through the k-th substep of length h and mark the lanes in which an event may occur.
+def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> None:
+    """Move the copies through the k-th substep and mark the lanes in which an event may occur.
 
     With z = h^2 (lam u - pull), r' = weight z - h^2 push. A term contributes to the second next and, as the weight
     changes, to the third. Therefore the last terms bound the truncation.
     """
-    square, rate = h * h, 1.0 / h
     for lane in range(WIDTH):
-        side_push = push_during(push, group.factor[lane], unit, k, h)
-        weight = weight_during(lift, group.factor[lane], unit, k, h)
+        h = group.length[lane] / substeps
+        square, rate = h * h, 1.0 / h
+        side_push = line_during(push_line(group, lane, unit), k, h)
+        weight = line_during(weight_line(group, lane, unit), k, h)
         w, d = weight
         u, v = group.next_u[lane], group.next_v[lane]
         q, gain = group.stiffness[lane] * square, group.push[lane] * square
@@ -205,60 +205,70 @@ def take_weighted_substep(
         tail += 8.0 * abs(r9) + (9.0 * abs(r10) + 10.0 * abs(r11))
         lower, upper = min(r2 + 2.0 * min(r3, 0.0) - tail, 0.0), max(r2 + 2.0 * max(r3, 0.0) + tail, 0.0)
         is_free = is_event_free(
-            (u, u1), r1, 0.125 * upper, -0.125 * lower, (lower, upper), group.peak[lane], overturn_angle
+            (u, u1),
+            r1,
+            0.125 * upper,
+            -0.125 * lower,
+            (lower, upper),
+            group.peak[lane],
+            group.overturn_angle[lane],
         )
         last_terms = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
         is_free &= abs(q) * last_terms <= _NEXT_TERMS * (abs(r1) + abs(r2))
-        group.event[lane] |= not is_free
+        group.blocked[lane] |= not is_free
         group.next_u[lane] = u1
         group.next_v[lane] = v1
 
 
+@inlined
+def line_during(line: Line, k: int, h: float) -> Line:
+    """Return the value of a line at the start of the k-th substep of length h, and its change."""
+    change = line[1] * h
+    return line[0] + k * change, change
+
+
+@inlined
+def weight_during(group: Record, lane: int, at_rest: Line | None, unit: float, k: int, h: float) -> Line | None:
+    """Return the weight at the start of the k-th substep of length h, and its change; None if it is constant."""
+    if at_rest is None:
+        return at_rest
+    return line_during(weight_line(group, lane, unit), k, h)
+
+
 @shared
-def step_nonlinear(
-    group: Record,
-    push: Line,
-    lift: Line | None,
-    unit: float,
-    length: float,
-    h: float,
-    substeps: int,
-    overturn_angle: float,
-) -> int:
+def step_nonlinear(group: Record, at_rest: Line | None, unit: float, substeps: int) -> int:
     """Step a group of the nonlinear model through one sample and return the number of events.
 
-    ``push`` and ``lift`` are the horizontal and any vertical acceleration of the unscaled motion. Due to rounded
-    sample times, the sample has ``length``, but the constants of the lanes are for ``h``.
+    ``at_rest`` is (1, 0), the weight without vertical motion and its slope, or None if it is constant. A lane whose series is too short repeats the step with twice as many
+    substeps, whatever the other lanes do.
     """
-    span = length / substeps
-    copy_states(group, span)
-    for k in range(substeps):
-        scale = (length / h) ** 2
-        take_nonlinear_substep(group, push, lift, unit, k, span, scale, overturn_angle)
-    return accept_states(group, 1.0 / span)
+    begin_step(group)
+    for refinement in range(1, 3):
+        count = refinement * substeps
+        copy_states(group, count, scaled=True)
+        for k in range(count):
+            take_nonlinear_substep(group, at_rest, unit, k, count, 1.0 / refinement)
+        events, retries = accept_states(group, count, scaled=True)
+        if retries == 0:
+            break
+    return events
 
 
 @shared
 def take_nonlinear_substep(
-    group: Record,
-    push: Line,
-    lift: Line | None,
-    unit: float,
-    k: int,
-    span: float,
-    scale: float,
-    overturn_angle: float,
+    group: Record, at_rest: Line | None, unit: float, k: int, count: int, fraction: float
 ) -> None:
-    """Move the copies through the k-th substep and mark the lanes in which an event may occur.
+    """Move the copies through the k-th of ``count`` substeps, and mark lanes with possible events or truncation.
 
-    ``scale`` is the squared ratio of its length to the usual one. The
-    addition theorem gives the sine and cosine of alpha - u.
+    A substep is a ``fraction`` of those for which the constants of the lanes are. The addition theorem gives the sine and cosine of alpha - u.
     """
     for lane in range(WIDTH):
+        span = group.length[lane] / count
+        scale = (group.length[lane] / group.h[lane] * fraction) ** 2
         u, r1 = group.next_u[lane], group.next_v[lane]
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
-        weight = weight_during(lift, group.factor[lane], unit, k, span)
-        lane_push = push_during(push, group.factor[lane], unit, k, span)
+        weight = weight_during(group, lane, at_rest, unit, k, span)
+        lane_push = line_during(push_line(group, lane, unit), k, span)
         side_push = (group.push[lane] * lane_push[0], group.push[lane] * lane_push[1])
         l2 = group.stiffness[lane] * scale
         terms, angles = nonlinear_velocity_terms(r1, (s0, c0), l2, side_push, weight)
@@ -272,10 +282,16 @@ def take_nonlinear_substep(
         is_converged, tail = has_negligible_truncation(sizes, angles, -2.0 * l2, strength)
         lower, upper = min(r2 - tail, 0.0), max(r2 + tail, 0.0)
         is_free = is_event_free(
-            (u, u1), r1, 0.125 * upper, -0.125 * lower, (lower, upper), group.peak[lane], overturn_angle
+            (u, u1),
+            r1,
+            0.125 * upper,
+            -0.125 * lower,
+            (lower, upper),
+            group.peak[lane],
+            group.overturn_angle[lane],
         )
-        is_free &= is_converged
-        group.event[lane] |= not is_free
+        group.blocked[lane] |= not (is_free & is_converged)
+        group.truncated[lane] |= not is_converged
         # sine and 1 - cosine of the change of the rotation
         square = change * change
         higher = 1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0))

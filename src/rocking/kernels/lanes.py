@@ -1,10 +1,10 @@
-"""Simulation of many blocks under one evenly sampled record: together, or one by one where an event may occur.
+"""Simulation of many blocks under evenly sampled records: together, or one by one where an event may occur.
 
-A lane contains one block and the factor on its motion. All lanes step through a sample together, in loops that
-vectorise. A lane whose step may contain an event (an impact, a new peak, an overturning) is left unchanged, and `march`
-simulates its block during that sample. Bounds decide, never sampling (`lane_steps.is_event_free`). The arithmetic of a
-lane depends only on its block, its factor and the motion, never on other lanes. A block with a NaN is always simulated
-by `march`.
+A lane contains one simulation: a block, a motion, and the factor on it. Each lane is at its own sample of its own motion,
+and starts another simulation when one is over. All lanes step through their samples together, in loops that vectorise. A
+lane whose step may contain an event (an impact, a new peak, an overturning) is left unchanged, and `march` simulates its
+block during that sample. Bounds decide, never sampling (`lane_steps.is_event_free`). The arithmetic of a lane depends
+only on its block, its motion and the factor, never on other lanes. A block with a NaN is always simulated by `march`.
 """
 
 import math
@@ -13,18 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats, Integers
-from rocking.kernels.compiled import inlined, kernel
+from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import raise_peak
-from rocking.kernels.ground import (
-    Ground,
-    has_vertical,
-    last_piece,
-    piece_length,
-    piece_start,
-    scale_ground,
-    unscaled_line,
-    vertical_component,
-)
+from rocking.kernels.ground import FIRST, LENGTH, START, Grounds, select_ground
 from rocking.kernels.lane_steps import GROUP, STEP_CONSTANTS, WIDTH, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.march import march
 from rocking.kernels.state import TO_THE_END, Ending, Record, Records, expose_fields, new_record, new_records, new_table
@@ -38,42 +29,35 @@ MAX_WEIGHTED_SUBSTEP = 0.125
 #: Rotation of a lane without a block.
 EMPTY_ROTATION = 1e-300
 
-#: Numbers of lanes in use, of lanes that have become free, and of blocks that wait for their uplift.
-COUNTS = np.dtype([("active", "i8"), ("free", "i8"), ("waiting", "i8")], align=True)
+#: Numbers of lanes in use and of simulations that have started.
+COUNTS = np.dtype([("active", "i8"), ("started", "i8")], align=True)
 
 
 class Pool(NamedTuple):
-    """Blocks, groups of lanes, and queues of blocks that wait for a piece."""
+    """Simulations of blocks under motions, and the lanes in which they run."""
 
-    blocks: Records  # bodies
-    states: Records  # state of each block
-    steps: Records  # step constants of each block
-    factors: Floats  # factor on the motion of each block
-    groups: Records  # groups of lanes
-    first_waiting: Integers  # for each piece, the first block that waits for it; -1: none
-    next_waiting: Integers  # for each block, the next one that waits for the same piece; -1: none
-    free_lanes: Integers  # lanes that have become free
+    grounds: Grounds  # motions
+    motions: Integers  # index of the motion of each simulation
+    factors: Floats  # factor on it
+    blocks: Records  # body of each
+    states: Records  # state of each
+    steps: Records  # step constants of each
+    ends: Integers  # first piece of each motion that lanes do not step
+    groups: Records  # one group of lanes
     counts: Record  # `COUNTS`
     table: Records  # table without rows
-    overturn_angle: float  # smallest rotation at which a block overturns
 
 
-def build_pool(blocks: Records, states: Records, factors: Floats, pieces: int, h: float, substeps: int) -> Pool:
-    """Return a pool in which every block waits for the first piece; ``substeps`` is 0 in the linear model."""
-    count = len(blocks)
-    groups = _allocate_aligned(-(-count // WIDTH), GROUP)
-    groups["block"] = -1
-    groups["u"] = EMPTY_ROTATION
-    groups["peak"] = np.inf
-    first_waiting = np.full(pieces + 1, -1, dtype=np.int64)
-    next_waiting = np.arange(1, count + 1, dtype=np.int64)
-    next_waiting[-1] = -1
-    first_waiting[0] = 0
-    return Pool(
-        blocks, states, compute_step_constants(blocks, h, substeps), factors, groups, first_waiting, next_waiting,
-        np.zeros(count, dtype=np.int64), new_record(COUNTS, waiting=count), new_table(0),
-        float(blocks["overturn_angle"].min()),
-    )  # fmt: skip
+def build_pool(
+    grounds: Grounds, motions: Integers, factors: Floats, blocks: Records, states: Records, stop: float, substeps: int
+) -> Pool:
+    """Return a pool of simulations up to a time of stop; ``substeps`` is 0 in the linear model under constant weight."""
+    first, last = grounds.first_pieces[:-1], grounds.first_pieces[1:] - 1
+    breakpoints = (grounds.pieces[start + 1 : end + 1, START] for start, end in zip(first, last, strict=True))
+    ends = np.array([np.searchsorted(times, stop, "right") for times in breakpoints], dtype=np.int64)
+    steps = compute_step_constants(blocks, grounds.pieces[first, LENGTH][motions], substeps)
+    groups, counts = _allocate_aligned(1, GROUP), new_record(COUNTS, active=WIDTH)
+    return Pool(grounds, motions, factors, blocks, states, steps, ends, groups, counts, new_table(0))
 
 
 def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Records:
@@ -84,10 +68,10 @@ def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Records:
     return expose_fields(buffer[skip : skip + count * kind.itemsize].view(kind))
 
 
-def compute_step_constants(blocks: Records, h: float, substeps: int) -> Records:
-    """Compute the constants of a step of length h for every block (`STEP_CONSTANTS`)."""
+def compute_step_constants(blocks: Records, lengths: Floats, substeps: int) -> Records:
+    """Compute the constants of a step of each length for every block (`STEP_CONSTANTS`)."""
     steps = new_records(len(blocks), STEP_CONSTANTS)
-    lam = blocks["stiffness"]
+    lam, h = blocks["stiffness"], lengths[:, None]
     sign = np.array([1.0, -1.0])
     if substeps > 0:
         steps["stiffness"] = -0.5 * lam * (h / substeps) ** 2
@@ -115,211 +99,165 @@ def stumpff(k: int, q: Any) -> Floats:
 
 
 @inlined
-def fill_lane(pool: Pool, lane: int, index: int) -> None:
-    """Write a block's state and constants, except its sine and cosine, into a lane."""
-    group, slot = pool.groups[lane // WIDTH], lane % WIDTH
-    state, steps = pool.states[index], pool.steps[index]
-    side = state.side
-    group.block[slot] = index
-    group.factor[slot] = pool.factors[index]
-    group.u[slot] = state.u
-    group.v[slot] = state.v
-    group.peak[slot] = state.peak
-    group.stiffness[slot] = steps.stiffness[side]
-    group.pull[slot] = steps.pull[side]
-    group.push[slot] = steps.push[side]
-    group.first[slot] = steps.first[side]
-    group.second[slot] = steps.second[side]
-    group.third[slot] = steps.third[side]
-    group.curve[slot] = steps.curve[side]
+def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
+    """Write the state and constants of a simulation into a lane."""
+    group, state, steps, motion = pool.groups[0], pool.states[index], pool.steps[index], pool.motions[index]
+    side, first = state.side, pool.grounds.first_pieces[motion]
+    group.simulation[lane] = index
+    group.row[lane] = first + state.piece
+    group.end_row[lane] = first + pool.ends[motion]
+    group.increment[lane] = 1
+    group.h[lane] = pool.grounds.pieces[first, LENGTH]
+    group.factor[lane] = pool.factors[index]
+    group.overturn_angle[lane] = pool.blocks[index].overturn_angle
+    group.u[lane] = state.u
+    group.v[lane] = state.v
+    group.peak[lane] = state.peak
+    group.stiffness[lane] = steps.stiffness[side]
+    group.pull[lane] = steps.pull[side]
+    group.push[lane] = steps.push[side]
+    group.first[lane] = steps.first[side]
+    group.second[lane] = steps.second[side]
+    group.third[lane] = steps.third[side]
+    group.curve[lane] = steps.curve[side]
+    if settings.nonlinear:
+        psi = pool.blocks[index].slenderness[side] - state.u
+        group.sine[lane] = math.sin(psi)
+        group.cosine[lane] = math.cos(psi)
 
 
 @inlined
-def set_angles(pool: Pool, lane: int, index: int) -> None:
-    """Set the sine and cosine of alpha - u in a lane."""
-    group, slot = pool.groups[lane // WIDTH], lane % WIDTH
-    state = pool.states[index]
-    psi = pool.blocks[index].slenderness[state.side] - state.u
-    group.sine[slot] = math.sin(psi)
-    group.cosine[slot] = math.cos(psi)
-
-
-@inlined
-def write_lane(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
-    """Write a lane into the state of its block at the start of a piece, and return the block's index.
+def write_lane(pool: Pool, lane: int) -> int:
+    """Write a lane into the state of its simulation at the start of a sample, and return the simulation's index.
 
     The state does not yet contain the largest rotation of a block that still rises.
     """
-    group, slot = pool.groups[lane // WIDTH], lane % WIDTH
-    index = group.block[slot]
+    group = pool.groups[0]
+    index, row = group.simulation[lane], group.row[lane]
     state = pool.states[index]
-    state.piece = piece
+    state.piece = row - pool.grounds.first_pieces[pool.motions[index]]
     state.offset = 0.0
-    state.u = group.u[slot]
-    state.v = group.v[slot]
+    state.u = group.u[lane]
+    state.v = group.v[lane]
     if state.u > state.peak:
-        raise_peak(state, state.u, piece_start(ground, piece))
+        raise_peak(state, state.u, pool.grounds.pieces[row, START])
     return index
 
 
 @inlined
 def clear_lane(pool: Pool, lane: int) -> None:
-    """Remove the block of a lane; no step then changes the lane or detects an event."""
-    group, slot = pool.groups[lane // WIDTH], lane % WIDTH
-    group.block[slot] = -1
-    group.u[slot] = EMPTY_ROTATION
-    group.v[slot] = group.sine[slot] = group.cosine[slot] = 0.0
-    group.peak[slot] = np.inf
-    group.stiffness[slot] = group.pull[slot] = group.push[slot] = group.curve[slot] = 0.0
-    group.first[slot] = group.second[slot] = group.third[slot] = 0.0
+    """Remove the simulation of a lane; no step then changes the lane or detects an event."""
+    group = pool.groups[0]
+    group.simulation[lane] = -1
+    group.row[lane] = group.increment[lane] = 0
+    group.end_row[lane] = 1
+    group.u[lane] = EMPTY_ROTATION
+    group.v[lane] = group.sine[lane] = group.cosine[lane] = group.factor[lane] = 0.0
+    group.peak[lane] = group.overturn_angle[lane] = np.inf
+    group.h[lane] = pool.grounds.pieces[0, LENGTH]
+    group.stiffness[lane] = group.pull[lane] = group.push[lane] = group.curve[lane] = 0.0
+    group.first[lane] = group.second[lane] = group.third[lane] = 0.0
 
 
-@inlined
-def move_block(pool: Pool, lane: int, target_lane: int) -> None:
-    """Move a block from one lane to another."""
-    source, i = pool.groups[lane // WIDTH], lane % WIDTH
-    target, j = pool.groups[target_lane // WIDTH], target_lane % WIDTH
-    index = source.block[i]
-    state = pool.states[index]
-    state.u = source.u[i]
-    state.v = source.v[i]
-    peak = source.peak[i]
-    target.sine[j] = source.sine[i]
-    target.cosine[j] = source.cosine[i]
-    fill_lane(pool, target_lane, index)
-    target.peak[j] = peak
-    clear_lane(pool, lane)
-
-
-# ---- The loop over the samples of a record ----
+# ---- The loop over samples ----
 
 
 @kernel
-def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, substeps: int) -> None:
-    """Simulate every block of a pool under an evenly sampled record to its end.
+def run_lanes(settings: Record, scratch: Record, pool: Pool, substeps: int) -> None:
+    """Run all simulations of a pool under evenly sampled records to their ends.
 
     ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``ending`` of every state is an
-    `Ending`; RUNNING and PAUSED states can be continued individually.
+    `Ending`; PAUSED states can be continued individually.
     """
-    piece = next_waiting_piece(pool, 0)
-    while piece < last_piece(ground) and piece_start(ground, piece + 1) <= settings.stop:
-        step_groups(ground, settings, scratch, pool, piece, substeps)
-        drop_finished(pool)
-        admit_waiting(ground, settings, scratch, pool, piece)
-        piece += 1
-        if pool.counts.active == 0:
-            if pool.counts.waiting == 0:
-                return
-            piece = next_waiting_piece(pool, piece)
-    for lane in range(pool.counts.active):
-        write_lane(ground, pool, lane, piece)
-    for index in range(pool.blocks.shape[0]):
-        if pool.states[index].ending == Ending.RUNNING:
-            march_until(ground, settings, scratch, pool, index, TO_THE_END)
+    for lane in range(WIDTH):
+        start_simulation(settings, scratch, pool, lane)
+    group = pool.groups[0]
+    while pool.counts.active > 0:
+        load_samples(pool)
+        events = step_group(settings, pool, substeps)
+        lane = 0
+        while events > 0:
+            if group.event[lane] != 0:
+                march_lane(settings, scratch, pool, lane)
+                events -= 1
+            lane += 1
 
 
 @kernel
-def march_blocks(ground: Ground, settings: Record, scratch: Record, pool: Pool) -> None:
-    """Simulate every block of a pool to its end, one by one; ``ending`` of every state is then an `Ending`."""
+def march_blocks(settings: Record, scratch: Record, pool: Pool) -> None:
+    """Run all simulations of a pool to their ends, one by one; ``ending`` of every state is then an `Ending`."""
     for index in range(pool.blocks.shape[0]):
-        march_until(ground, settings, scratch, pool, index, TO_THE_END)
+        state = pool.states[index]
+        ground = select_ground(pool.grounds, pool.motions[index], pool.factors[index])
+        state.ending = march(ground, pool.blocks[index], settings, pool.table, scratch, state)
 
 
 @inlined
-def next_waiting_piece(pool: Pool, piece: int) -> int:
-    """Return the first piece from ``piece`` on with a waiting block, or the end of the motion."""
-    while piece < pool.first_waiting.shape[0] - 1 and pool.first_waiting[piece] < 0:
-        piece += 1
-    return piece
+def load_samples(pool: Pool) -> None:
+    """Copy the sample of every lane from its motion; NaN beyond the last, which no step accepts."""
+    group, pieces = pool.groups[0], pool.grounds.pieces
+    for lane in range(WIDTH):
+        row = group.row[lane]
+        group.length[lane] = pieces[row, LENGTH]
+        group.push_start[lane] = pieces[row, FIRST] if row < group.end_row[lane] else np.nan
+        group.push_slope[lane] = pieces[row, FIRST + 1]
+    if has_lift(pool):
+        for lane in range(WIDTH):
+            row = group.row[lane]
+            group.lift_start[lane] = pieces[row, FIRST + 2]
+            group.lift_slope[lane] = pieces[row, FIRST + 3]
 
 
 @inlined
-def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int, substeps: int) -> None:
-    """Move all lanes through one sample: together, or by a march if an event may occur."""
-    for first in range(0, pool.counts.active, WIDTH):
-        group = pool.groups[first // WIDTH]
-        events = step_group(ground, settings, group, piece, substeps, pool.overturn_angle)
-        slot = 0
-        while events > 0:
-            if group.event[slot] != 0:
-                march_sample(ground, settings, scratch, pool, piece, first + slot)
-                events -= 1
-            slot += 1
+def has_lift(pool: Pool) -> bool:
+    """Return whether the motions have a vertical component."""
+    return pool.grounds.stretches.shape[1] > 1
 
 
 @inlined
-def step_group(
-    ground: Ground, settings: Record, group: Record, piece: int, substeps: int, overturn_angle: float
-) -> int:
-    """Step a group through one sample and return the number of lanes with possible events."""
-    push, unit = unscaled_line(ground, piece), ground.unit
-    length, h = piece_length(ground, piece), piece_length(ground, 0)
-    if has_vertical(ground):
-        lift = unscaled_line(vertical_component(ground), piece)
-        if settings.nonlinear:
-            return step_nonlinear(group, push, lift, unit, length, h, substeps, overturn_angle)
-        return step_weighted(group, push, lift, unit, length, substeps, overturn_angle)
+def step_group(settings: Record, pool: Pool, substeps: int) -> int:
+    """Step all lanes through their samples and return the number of those with possible events."""
+    group, unit = pool.groups[0], pool.grounds.unit
     if settings.nonlinear:
-        return step_nonlinear(group, push, None, unit, length, h, substeps, overturn_angle)
-    return step_linear(group, push, unit, h, length - h, overturn_angle)
+        if has_lift(pool):
+            return step_nonlinear(group, (1.0, 0.0), unit, substeps)
+        return step_nonlinear(group, None, unit, substeps)
+    return step_weighted(group, unit, substeps) if has_lift(pool) else step_linear(group, unit)
 
 
 @inlined
-def march_sample(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int, lane: int) -> None:
-    """March the block of a lane through one sample, and free the lane unless the block still rocks."""
-    index = write_lane(ground, pool, lane, piece)
-    if march_until(ground, settings, scratch, pool, index, piece + 1):
-        start_lane(settings, pool, lane, index)
+def march_lane(settings: Record, scratch: Record, pool: Pool, lane: int) -> None:
+    """March the block of a lane at least through one sample; if its simulation ends, start another one."""
+    index = write_lane(pool, lane)
+    if march_to_sample(settings, scratch, pool, index):
+        fill_lane(pool, settings, lane, index)
     else:
-        clear_lane(pool, lane)
-        pool.free_lanes[pool.counts.free] = lane
-        pool.counts.free += 1
+        start_simulation(settings, scratch, pool, lane)
 
 
-@inlined
-def start_lane(settings: Record, pool: Pool, lane: int, index: int) -> None:
-    """Assign a block to a lane."""
-    fill_lane(pool, lane, index)
-    if settings.nonlinear:
-        set_angles(pool, lane, index)
+@shared
+def start_simulation(settings: Record, scratch: Record, pool: Pool, lane: int) -> None:
+    """Start simulations until one rocks at the start of a sample, and put it into a lane; clear the lane without one."""
+    while pool.counts.started < pool.blocks.shape[0]:
+        index = pool.counts.started
+        pool.counts.started += 1
+        if march_to_sample(settings, scratch, pool, index):
+            fill_lane(pool, settings, lane, index)
+            return
+    clear_lane(pool, lane)
+    pool.counts.active -= 1
 
 
-@inlined
-def march_until(ground: Ground, settings: Record, scratch: Record, pool: Pool, index: int, stop_piece: int) -> bool:
-    """March a block up to a piece and return whether it rocks at its start; if not, queue it for its next uplift."""
-    state = pool.states[index]
-    state.stop_piece = stop_piece
-    scaled = scale_ground(ground, pool.factors[index])
-    state.ending = march(scaled, pool.blocks[index], settings, pool.table, scratch, state)
-    if state.ending != Ending.RUNNING:
-        return False
-    if state.side >= 0 and state.piece == stop_piece and state.offset == 0.0:
-        return True
-    pool.next_waiting[index] = pool.first_waiting[state.piece]
-    pool.first_waiting[state.piece] = index
-    pool.counts.waiting += 1
-    return False
-
-
-@inlined
-def drop_finished(pool: Pool) -> None:
-    """Move the blocks of the last lanes into the lanes that have become free."""
-    while pool.counts.free > 0:
-        pool.counts.free -= 1
-        pool.counts.active -= 1
-        lane = pool.free_lanes[pool.counts.free]
-        if lane != pool.counts.active:
-            move_block(pool, pool.counts.active, lane)
-
-
-@inlined
-def admit_waiting(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int) -> None:
-    """March the blocks that wait for a piece through it, and admit those that rock at its end."""
-    index = pool.first_waiting[piece]
-    while index >= 0:
-        next_index = pool.next_waiting[index]
-        pool.counts.waiting -= 1
-        if march_until(ground, settings, scratch, pool, index, piece + 1):
-            start_lane(settings, pool, pool.counts.active, index)
-            pool.counts.active += 1
-        index = next_index
+@shared
+def march_to_sample(settings: Record, scratch: Record, pool: Pool, index: int) -> bool:
+    """March a block until it rocks at the start of a sample that lanes may step, or to the end; return whether it does."""
+    state, block, motion = pool.states[index], pool.blocks[index], pool.motions[index]
+    ground = select_ground(pool.grounds, motion, pool.factors[index])
+    end = pool.ends[motion]
+    while True:
+        state.stop_piece = state.piece + 1 if state.piece < end else TO_THE_END
+        state.ending = march(ground, block, settings, pool.table, scratch, state)
+        if state.ending != Ending.RUNNING:
+            return False
+        if state.side >= 0 and state.piece == state.stop_piece and state.offset == 0.0 and state.piece < end:
+            return True

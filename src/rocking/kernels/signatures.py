@@ -36,7 +36,8 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
     block, settings, scratch = state.new_record(state.BLOCK), state.new_record(state.SETTINGS), state.new_scratch()
     blocks, states, table = state.new_records(1, state.BLOCK), state.new_states(1, 1), state.new_table(1)
     trail = Trail(sample, block, settings, state.new_records(1, state.NODE_ROW))
-    pool = build_pool(blocks, states, array(1), 1, 1.0, 0)
+    grounds, motions = ground.join_grounds([sample]), array(1, dtype=np.int64)
+    pool = build_pool(grounds, motions - 1, array(1), blocks, states, 1.0, 0)
     problem = PeriodicProblem(sample, block, settings, table, array(2, 1, 10))
     sequences = (fixed(), fixed(), fixed())
     statuses = array(1, dtype=np.int8)
@@ -58,11 +59,11 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
             array(3, 2),
             array(1, 2),
         ),
-        "uplift.write_completeness": (sample, fixed(1), blocks, states, scratch, flags),
+        "uplift.write_completeness": (grounds, motions, array(1), blocks, states, scratch, flags),
         "uplift.write_next_uplifts": (trail, scratch, array()),
         "ground.write_pieces": (fixed(3), fixed(2, 2), sample, array()),
-        "lanes.run_lanes": (sample, settings, scratch, pool, 0),
-        "lanes.march_blocks": (sample, settings, scratch, pool),
+        "lanes.run_lanes": (settings, scratch, pool, 0),
+        "lanes.march_blocks": (settings, scratch, pool),
         "oscillator.write_peak_displacements": (fixed(3), fixed(2, 2), fixed(), 0.05, array(), array()),
         "sine.series.sum_eq65": (1.0,),
         "sine.series.write_eq65_terms": (1.0, array(), array()),

@@ -7,18 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.core.arrays import Flags, Floats
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import find_first_root
 from rocking.kernels.ground import (
     Ground,
+    Grounds,
     bound_piece,
     has_vertical,
     last_piece,
     next_piece_beyond,
     piece_length,
     piece_start,
-    scale_ground,
+    select_ground,
     shift_polynomial,
     vertical_component,
     write_local_series,
@@ -223,13 +224,13 @@ _RETURN = 2.0**-40
 
 @kernel
 def write_completeness(
-    ground: Ground, factors: Floats, blocks: Records, states: Records, scratch: Record, complete: Flags
+    grounds: Grounds, motions: Integers, factors: Floats, blocks: Records, states: Records, scratch: Record, complete: Flags
 ) -> None:
     """Write whether the chattering after the first uplift was complete, for each block that started at rest."""
     for k in range(blocks.shape[0]):
         state = states[k]
-        scaled = scale_ground(ground, factors[k])
-        complete[k] = state.rests > 0 and not exceeds_threshold_again(scaled, blocks[k], scratch, state)
+        ground = select_ground(grounds, motions[k], factors[k])
+        complete[k] = state.rests > 0 and not exceeds_threshold_again(ground, blocks[k], scratch, state)
 
 
 @inlined

@@ -19,7 +19,7 @@ from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.engine.problem import build_settings, gather_bodies
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, simulate_tasks, split_bodies
+from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, create_task, simulate_tasks, split_simulations
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
@@ -229,13 +229,14 @@ def build_setup(product: Product, bodies: slice | None = None) -> Setup:
 
 
 def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
-    """Divide a product into tasks for the engine with keys (motion, scale, polarity)."""
-    shape, signs = product.shape[1:], np.asarray(product.signs, dtype=float)
-    for m, motion in enumerate(product.motions):
-        factors = product.scales.factors(motion)
-        for part in split_bodies(math.prod(shape), motion):
-            s, k, block = np.unravel_index(np.arange(part.start, part.stop), shape)
-            yield Task(block, motion, perturbation * (signs[k] * factors[s]), (m, s, k))
+    """Divide a product into tasks for the engine, with indices into its outcomes as keys."""
+    signs, per_motion = np.asarray(product.signs, dtype=float), math.prod(product.shape[1:])
+    factors = [product.scales.factors(motion) for motion in product.motions]
+    for part in split_simulations(product.motions, np.full(len(factors), per_motion)):
+        m, s, k, block = key = np.unravel_index(np.arange(part.start, part.stop), product.shape)
+        first = m[0]
+        scales = np.array(factors[first : m[-1] + 1])[m - first, s]
+        yield create_task(block, product.motions, m, perturbation * (signs[k] * scales), key)
 
 
 def build_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
@@ -386,6 +387,6 @@ def simulate_product(
     with Progress("simulating", math.prod(product.shape)) as bar:
         for task, outcomes in simulate_tasks(setup, _generate_tasks(product, perturbation)):
             for name, values in results.items():
-                values[(*task.key, task.bodies)] = outcomes[name]
+                values[task.key] = outcomes[name]
             bar.advance(len(outcomes))
     return results

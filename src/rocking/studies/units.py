@@ -19,7 +19,7 @@ import numpy as np
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import VERSION
-from rocking.engine.tasks import Setup, Task, simulate_task
+from rocking.engine.tasks import Setup, Task, create_task, simulate_task, split_simulations
 from rocking.errors import InvalidOption, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
@@ -101,7 +101,7 @@ def choose_unit_shape(product: Product, unit_blocks: int | None) -> tuple[int, .
     sample = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP_SIZE)).astype(np.int64))
     motion = max(product.motions, key=lambda candidate: len(candidate.coefficients))
     setup = Setup(sample, product.model, product.chattering, product.duration)
-    task = Task(slice(None), motion, float(product.scales.factors(motion).max()))
+    task = Task(slice(None), (motion,), float(product.scales.factors(motion).max()))
     simulate_task(setup, task)  # loads the kernels
     start = time.perf_counter()
     simulate_task(setup, task)
@@ -141,12 +141,13 @@ def compute_unit(unit_input: UnitInput, cancelled: threading.Event | None = None
         )
     # NaN where the unit contains fewer simulations than a full one
     values = np.full((len(OUTCOMES), *unit_input.unit), np.nan)
-    blocks = slice(0, len(unit_input.setup.bodies))
-    for m, s, k in np.ndindex(unit_input.factors.shape):
-        task = Task(blocks, unit_input.motions[m], float(unit_input.factors[m, s, k]))
+    shape = (*unit_input.factors.shape, len(unit_input.setup.bodies))
+    for part in split_simulations(unit_input.motions, np.full(shape[0], math.prod(shape[1:]))):
+        m, s, k, block = key = np.unravel_index(np.arange(part.start, part.stop), shape)
+        task = create_task(block, unit_input.motions, m, unit_input.factors[m, s, k])
         outcomes = simulate_task(unit_input.setup, task, cancelled)
-        for cells, name in zip(values[:, m, s, k], OUTCOMES, strict=True):
-            cells[blocks] = outcomes[name]
+        for cells, name in zip(values, OUTCOMES, strict=True):
+            cells[key] = outcomes[name]
     return seal(zlib.compress(np.ascontiguousarray(values, "<f8").data, _COMPRESSION_LEVEL))
 
 
