@@ -36,7 +36,7 @@ def test_balls_and_blocks_are_bodies():
         lambda body, motion: simulate(body, motion, model="linear", duration=1.0),
         lambda body, motion: simulate_many(body.as_bodies(), motion, model="linear", duration=1.0),
         lambda body, motion: [
-            *simulate_tasks(Setup(body.as_bodies(), "linear", Certified(), 1.0), [Task(slice(1), motion)])
+            *simulate_tasks(Setup(body.as_bodies(), "linear", Certified(), 1.0), [Task(slice(1), (motion,))])
         ],
         lambda body, motion: dynamics.simulate(body, motion, duration=1.0),
     ],

@@ -129,7 +129,7 @@ def test_nothing_to_simulate_is_refused(records):
 def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
     setup, task = (
         engine.Setup(Block.from_parameters(2.0, 0.2).as_bodies(), "linear", Certified()),
-        engine.Task(slice(None), rocking.pulses.one_sine(1.0, 1.0)),
+        engine.Task(slice(None), (rocking.pulses.one_sine(1.0, 1.0),)),
     )
     begun, told = threading.Event(), []
 
@@ -153,10 +153,10 @@ def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
 
 
 def test_a_task_that_is_told_to_stop_follows_no_body_any_further(monkeypatch, records):
-    setup, task = engine.Setup(random_blocks(3, 1), "linear", Certified()), engine.Task(slice(None), records[2])
+    setup, task = engine.Setup(random_blocks(3, 1), "linear", Certified()), engine.Task(slice(None), (records[2],))
     marched, cancelled = [], threading.Event()
     march = engine._march_together
-    monkeypatch.setattr(engine, "_march_together", lambda *given: marched.append(march(*given)))
+    monkeypatch.setattr(engine, "_march_together", lambda *given: marched.append(given) or march(*given))
     engine.simulate_task(setup, task, cancelled)
     assert len(marched) >= 1
     cancelled.set()

@@ -200,10 +200,11 @@ def test_blocks_that_each_have_their_own_scaling_do_what_simulate_says():
     factors = rng.uniform(0.5, 6.0, 40)
     motion = rocking.pulses.sine(1.0, 0.9, cycles=2.5)
     for model in ("linear", "nonlinear"):
-        played = list(simulate_each(Setup(blocks, model, Certified()), motion, factors))
-        assert sorted(np.concatenate([task.bodies for task, _ in played])) == list(range(40))
-        for task, outcomes in played:
-            for k, outcome in zip(task.bodies, outcomes, strict=True):
+        setup, bodies = Setup(blocks, model, Certified()), np.arange(40)
+        played = list(simulate_each(setup, [motion], bodies, np.zeros(40, dtype=np.int64), factors))
+        assert sorted(np.concatenate([indices for indices, _ in played])) == list(range(40))
+        for indices, outcomes in played:
+            for k, outcome in zip(indices, outcomes, strict=True):
                 response = rocking.simulate(blocks[k], motion.scaled(factors[k]), model=model)
                 assert outcome["overturned"] == response.overturned
                 assert outcome["peak_rotation"] == response.peak_rotation

@@ -305,13 +305,13 @@ def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLi
     _, motion, block, _ = np.unravel_index(indices, overturned.shape)
     factor, original = np.broadcast_to(factors, overturned.shape).ravel()[indices], overturned.ravel()[indices]
     scales, count = np.array(list_factors(RELATIVE, COUNT))[[0, -1]], len(indices)
-    has_changed = np.zeros(count, dtype=bool)
+    has_changed = np.zeros(2 * count, dtype=bool)
     for k, outcomes in simulate_each(
         setup, motions, np.tile(block, 2), np.tile(motion, 2), np.outer(scales, factor).ravel()
     ):
-        has_changed[k % count] |= outcomes["overturned"] != original[k % count]
-    sample = format_count(len(indices), "outcome")
-    return f"undecided within {format_percent(scales[-1] - 1.0)} of the motion: {has_changed.sum()} of a sample of {sample}"
+        has_changed[k] = outcomes["overturned"] != original[k % count]
+    changed, sample = has_changed.reshape(2, count).any(axis=0).sum(), format_count(count, "outcome")
+    return f"undecided within {format_percent(scales[-1] - 1.0)} of the motion: {changed} of a sample of {sample}"
 
 
 @dataclass(frozen=True, eq=False)

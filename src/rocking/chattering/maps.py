@@ -25,6 +25,7 @@ from rocking.core.threads import map_in_threads
 from rocking.engine.tasks import OUTCOME, detect_complete_chattering
 from rocking.errors import InvalidOption
 from rocking.kernels import state
+from rocking.kernels.ground import join_grounds
 from rocking.motion.motion import Motion, find_exceedances
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
@@ -346,8 +347,9 @@ def _simulate_point(point: SimulationInput) -> _MapPoint:
             states, trail = state.new_states(1, 0), response.solution.trail
             states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, times["upper"]
             results["complete_chattering"] = detect_complete_chattering(
-                trail.ground, np.ones(1), np.array([trail.block]), states
-            )
+                join_grounds([trail.ground]), np.zeros(1, dtype=np.int64), np.array([trail.ground.factor]),
+                np.array([trail.block]), states,
+            )  # fmt: skip
     return _MapPoint(
         int(classify_uplifts(results, last_exceedance)[0]), uplift, **times, rests=rests, overturned=response.overturned
     )

@@ -50,15 +50,17 @@ class GroundGroup(NamedTuple):
 
     indices: Integers  # index of each in the original order
     grounds: Grounds
-    steps: Floats  # common step of each motion; infinite if it is not evenly sampled
+    steps: Floats  # common step of each motion; 0 if it is not evenly sampled
 
 
 @functools.lru_cache(maxsize=4)
 def prepare_grounds(motions: tuple[Motion, ...], gravity: float) -> list[GroundGroup]:
     """Create the grounds of motions, in groups; the last few results are cached."""
     grounds = [prepare_ground(motion, gravity) for motion in motions]
-    steps = np.array([find_common_step(motion) or math.inf for motion in motions])
-    layouts = np.array([(item.columns, item.stretches.shape[1], np.isinf(step)) for item, step in zip(grounds, steps, strict=True)])
+    steps = np.array([find_common_step(motion) or 0.0 for motion in motions])
+    layouts = np.array(
+        [(item.columns, item.stretches.shape[1], step > 0.0) for item, step in zip(grounds, steps, strict=True)]
+    )
     groups = []
     for layout in np.unique(layouts, axis=0):
         indices = np.flatnonzero((layouts == layout).all(axis=1))

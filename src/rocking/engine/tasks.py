@@ -51,8 +51,9 @@ _BUDGET_PER_PIECE: Final = 4
 SLICE: Final = 50_000
 _FIRST_SLICE: Final = 5_000
 
-#: Largest number of simulations and of their pieces in a call of a kernel, which takes at most half a second.
-_CALL_SIZE: Final = 512
+#: Number of simulations in a call of a kernel, and of their pieces in lanes, where it is larger. A call takes at most
+#: about half a second; the last simulations of a call do not fill the lanes.
+_CALL_SIZE: Final = 16 * WIDTH
 _CALL_PIECES: Final = 20_000_000
 
 #: Largest number of steps of all simulations in one task, enough to amortise the call and few enough to stop soon after
@@ -144,7 +145,7 @@ def split_simulations(motions: Sequence[Motion], counts: Integers) -> Iterator[s
         if stop > start and (steps + length * count > max_steps or motion_pieces + length > _TASK_PIECES):
             yield slice(start, stop)
             start, steps, motion_pieces = stop, 0, 0
-        size = max(WIDTH, max_steps // max(length, 1))
+        size = max(_CALL_SIZE, max_steps // max(length, 1))
         while count > size:
             yield slice(start, start + size)
             start, stop, count = start + size, stop + size, count - size
@@ -166,9 +167,7 @@ def simulate_each(
         yield task.key, outcomes
 
 
-def create_task(
-    bodies: Integers, motions: Sequence[Motion], motion: Integers, factors: Floats, key: Any = ()
-) -> Task:
+def create_task(bodies: Integers, motions: Sequence[Motion], motion: Integers, factors: Floats, key: Any = ()) -> Task:
     """Create a task of simulations under some of the motions, from the indices of bodies and motions."""
     first, last = int(motion.min()), int(motion.max())
     return Task(bodies, tuple(motions[first : last + 1]), factors, motion - first, key)
@@ -200,6 +199,8 @@ def check_components(bodies: Bodies, motion: Motion | None) -> None:
 def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = None) -> NDArray[np.void]:
     """Compute the outcomes of one task; they are invalid if it is ``cancelled`` on the way."""
     bodies = setup.bodies.select(task.bodies)
+    for ground_motion in task.motions:
+        check_components(bodies, ground_motion)
     motion = np.zeros(len(bodies), dtype=np.int64) if task.motion is None else task.motion
     factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(bodies)).copy()
     settings = build_settings(bodies, setup.model, setup.chattering, setup.duration, record=False)
@@ -217,9 +218,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
                 break
             batch.states[part] = _march_together(settings, batch.select(part), substeps)
         _resume_marches(settings, batch, cancelled)
-        states[members], are_complete = batch.states, np.empty(len(members), dtype=bool)
-        write_completeness(*batch, state.new_scratch(), are_complete)
-        complete[members] = are_complete
+        states[members], complete[members] = batch.states, detect_complete_chattering(*batch)
     outcomes = _collect_outcomes(states, np.array([motion.end for motion in task.motions])[motion])
     outcomes["peak_rotation"] = compute_peaks(states, records, bodies.stops)
     is_known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
@@ -255,18 +254,20 @@ class _Batch(NamedTuple):
 
     def select(self, indices: Integers) -> _Batch:
         """Return some of the simulations, copied."""
-        return _Batch(self.grounds, *(array[indices] for array in self[1:]))
+        motion, factors, records, states = self[1:]
+        return _Batch(self.grounds, motion[indices], factors[indices], records[indices], states[indices])
 
 
 def _split_batch(batch: _Batch, steps: Floats, model: Model) -> Iterator[tuple[Integers, int]]:
     """Yield simulations for one call of a kernel, with their number of substeps; -1 for bodies simulated alone.
 
-    ``steps`` are the sampling steps of the motions, infinite without one.
+    ``steps`` are the sampling steps of the motions, 0 without one.
     """
     stiffness = np.abs(batch.records["stiffness"]).max(axis=1)
-    width = steps[batch.motion] * np.sqrt(stiffness * max_absolute_weights(batch.grounds, batch.motion, batch.factors))
+    step, weight = steps[batch.motion], max_absolute_weights(batch.grounds, batch.motion, batch.factors)
+    width = step * np.sqrt(stiffness * weight)
     with_vertical = batch.grounds.stretches.shape[1] > 1
-    in_lanes = (width <= lanes.MAX_STEP) & ~(batch.records["restrained"] | batch.records["two_stops"])
+    in_lanes = (step > 0.0) & (width <= lanes.MAX_STEP) & ~(batch.records["restrained"] | batch.records["two_stops"])
     width = np.where(in_lanes, width, 0.0)
     if model == "nonlinear" or with_vertical:  # otherwise one formula covers a sample
         substeps = np.ceil(width / (lanes.MAX_SUBSTEP if model == "nonlinear" else lanes.MAX_WEIGHTED_SUBSTEP))
@@ -276,7 +277,7 @@ def _split_batch(batch: _Batch, steps: Floats, model: Model) -> Iterator[tuple[I
     pieces = int(np.diff(batch.grounds.first_pieces).max(initial=1))
     for count in np.unique(substeps):
         indices = np.flatnonzero(substeps == count)
-        for part in split_range(len(indices), _CALL_SIZE if count < 0 else max(WIDTH, _CALL_PIECES // pieces)):
+        for part in split_range(len(indices), _CALL_SIZE if count < 0 else max(_CALL_SIZE, _CALL_PIECES // pieces)):
             yield indices[part], int(count)
 
 
@@ -311,6 +312,15 @@ def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event 
 def count_slices(ground: Ground) -> int:
     """Return the number of slices in the budget of a simulation."""
     return math.ceil((BUDGET + _BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
+
+
+def detect_complete_chattering(
+    grounds: Grounds, motion: Integers, factors: Floats, records: Records, states: Records
+) -> Flags:
+    """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
+    complete = np.empty(len(states), dtype=bool)
+    write_completeness(grounds, motion, factors, records, states, state.new_scratch(), complete)
+    return complete
 
 
 def _collect_outcomes(states: Records, motion_end: Floats) -> NDArray[np.void]:

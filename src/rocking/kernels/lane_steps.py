@@ -22,11 +22,12 @@ WIDTH = 32
 _LANES = ("f8", (WIDTH,))
 _SIDES = ("f8", (2,))
 
-#: Group of lanes. Index of the simulation (-1: none); row of its sample and first row that lanes do not step; increment
-#: of the row by a step (0 without a simulation); whether the step is still to be taken, was impossible, may be repeated
-#: in shorter substeps. Length of the sample, and accelerations (horizontal, vertical) of the unscaled motion at its start
-#: and their slopes. u, u' and (nonlinear) sin and cos(alpha - u) before and after the step; constants of the present side
-#: (`STEP_CONSTANTS`); largest rotation; rotation of overturning; usual length of a sample; factor on the motion.
+#: Group of lanes: index of the simulation (-1: none); row of its sample, and first row that lanes do not step;
+#: increment of the row by a step (0 without a simulation); whether the step may contain an event, whether one of its
+#: substeps may, whether its series is too short, whether to try it; length of the sample, accelerations (horizontal,
+#: vertical) of the unscaled motion at its start, and their slopes; u, u' and (nonlinear) sin and cos(alpha - u) before
+#: and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation; rotation of overturning; usual
+#: length of a sample; factor on the motion.
 GROUP = np.dtype(
     [
         (name, "i8", (WIDTH,))
@@ -239,8 +240,8 @@ def weight_during(group: Record, lane: int, at_rest: Line | None, unit: float, k
 def step_nonlinear(group: Record, at_rest: Line | None, unit: float, substeps: int) -> int:
     """Step a group of the nonlinear model through one sample and return the number of events.
 
-    ``at_rest`` is (1, 0), the weight without vertical motion and its slope, or None if it is constant. A lane whose series is too short repeats the step with twice as many
-    substeps, whatever the other lanes do.
+    ``at_rest`` is (1, 0), the weight without vertical motion and its slope, or None if it is constant. A lane whose
+    series is too short repeats the step with twice as many substeps, independently of other lanes.
     """
     begin_step(group)
     for refinement in range(1, 3):
@@ -260,7 +261,8 @@ def take_nonlinear_substep(
 ) -> None:
     """Move the copies through the k-th of ``count`` substeps, and mark lanes with possible events or truncation.
 
-    A substep is a ``fraction`` of those for which the constants of the lanes are. The addition theorem gives the sine and cosine of alpha - u.
+    Its length is a ``fraction`` of that for which the lanes have constants. The addition theorem gives the sine and
+    cosine of alpha - u.
     """
     for lane in range(WIDTH):
         span = group.length[lane] / count

@@ -1,10 +1,11 @@
 """Simulation of many blocks under evenly sampled records: together, or one by one where an event may occur.
 
-A lane contains one simulation: a block, a motion, and the factor on it. Each lane is at its own sample of its own motion,
-and starts another simulation when one is over. All lanes step through their samples together, in loops that vectorise. A
-lane whose step may contain an event (an impact, a new peak, an overturning) is left unchanged, and `march` simulates its
-block during that sample. Bounds decide, never sampling (`lane_steps.is_event_free`). The arithmetic of a lane depends
-only on its block, its motion and the factor, never on other lanes. A block with a NaN is always simulated by `march`.
+A lane contains one simulation: a block, a motion, and the factor on it. Each lane is at its own sample of its own
+motion, and starts another simulation when one ends. All lanes step through their samples together, in loops that
+vectorise. A lane whose step may contain an event (an impact, a new peak, an overturning) is left unchanged, and `march`
+simulates its block during that sample. Bounds decide, never sampling (`lane_steps.is_event_free`). The arithmetic of a
+lane depends only on its block, its motion and the factor, never on other lanes. A block with a NaN is always simulated
+by `march`.
 """
 
 import math
@@ -51,7 +52,7 @@ class Pool(NamedTuple):
 def build_pool(
     grounds: Grounds, motions: Integers, factors: Floats, blocks: Records, states: Records, stop: float, substeps: int
 ) -> Pool:
-    """Return a pool of simulations up to a time of stop; ``substeps`` is 0 in the linear model under constant weight."""
+    """Return a pool of simulations up to a stop; ``substeps`` is 0 in the linear model under constant weight."""
     first, last = grounds.first_pieces[:-1], grounds.first_pieces[1:] - 1
     breakpoints = (grounds.pieces[start + 1 : end + 1, START] for start, end in zip(first, last, strict=True))
     ends = np.array([np.searchsorted(times, stop, "right") for times in breakpoints], dtype=np.int64)
@@ -237,7 +238,7 @@ def march_lane(settings: Record, scratch: Record, pool: Pool, lane: int) -> None
 
 @shared
 def start_simulation(settings: Record, scratch: Record, pool: Pool, lane: int) -> None:
-    """Start simulations until one rocks at the start of a sample, and put it into a lane; clear the lane without one."""
+    """Start simulations until one rocks at the start of a sample, and put it into a lane; without one, clear it."""
     while pool.counts.started < pool.blocks.shape[0]:
         index = pool.counts.started
         pool.counts.started += 1
@@ -248,9 +249,9 @@ def start_simulation(settings: Record, scratch: Record, pool: Pool, lane: int) -
     pool.counts.active -= 1
 
 
-@shared
+@inlined
 def march_to_sample(settings: Record, scratch: Record, pool: Pool, index: int) -> bool:
-    """March a block until it rocks at the start of a sample that lanes may step, or to the end; return whether it does."""
+    """March a block until it rocks at the start of a sample that lanes may step, or to its end; False at its end."""
     state, block, motion = pool.states[index], pool.blocks[index], pool.motions[index]
     ground = select_ground(pool.grounds, motion, pool.factors[index])
     end = pool.ends[motion]

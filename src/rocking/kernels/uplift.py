@@ -224,7 +224,13 @@ _RETURN = 2.0**-40
 
 @kernel
 def write_completeness(
-    grounds: Grounds, motions: Integers, factors: Floats, blocks: Records, states: Records, scratch: Record, complete: Flags
+    grounds: Grounds,
+    motions: Integers,
+    factors: Floats,
+    blocks: Records,
+    states: Records,
+    scratch: Record,
+    complete: Flags,
 ) -> None:
     """Write whether the chattering after the first uplift was complete, for each block that started at rest."""
     for k in range(blocks.shape[0]):
