@@ -26,8 +26,8 @@ _SIDES = ("f8", (2,))
 #: increment of the row by a step (0 without a simulation); whether the step may contain an event, whether one of its
 #: substeps may, whether its series is too short, whether to try it; length of the sample, accelerations (horizontal,
 #: vertical) of the unscaled motion at its start, and their slopes; u, u' and (nonlinear) sin and cos(alpha - u) before
-#: and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation; rotation of overturning; usual
-#: length of a sample; factor on the motion.
+#: and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation; rotation of overturning;
+#: usual length of a sample; factor on the motion.
 GROUP = np.dtype(
     [
         (name, "i8", (WIDTH,))
