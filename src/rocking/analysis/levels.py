@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -42,9 +43,8 @@ def number_groups(labels: object, name: str, count: int, item: str = "outcome") 
     """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
     entries = checks.items(labels, name, InvalidOption)
     if len(entries) != count or not all(isinstance(label, Hashable) for label in entries):
-        raise InvalidOption(
-            f"{{}} must contain {count} labels (numbers or texts), one for each {item}", name, value=labels
-        )
+        message = f"{{}} must contain {count} labels (numbers or texts), one for each {item}"
+        raise InvalidOption(message, name, value=labels)
     return number_labels([(k,) if _is_missing(label) else label for k, label in enumerate(entries)])
 
 
@@ -96,8 +96,7 @@ BY_STATION: Final = "station"
 
 def describe_blocks(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Describe a block by its sizes or parameters, several by their number."""
-    block = find_single_block(blocks)
-    if block is None:
+    if (block := find_single_block(blocks)) is None:
         return format_count(len(gather_bodies(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
         return block.description
@@ -151,9 +150,8 @@ def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integer
     if isinstance(labels, str) and labels == BY_STATION:
         labels = stations
         if not any(stations):
-            raise InvalidOption(
-                f"{{}} {BY_STATION} requires records that name their station; give a label for each motion", "clusters"
-            )
+            message = f"{{}} {BY_STATION} requires records that name their station; give a label for each motion"
+            raise InvalidOption(message, "clusters")
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -172,20 +170,16 @@ def describe_sample(clusters: Integers, labels: object) -> str:
 def number_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
     """Assign numbers to families of motions that are equal up to a factor, also a negative one if ``reversed_too``."""
     # Invariants of scale and sign. Only motions with equal invariants are compared in full.
-    invariants = np.empty((len(motions), 2))
+    invariants, first_members = np.empty((len(motions), 2)), list[int]()
+    families = np.empty(len(motions), dtype=np.int64)
     for k, motion in enumerate(motions):
         magnitudes = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
         invariants[k] = (magnitudes / magnitudes.max()).mean(), np.sqrt(((magnitudes / magnitudes.max()) ** 2).mean())
-    representatives: list[int] = []
-    families = np.empty(len(motions), dtype=np.int64)
-    for k, motion in enumerate(motions):
-        candidates = np.flatnonzero(np.all(np.abs(invariants[representatives] - invariants[k]) <= 1e-9, axis=1))
-        matches = (
-            int(j) for j in candidates if is_multiple(motions[representatives[j]], motion, reversed_too=reversed_too)
-        )
-        families[k] = next(matches, len(representatives))
-        if families[k] == len(representatives):
-            representatives.append(k)
+        candidates = np.flatnonzero(np.all(np.abs(invariants[first_members] - invariants[k]) <= 1e-9, axis=1)).tolist()
+        is_alike = (is_multiple(motions[first_members[j]], motion, reversed_too=reversed_too) for j in candidates)
+        families[k] = next(compress(candidates, is_alike), len(first_members))
+        if families[k] == len(first_members):
+            first_members.append(k)
     return families
 
 
@@ -216,7 +210,11 @@ def simulate_levels(
     return ordered.assign_coords(body_coordinates(blocks))
 
 
-def compute_ratios(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: Floats | float) -> Floats:
+#: Variables of a table of simulations from which `compute_ratios` is computed.
+RATIO_VARIABLES: Final = ("peak_rotation", "overturned", "unfinished")
+
+
+def compute_ratios(slenderness: Floats | float, peak: Floats, overturned: Flags, unfinished: Flags) -> Floats:
     """Compute ratios of peak rotation to slenderness: infinite for overturning, NaN for abandoned simulations."""
     return np.asarray(np.where(unfinished, np.nan, np.where(overturned, np.inf, peak / slenderness)))
 
@@ -259,6 +257,7 @@ def create_outcome_table(
 
     signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
     motion_names = [name for name in ("motion", "vertical") if name in table.coords]
+    exceeded = {state: exceeds_limit(ratio, limit, state).ravel() for state, limit in limit_states.items()}
     return pd.DataFrame(
         {
             **{name: expand(table[name].values[:, None, None]) for name in motion_names},
@@ -269,10 +268,7 @@ def create_outcome_table(
             "peak_over_alpha": ratio.ravel(),
             "overturned": table.overturned.values.ravel(),
             "unfinished": table.unfinished.values.ravel(),
-            **{
-                f"exceeded_{name}": exceeds_limit(ratio, limit, name).ravel().astype(bool)
-                for name, limit in limit_states.items()
-            },
+            **{f"exceeded_{state}": flags.astype(bool) for state, flags in exceeded.items()},
         }
     )
 
@@ -294,6 +290,11 @@ def note_missing(unfinished: Flags) -> None:
     """Report abandoned simulations, which count as half overturned."""
     if text := describe_missing(unfinished):
         note(f"{text}, and each counts as half overturned")
+
+
+def list_missing_notes(unfinished: Flags) -> list[str]:
+    """List the note on abandoned simulations, if there are any."""
+    return [f"note: {message}"] if (message := describe_missing(unfinished)) else []
 
 
 def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags) -> str:
@@ -348,7 +349,7 @@ def find_boundaries(
         while (is_wide := bisection.is_wide(brackets.low, brackets.high, rtol)).any():
             outcomes = brackets.below.copy()
             outcomes[is_wide] = find_outcome(brackets.column[is_wide], brackets.level[is_wide])
-            brackets, origin = _bisect_brackets(brackets, is_wide, outcomes, origin)
+            brackets, origin = _bisect(brackets, is_wide, outcomes, origin)
             # A third outcome adds brackets, for which the progress bar does not move back.
             previous, remaining = remaining, min(remaining, _count_bisections(brackets, rtol))
             bar.advance(previous - remaining)
@@ -361,21 +362,13 @@ def _count_bisections(brackets: Boundaries, rtol: float) -> int:
     return int(np.ceil(np.log2(np.maximum(1.0, (brackets.high - brackets.low) / (rtol * brackets.high)))).sum())
 
 
-def _bisect_brackets(
-    brackets: Boundaries, is_wide: Flags, outcomes: Integers, origin: Integers
-) -> tuple[Boundaries, Integers]:
+def _bisect(brackets: Boundaries, is_wide: Flags, outcomes: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
     """Bisect wide brackets, and split those with a third outcome."""
+    column, low, high, below, above = vars(brackets).values()
     has_few_changes = np.bincount(origin)[origin] < 64
-    is_third = is_wide & has_few_changes & (outcomes != brackets.below) & (outcomes != brackets.above)
-    moves_up = is_wide & (outcomes == brackets.below)
-    low, high = bisection.halve(brackets.low, brackets.high, moves_up, is_wide & ~moves_up)
-    lower = Boundaries(brackets.column, low, high, brackets.below, np.where(is_third, outcomes, brackets.above))
-    upper = Boundaries(
-        brackets.column[is_third],
-        brackets.level[is_third],
-        brackets.high[is_third],
-        outcomes[is_third],
-        brackets.above[is_third],
-    )
-    both = (np.concatenate(pair) for pair in zip(vars(lower).values(), vars(upper).values(), strict=True))
-    return Boundaries(*both), np.concatenate([origin, origin[is_third]])
+    is_third = is_wide & has_few_changes & (outcomes != below) & (outcomes != above)
+    moves_up = is_wide & (outcomes == below)
+    new_low, new_high = bisection.halve(low, high, moves_up, is_wide & ~moves_up)
+    lower = column, new_low, new_high, below, np.where(is_third, outcomes, above)
+    upper = (values[is_third] for values in (column, brackets.level, high, outcomes, above))
+    return Boundaries(*map(np.append, lower, upper)), np.append(origin, origin[is_third])

@@ -250,7 +250,7 @@ def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
                 "without a duration"
             )
         alpha = compute_slenderness(store.product.bodies.select(blocks))
-        yield blocks, compute_ratios(peak, overturned != 0.0, unfinished != 0.0, alpha)
+        yield blocks, compute_ratios(alpha, peak, overturned != 0.0, unfinished != 0.0)
 
 
 def _mark_repeated(bodies: Bodies, polarities: int) -> Flags:
