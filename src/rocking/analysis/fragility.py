@@ -259,7 +259,8 @@ class Fragility(Result):
             names = ("limit_state", self.measure.column, "probability", "lower", "upper")
             return [*map(Column, names, [limit_states, *values])]
         if self.outcomes is None:
-            raise InvalidOption("this fragility was fitted to observed outcomes, and has no simulations to write")
+            origin = "this fragility was fitted to observed outcomes"
+            raise InvalidOption(f"{origin}, so that there are no simulations to write")
         return [Column(str(name), self.outcomes[name]) for name in self.outcomes]
 
     def to_nrml(
