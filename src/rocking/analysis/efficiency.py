@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import (
     MIRROR_NOTE,
+    assign_clusters,
+    assign_families,
     compute_intensities,
     compute_units,
     describe_pool,
     describe_sample,
     normalise_weights,
-    number_clusters,
-    number_families,
 )
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
@@ -111,7 +111,7 @@ def compare_measures(
     period_values = checks.positive_numbers(periods, "periods", InvalidOption)
     spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
     measures = [Measure("pga"), Measure("pgv"), *spectral_measures, Measure("pga_ratio"), Measure("pgv_ratio")]
-    cluster_numbers = number_clusters(motions, clusters)
+    cluster_numbers = assign_clusters(motions, clusters)
     _check_sample_size(len(np.unique(cluster_numbers)), clusters)
     analysis = incremental_dynamic_analysis(bodies, motions, measure="pga_ratio", model=model, rtol=rtol)
     levels = analysis.data.overturning_level.transpose("motion", "block").values
@@ -119,7 +119,7 @@ def compare_measures(
     units = [compute_units(bodies, measure, model) for measure in measures]
     factors = levels * units[-2] / values[0]  # on the motions; levels are of pga_ratio
     intensity = np.array([factors * value / unit for value, unit in zip(values, units, strict=True)])
-    families = number_families(motions, reversed_too=bodies.is_symmetric)
+    families = assign_families(motions, reversed_too=bodies.is_symmetric)
     is_first = np.isin(np.arange(len(motions)), np.unique(families, return_index=True)[1])
     is_counted = is_first[:, None] & np.isfinite(levels)
     cluster_counts = [len(np.unique(cluster_numbers[overturns])) for overturns in is_counted[:, block_weights > 0.0].T]

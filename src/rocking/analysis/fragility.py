@@ -26,8 +26,11 @@ from rocking.analysis.curve import (
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
     RATIO_VARIABLES,
+    assign_clusters,
+    assign_groups,
     check_limit_states,
     check_state_mapping,
+    compute_exceedances,
     compute_intensities,
     compute_ratios,
     compute_units,
@@ -36,11 +39,8 @@ from rocking.analysis.levels import (
     describe_pool,
     describe_sample,
     describe_undecided,
-    exceeds_limit,
     find_single_block,
     normalise_positive_weights,
-    number_clusters,
-    number_groups,
     simulate_levels,
 )
 from rocking.analysis.risk import Risk, Survival, compute_mean_survival, compute_risk
@@ -406,7 +406,7 @@ def fragility(
     if stripes is not None and stripes.size < 2:
         raise InvalidOption(f"{{}} must contain at least two levels; got {stripes.size}", "levels", value=levels)
     motions = list_motions(motions)
-    values, cluster_numbers = compute_intensities(motions, measure), number_clusters(motions, clusters)
+    values, cluster_numbers = compute_intensities(motions, measure), assign_clusters(motions, clusters)
     units = compute_units(bodies, measure, model)
     options: dict[str, Any] = {"chattering": chattering, "polarity": "+" if mirrored else polarity}
     if stripes is None:
@@ -430,7 +430,7 @@ def fragility(
     curves = []
     try:
         for name, limit in states.items():
-            data = x, trials * exceeds_limit(ratio, limit, name).ravel()[is_counted], trials
+            data = x, trials * compute_exceedances(ratio, limit, name).ravel()[is_counted], trials
             curves.append(fit_curve(name, data, trial_clusters, confidence, measure, limit))
     except Unfitted as error:
         error.outcomes = outcomes
@@ -524,7 +524,7 @@ def fit_fragility(
         checks.between(float(end), "intensity", InvalidOption, 1e-50, 1e50)
     counts = check_counts(trials, "trials", x.size, 1.0, 2.0**53)
     outcomes = check_state_mapping(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
-    groups = None if clusters is None else number_groups(clusters, "clusters", x.size)
+    groups = None if clusters is None else assign_groups(clusters, "clusters", x.size)
     checks.fraction(confidence, "confidence", InvalidOption)
     curves = [
         fit_curve(name, (x, check_counts(values, "exceeded", x.size, 0.0, counts), counts), groups, confidence, measure)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rocking.analysis.levels import (
     MIRROR_NOTE,
-    Boundaries,
+    Brackets,
     compose_motion_labels,
     compute_intensities,
     compute_units,
@@ -318,7 +318,7 @@ def _simulate_until_overturned(
 
 
 def _combine_bands(
-    table: xr.Dataset, flat_grid: Integers, brackets: Boundaries, alpha: Floats, measure: Measure
+    table: xr.Dataset, flat_grid: Integers, brackets: Brackets, alpha: Floats, measure: Measure
 ) -> xr.Dataset:
     """Pair the levels of outcome changes in a (level, column) grid, NaN for bands beyond it."""
     import xarray as xr

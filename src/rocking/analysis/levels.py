@@ -33,19 +33,19 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def number_labels(labels: Sequence[object]) -> Integers:
+def assign_numbers(labels: Sequence[object]) -> Integers:
     """Replace labels by integers in the order of first appearance."""
     numbers: dict[object, int] = {}
     return np.array([numbers.setdefault(label, len(numbers)) for label in labels], dtype=np.int64)
 
 
-def number_groups(labels: object, name: str, count: int, item: str = "outcome") -> Integers:
+def assign_groups(labels: object, name: str, count: int, item: str = "outcome") -> Integers:
     """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
     entries = checks.items(labels, name, InvalidOption)
     if len(entries) != count or not all(isinstance(label, Hashable) for label in entries):
         message = f"{{}} must contain {count} labels (numbers or texts), one for each {item}"
         raise InvalidOption(message, name, value=labels)
-    return number_labels([(k,) if _is_missing(label) else label for k, label in enumerate(entries)])
+    return assign_numbers([(k,) if _is_missing(label) else label for k, label in enumerate(entries)])
 
 
 def _is_missing(label: object) -> bool:
@@ -137,9 +137,9 @@ def compute_intensities(motions: Sequence[Motion], measure: Measure) -> Floats:
     return np.array([measure.require_positive_value(motion, motion.name) for motion in motions])
 
 
-def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integers:
+def assign_clusters(motions: Sequence[Motion], labels: object = None) -> Integers:
     """Assign numbers to clusters of motions with equal labels ("station": of one record) or equal up to a factor."""
-    families, origins = number_families(motions), [motion.description.origin or Origin() for motion in motions]
+    families, origins = assign_families(motions), [motion.description.origin or Origin() for motion in motions]
     stations = [f"{origin.event}, {origin.station}" if origin.station else "" for origin in origins]
     if labels is None:
         stations_by_family = {family: station for family, station in zip(families, stations, strict=True) if station}
@@ -156,9 +156,9 @@ def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integer
     from scipy.sparse.csgraph import connected_components
 
     count = len(motions)
-    label_numbers = number_groups(labels, "clusters", count, "motion")
+    label_numbers = assign_groups(labels, "clusters", count, "motion")
     links = coo_array((np.ones(count), (families, count + label_numbers)), shape=(2 * count, 2 * count))
-    return number_labels(connected_components(links, directed=False)[1][families].tolist())
+    return assign_numbers(connected_components(links, directed=False)[1][families].tolist())
 
 
 def describe_sample(clusters: Integers, labels: object) -> str:
@@ -167,7 +167,7 @@ def describe_sample(clusters: Integers, labels: object) -> str:
     return text if labels is None else f"{text} in {format_count(len(np.unique(clusters)), 'cluster')}"
 
 
-def number_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
+def assign_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
     """Assign numbers to families of motions that are equal up to a factor, also a negative one if ``reversed_too``."""
     # Invariants of scale and sign. Only motions with equal invariants are compared in full.
     invariants, first_members = np.empty((len(motions), 2)), list[int]()
@@ -219,7 +219,7 @@ def compute_ratios(slenderness: Floats | float, peak: Floats, overturned: Flags,
     return np.asarray(np.where(unfinished, np.nan, np.where(overturned, np.inf, peak / slenderness)))
 
 
-def exceeds_limit(ratio: Floats, limit: float, name: str) -> Floats:
+def compute_exceedances(ratio: Floats, limit: float, name: str) -> Floats:
     """Compare ratios of peak rotation to slenderness with a limit (infinite: overturning); 1 if exceeded, else 0."""
     limit = check_limit(limit, name)
     return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
@@ -257,7 +257,7 @@ def create_outcome_table(
 
     signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
     motion_names = [name for name in ("motion", "vertical") if name in table.coords]
-    exceeded = {state: exceeds_limit(ratio, limit, state).ravel() for state, limit in limit_states.items()}
+    exceeded = {state: compute_exceedances(ratio, limit, state).ravel() for state, limit in limit_states.items()}
     return pd.DataFrame(
         {
             **{name: expand(table[name].values[:, None, None]) for name in motion_names},
@@ -318,7 +318,7 @@ def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLi
 
 
 @dataclass(frozen=True, eq=False)
-class Boundaries:
+class Brackets:
     """Brackets (low, high) of changes of the outcome in columns of a grid, sorted by column and level."""
 
     column: Integers
@@ -335,14 +335,14 @@ class Boundaries:
 
 def find_boundaries(
     levels: Floats, outcome: Integers, find_outcome: Callable[[Integers, Floats], Integers], *, rtol: float
-) -> Boundaries:
+) -> Brackets:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
     A bracket with a third outcome is split, but in an interval with 64 changes or more only one half is followed.
     Changes between two levels of equal outcome are not detected.
     """
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
-    brackets = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
+    brackets = Brackets(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
     origin = np.arange(len(brackets.level))
     remaining = _count_bisections(brackets, rtol)
     with Progress("refining", remaining) as bar:
@@ -354,15 +354,15 @@ def find_boundaries(
             previous, remaining = remaining, min(remaining, _count_bisections(brackets, rtol))
             bar.advance(previous - remaining)
     order = np.lexsort((brackets.low, brackets.column))
-    return Boundaries(*(values[order] for values in vars(brackets).values()))
+    return Brackets(*(values[order] for values in vars(brackets).values()))
 
 
-def _count_bisections(brackets: Boundaries, rtol: float) -> int:
+def _count_bisections(brackets: Brackets, rtol: float) -> int:
     """Count the bisections that brackets still need."""
     return int(np.ceil(np.log2(np.maximum(1.0, (brackets.high - brackets.low) / (rtol * brackets.high)))).sum())
 
 
-def _bisect(brackets: Boundaries, is_wide: Flags, outcomes: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
+def _bisect(brackets: Brackets, is_wide: Flags, outcomes: Integers, origin: Integers) -> tuple[Brackets, Integers]:
     """Bisect wide brackets, and split those with a third outcome."""
     column, low, high, below, above = vars(brackets).values()
     has_few_changes = np.bincount(origin)[origin] < 64
@@ -371,4 +371,4 @@ def _bisect(brackets: Boundaries, is_wide: Flags, outcomes: Integers, origin: In
     new_low, new_high = bisection.halve(low, high, moves_up, is_wide & ~moves_up)
     lower = column, new_low, new_high, below, np.where(is_third, outcomes, above)
     upper = (values[is_third] for values in (column, brackets.level, high, outcomes, above))
-    return Boundaries(*map(np.append, lower, upper)), np.append(origin, origin[is_third])
+    return Brackets(*map(np.append, lower, upper)), np.append(origin, origin[is_third])

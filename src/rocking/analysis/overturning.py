@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.analysis.levels import Boundaries, find_boundaries, list_missing_notes
+from rocking.analysis.levels import Brackets, find_boundaries, list_missing_notes
 from rocking.block import Block, Blocks
 from rocking.block.single import require_block
 from rocking.core import checks
@@ -400,7 +400,7 @@ def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio:
 
 
 def _combine_modes(
-    levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, brackets: Boundaries, attributes: dict[str, Any]
+    levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, brackets: Brackets, attributes: dict[str, Any]
 ) -> xr.Dataset:
     import xarray as xr
 
