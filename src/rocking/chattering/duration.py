@@ -236,9 +236,8 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
             break
         capacity *= 2
         if capacity > _MAX_CAPACITY:
-            raise InvalidOption(
-                f"the sequence has more than {_MAX_CAPACITY} impacts: reduce {{}} = {eta!r}", "eta", value=eta
-            )
+            message = f"the sequence has more than {_MAX_CAPACITY} impacts: reduce {{}} = {eta!r}"
+            raise InvalidOption(message, "eta", value=eta)
     # A sequence that lasts almost half a period may have the critical amplitude within rounding error.
     if status == SequenceStatus.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - 1e-6):
         # If rounding error decides, `chattering_time` determines the outcome.
@@ -458,11 +457,9 @@ def _bisect_critical_amplitude(omega: float, eta: float, alpha: float) -> float:
 
 def _comes_to_rest(block: Block, a: float, omega: float) -> bool:
     """Whether the block rests within half a period of its first uplift under a sine of amplitude a g tan(alpha)."""
-    amplitude = a * block.gravity * math.tan(block.sides[0].alpha)
-    two_pi = 2.0 * math.pi
-    motion = pulses.sine(
-        amplitude, omega / two_pi, cycles=(math.pi + _LEAD_PHASE) / two_pi, phase=math.asin(1.0 / a) - _LEAD_PHASE
-    )
+    amplitude, two_pi = a * block.gravity * math.tan(block.sides[0].alpha), 2.0 * math.pi
+    cycles, phase = (math.pi + _LEAD_PHASE) / two_pi, math.asin(1.0 / a) - _LEAD_PHASE
+    motion = pulses.sine(amplitude, omega / two_pi, cycles=cycles, phase=phase)
     response = simulate(block, motion, model="nonlinear", duration=motion.duration)
     require_finished(response.unfinished)
     return bool((response.events["kind"] == "rest").any())

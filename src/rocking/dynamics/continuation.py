@@ -191,11 +191,10 @@ class _BranchWalk:
         """Take a step along the branch or shorten it, and return the reason if the branch ends."""
         equations = self.equations
         if self.distance_to_end < _MIN_STEP:
-            reason = self.find_reason_of_end()
+            reason = self.find_end_reason()
             values = [(self.z + step * self.tangent)[2] for step in (0.0, self.distance_to_end)]
-            self.bifurcations += (
-                [] if reason == branches.LOST else [equations.create_bifurcation(reason, self.z, values)]
-            )
+            ending = [] if reason == branches.LOST else [equations.create_bifurcation(reason, self.z, values)]
+            self.bifurcations += ending
             return reason
         result = self.try_step()
         if result is None:
@@ -258,16 +257,12 @@ class _BranchWalk:
             return None
         new_tangent = compute_tangent(point.jacobian, tangent)
         # A point far from the prediction belongs to another branch.
-        self.is_bent = bool(
-            np.linalg.norm(point.z - guess) > _MAX_OFFSET * self.step or new_tangent @ tangent < _MIN_COSINE
-        )
+        offset = np.linalg.norm(point.z - guess)
+        self.is_bent = bool(offset > _MAX_OFFSET * self.step or new_tangent @ tangent < _MIN_COSINE)
         if self.is_bent:
             return None
         tests, new_tests = self.tests, point.compute_tests(new_tangent)
-        if (
-            tests.multiplier_one * new_tests.multiplier_one < 0.0
-            and tests.multiplier_minus_one * new_tests.multiplier_minus_one < 0.0
-        ):
+        if all(old * new < 0.0 for old, new in zip(tests[:2], new_tests[:2], strict=True)):
             return None  # A multiplier passes 1 and -1, or changes sign through infinity at a grazing impact.
         if self.turns_without_fold(new_tests) and max(abs(tests.multiplier_one), abs(new_tests.multiplier_one)) > 0.05:
             return None  # The turn is too far away, or a difference of the parameter extends past an end.
@@ -293,19 +288,13 @@ class _BranchWalk:
     def locate_junction(self, z: Floats) -> Bifurcation:
         """Locate the point at which the branch meets orbits of half the period, or symmetric orbits."""
         equations, middle = self.equations, 0.5 * (self.z + z)
-        is_even = equations.period % 2 == 0
-        parent = replace(
-            equations, period=equations.period // 2 if is_even else equations.period, uses_half_map=not is_even
-        )
-        kind = branches.FLIP if is_even else branches.SYMMETRY_BREAKING
-        for fraction in (
-            _SEARCH_FRACTIONS
-            if is_even or has_mirror_symmetry(equations.create_map(equations.to_physical(middle)[1]))
-            else ()
-        ):
-            if bifurcation := parent.locate_bifurcation(
-                kind, middle - fraction * PARAMETER_AXIS, PARAMETER_AXIS, 2.0 * fraction, 1
-            ):
+        period, is_odd = equations.period, equations.period % 2 == 1
+        kind = branches.SYMMETRY_BREAKING if is_odd else branches.FLIP
+        parent = replace(equations, period=period if is_odd else period // 2, uses_half_map=is_odd)
+        has_parent = not is_odd or has_mirror_symmetry(equations.create_map(equations.to_physical(middle)[1]))
+        for fraction in _SEARCH_FRACTIONS if has_parent else ():
+            start = middle - fraction * PARAMETER_AXIS
+            if bifurcation := parent.locate_bifurcation(kind, start, PARAMETER_AXIS, 2.0 * fraction, 1):
                 return bifurcation
         return equations.create_bifurcation(branches.BRANCH_POINT, middle, [self.z[2], z[2]])
 
@@ -324,9 +313,7 @@ class _BranchWalk:
         if len(fitted) < 4:
             return None
         speeds, values = zip(*fitted, strict=True)
-        estimates = [
-            interpolate_at_zero(speeds[:count], values[:count]) for count in range(len(fitted) - 2, len(fitted) + 1)
-        ]
+        estimates = [interpolate_at_zero(speeds[:n], values[:n]) for n in range(len(fitted) - 2, len(fitted) + 1)]
         if abs(estimates[-1] - estimates[-2]) > 1e-6:
             return None
         bifurcation = equations.create_bifurcation(branches.GRAZING, self.z, estimates)
@@ -334,9 +321,8 @@ class _BranchWalk:
 
     def has_returned(self) -> bool:
         """Whether the branch has returned to its first point in its initial direction."""
-        first, second, before, last = (
-            np.append(self.points[k][1], self.points[k][0]) / self.equations.sizes for k in (0, 1, -2, -1)
-        )
+        points = (self.points[k] for k in (0, 1, -2, -1))
+        first, second, before, last = (np.append(state, value) / self.equations.sizes for value, state, *_ in points)
         near = np.linalg.norm(last - first) < np.linalg.norm(last - before)
         return bool(near and (last - before) @ (second - first) > 0.0)
 
@@ -365,7 +351,7 @@ class _BranchWalk:
             self.equations = shifted
             self.move_to(solution, tangent)
 
-    def find_reason_of_end(self) -> str:
+    def find_end_reason(self) -> str:
         """Return the reason why the branch ends just beyond its last point."""
         kind, beyond = self.equations.kind, self.z + 8.0 * _MIN_STEP * self.tangent
         rests_differently = False

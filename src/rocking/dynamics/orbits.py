@@ -123,18 +123,18 @@ class PeriodicOrbit(Result):
             events = "with complete chattering"
         else:
             events = f"with {format_count(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
-        return (
-            f"{stable}{' symmetric' if self.symmetric else ''} orbit of {format_count(self.period, 'period')} {events}"
-        )
+        symmetric = " symmetric" if self.symmetric else ""
+        return f"{stable}{symmetric} orbit of {format_count(self.period, 'period')} {events}"
 
     @property
     def _multipliers(self) -> str:
         """Format the multipliers with three digits."""
-        signs = ("-" if multiplier.imag < 0.0 else "+" for multiplier in self.multipliers)
-        return ", ".join(
-            f"{multiplier.real:.3g}" + (f" {sign} {abs(multiplier.imag):.3g}i" if multiplier.imag else "")
-            for multiplier, sign in zip(self.multipliers, signs, strict=True)
-        )
+        texts = []
+        for multiplier in self.multipliers:
+            sign = "-" if multiplier.imag < 0.0 else "+"
+            imaginary = f" {sign} {abs(multiplier.imag):.3g}i" if multiplier.imag else ""
+            texts.append(f"{multiplier.real:.3g}{imaginary}")
+        return ", ".join(texts)
 
     def _headline(self) -> str:
         return f"{self._description}, multipliers {self._multipliers}"
@@ -213,13 +213,10 @@ def simulate_periods(strobe: StroboscopicMap, state: Floats, periods: int) -> Re
     # The motion after the end determines how long a chattering sequence lasts.
     starts = strobe.forcing_period * np.arange(periods + 1)
     breakpoints = np.append((starts[:, None] + motion.breakpoints[:-1]).ravel(), strobe.forcing_period * (periods + 1))
-    repeated = Motion(
-        breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
-    )
-    start = float(state[0]), float(state[1])
-    response = compute_response(
-        strobe.body, repeated, strobe.model, strobe.chattering, duration, start, "initial_position"
-    )
+    coefficients = np.tile(motion.coefficients, (periods + 1, 1))
+    repeated = Motion(breakpoints, coefficients, motion.name, motion.description, error=motion.error)
+    start, name = (float(state[0]), float(state[1])), "initial_position"
+    response = compute_response(strobe.body, repeated, strobe.model, strobe.chattering, duration, start, name)
     return convert_to_positions(response) if isinstance(strobe.body, LinearBody) else response
 
 
@@ -429,9 +426,8 @@ class _OrbitSearch:
             # A step that does not reduce the residual is halved.
             for halving in range(5):
                 remaining = np.flatnonzero(~better)
-                candidates = self.map_with_derivatives(
-                    rows[active[remaining], :2] + 0.5**halving * steps[remaining], n_periods
-                )
+                trials = rows[active[remaining], :2] + 0.5**halving * steps[remaining]
+                candidates = self.map_with_derivatives(trials, n_periods)
                 # A step that is already accurate to rounding need not reduce the residual.
                 better[remaining] = reduced = self.compute_residuals(candidates)[0] < residual[active[remaining]]
                 new[remaining[reduced]] = candidates[reduced]
