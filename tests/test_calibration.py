@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 import rocking
 from rocking.calibration import search as searching
-from rocking.calibration.diagnostics import Scores, find_bounds_reached
+from rocking.calibration.diagnostics import Scores, list_bounds_reached
 from rocking.calibration.history import HistoryCalibration
 from rocking.calibration.outcomes import label_groups
 from rocking.calibration.search import MAX_R_HAT, Candidates, Evidence, Problem, sample_posterior, search
@@ -691,7 +691,7 @@ def test_a_posterior_whose_interval_ends_at_a_bound_is_told(share, told):
     space = Space.from_bounds((1.0, 10.0), 0.2, 0.9, two_sided=False)
     ends = np.log([9.9, 3.0])
     centres = np.repeat(ends, [round(1000 * share), 1000 - round(1000 * share)])[:, None]
-    notes = [str(one) for one in find_bounds_reached(space, centres)]
+    notes = [str(one) for one in list_bounds_reached(space, centres)]
     assert len(notes) == told
     assert all("8 % of the posterior" in note and "sets the upper end of the interval" in note for note in notes)
 

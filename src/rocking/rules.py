@@ -285,7 +285,7 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     ASCE (2005). Seismic Design Criteria for Structures, Systems, and Components in Nuclear Facilities. ASCE/SEI 43-05,
     Appendix A, section A.2.
     """
-    return _find_min_ratio(blocks, motion, _create_energy_oscillator)
+    return _compute_min_ratio(blocks, motion, _create_energy_oscillator)
 
 
 @_rule("m", "1.070")
@@ -328,7 +328,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     if restitution <= lowest:
         message = f"the rule priestley requires a restitution above {lowest:.2g}, where its damping is below critical"
         raise InvalidBlock(f"{message}; got {restitution:g}; omit this rule")
-    return _find_min_ratio(blocks, motion, _create_free_rocking_oscillator)
+    return _compute_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 
 
 def apply_rules(
@@ -397,7 +397,7 @@ def _create_free_rocking_oscillator(p: float, alpha: float, restitution: float, 
     return _Oscillator(periods, damping, displacements, (periods / (2.0 * np.pi)) ** 2)
 
 
-def _find_min_ratio(
+def _compute_min_ratio(
     blocks: Blocks, motion: Motion, create_oscillator: Callable[[float, float, float, float], _Oscillator]
 ) -> tuple[Floats, Floats]:
     """Find demand and capacity of the sides of blocks at the rotation with the smallest ratio."""
@@ -464,10 +464,8 @@ def compare_rules(
     names = None if rules is None else checks.items(rules, "rules", InvalidOption)
     # Raise errors before the simulations.
     compute_intensities([*named_motions.values()], Measure("pga"))
-    ratios = [
-        {name: float(rating.ratio[0]) for name, rating in apply_rules(block, motion, names).items()}
-        for motion in named_motions.values()
-    ]
+    ratings = [apply_rules(block, motion, names) for motion in named_motions.values()]
+    ratios = [{name: float(rating.ratio[0]) for name, rating in by_name.items()} for by_name in ratings]
     responses, margins = [], []
     with Progress("checking", total=len(named_motions)) as bar:
         for motion in named_motions.values():

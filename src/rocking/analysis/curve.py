@@ -127,7 +127,7 @@ class FragilityCurve:
     @property
     def median_interval(self) -> tuple[float, float]:
         """Confidence interval of the median, 0 or infinite if the data allow a curve that does not rise."""
-        low, high = find_extremes(self.region, _compute_log_medians)
+        low, high = compute_extremes(self.region, _compute_log_medians)
         with np.errstate(over="ignore"):
             return float(np.exp(low[0])), float(np.exp(high[0]))
 
@@ -172,7 +172,7 @@ class FragilityCurve:
 
         intensities = check_intensities(intensity)
         log_intensity = _compute_logarithm(intensities).ravel()
-        score_bounds = find_extremes(self.region, lambda fits: compute_normal_scores(fits, log_intensity))
+        score_bounds = compute_extremes(self.region, lambda fits: compute_normal_scores(fits, log_intensity))
         low, high = (unwrap_scalar(np.asarray(ndtr(scores)).reshape(intensities.shape)) for scores in score_bounds)
         return low, high
 
@@ -235,7 +235,7 @@ def fit_curve(
         independent=independent,
         log_likelihood=float(probit.compute_log_likelihood(outcomes.as_batch(), np.column_stack(fitted))[0]),
         goodness=probit.compute_goodness(outcomes, fitted, independent=independent),
-        region=probit.find_confidence_region(outcomes, fitted, None if independent else clusters, confidence),
+        region=probit.compute_confidence_region(outcomes, fitted, None if independent else clusters, confidence),
     )
 
 
@@ -269,7 +269,7 @@ def check_counts(values: ArrayLike, argument: str, size: int, minimum: float, ma
     return numbers
 
 
-def find_extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:
+def compute_extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:
     """Find the lowest and the highest values of a quantity (fits, n) in a region of fits."""
     values = quantity(region)
     return values.min(axis=0), values.max(axis=0)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -103,8 +102,8 @@ def response_rose(
     import xarray as xr
 
     if not isinstance(solid, Solid):
-        found = type(solid).__name__
-        raise InvalidBlock(f"a Solid is required, not a {found}; create one with rocking.Solid.from_mesh")
+        kind = type(solid).__name__
+        raise InvalidBlock(f"a Solid is required, not a {kind}; create one with rocking.Solid.from_mesh")
     named_pairs = _name_pairs(pairs)
     angles = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
     scales = Scales.from_levels(levels, measure)
@@ -168,9 +167,11 @@ class ResponseRose(DatasetResult):
     [0.0, 0.0]
     """
 
-    TABLES = MappingProxyType(
-        {"responses": ("overturned", "peak_over_slenderness"), "shares": ("overturned_share",), "levels": ("anywhere",)}
-    )
+    TABLES: ClassVar = {
+        "responses": ("overturned", "peak_over_slenderness"),
+        "shares": ("overturned_share",),
+        "levels": ("anywhere",),
+    }
     POOLED = ("pair", "azimuth")
 
     def _headline(self) -> str:

@@ -139,8 +139,8 @@ class Fragility(Result):
             ]
             for curve in self.curves
         ]
-        between = f"{100 * self.curves[0].confidence:g} % between"
-        table = format_table(["limit state", "exceeded", "median", between, "dispersion", between, "p of fit"], rows)
+        heading = f"{100 * self.curves[0].confidence:g} % between"
+        table = format_table(["limit state", "exceeded", "median", heading, "dispersion", heading, "p of fit"], rows)
         notes = [f"note: {sentence}" for sentence in self.notes]
         return "\n".join([f"{self.description}; intensity: {self.measure.label}", "", table, *notes])
 

@@ -1,11 +1,10 @@
-"""Incremental dynamic analysis, and critical scales of motions."""
+"""Incremental dynamic analysis: bands of levels at which scaled motions overturn blocks."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
@@ -14,9 +13,9 @@ from numpy.typing import ArrayLike
 from rocking.analysis.levels import (
     MIRROR_NOTE,
     Brackets,
-    compose_motion_labels,
     compute_intensities,
     compute_units,
+    create_motion_labels,
     describe_blocks,
     describe_undecided,
     find_boundaries,
@@ -26,7 +25,6 @@ from rocking.analysis.levels import (
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.core.bisection import bisect
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
 from rocking.core.tables import add_unit, escape_dollars, format_count, format_table
@@ -36,9 +34,7 @@ from rocking.engine.tasks import Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.records.named import Motions, check_motion, list_motions
-from rocking.response import Gradient, gradient
-from rocking.simulation.simulate import simulate
+from rocking.records.named import Motions, list_motions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -121,13 +117,11 @@ def incremental_dynamic_analysis(
     slenderness = compute_slenderness(bodies)
     values = compute_intensities(motion_list, measure)
     if never_rests(bodies):
-        raise InvalidOption(
-            "{} must be below 1 for an incremental dynamic analysis, because otherwise the block never comes to rest",
-            "restitution",
-        )
+        reason = "because otherwise the block never comes to rest"
+        raise InvalidOption(f"{{}} must be below 1 for an incremental dynamic analysis, {reason}", "restitution")
     relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model}
-    lowest_uplift = _find_lowest_uplift(bodies, motion_list, values, measure, model)
+    lowest_uplift = _compute_lowest_uplift(bodies, motion_list, values, measure, model)
     if levels is None:
         table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
     else:
@@ -137,7 +131,7 @@ def incremental_dynamic_analysis(
     # The scheme of the levels determines how often the restitution is drawn.
     setup = Setup(bodies, model, Certified())
 
-    def find_overturned(column: Integers, level: Floats) -> Integers:
+    def simulate_overturned(column: Integers, level: Floats) -> Integers:
         is_overturned = np.empty(column.size, dtype=np.int64)
         motion, block = np.divmod(column, len(bodies))
         for m in np.unique(motion):
@@ -150,7 +144,7 @@ def incremental_dynamic_analysis(
 
     grid = table.overturned.transpose("level", "motion", "block").values
     flat_grid = grid.reshape(len(grid), -1).astype(np.int64)
-    brackets = find_boundaries(table.level.values, flat_grid, find_overturned, rtol=relative_width)
+    brackets = find_boundaries(table.level.values, flat_grid, simulate_overturned, rtol=relative_width)
     dataset = _combine_bands(table, flat_grid, brackets, slenderness, measure)
     scales = table.level.values[:, None, None] * factors
     undecided = describe_undecided(setup, motion_list, scales[..., None], grid[..., None])
@@ -223,7 +217,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         coordinate = "record" if "record" in data.coords else "motion"
         rows = [
             [label, *([b] * has_several_blocks), levels.describe_bands(self.bands(block=b, motion=m))]
-            for m, label in enumerate(compose_motion_labels(data, coordinate, with_history=False))
+            for m, label in enumerate(create_motion_labels(data, coordinate, with_history=False))
             for b in range(block_count)
         ]
         blocks = format_count(block_count, "block") if has_several_blocks else data.blocks
@@ -237,6 +231,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         data, units = self.data, self.data.level.units
         peaks = data.peak_over_alpha.transpose("motion", "block", "level").values
         lowest = data.overturning_level.transpose("motion", "block").values
+        ends = add_unit("from", units), add_unit("to", units)
         return {
             "blocks": data.blocks,
             "model": data.model,
@@ -251,10 +246,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
                     **({"vertical": str(data.vertical.values[m])} if "vertical" in data.coords else {}),
                     "block": b,
                     add_unit("overturning_level", units): float(lowest[m, b]),
-                    "overturns": [
-                        {add_unit("from", units): low, add_unit("to", units): high}
-                        for low, high in self.bands(block=b, motion=m)
-                    ],
+                    "overturns": [dict(zip(ends, band, strict=True)) for band in self.bands(block=b, motion=m)],
                     "peak_over_alpha": peaks[m, b],
                 }
                 for m in range(data.sizes["motion"])
@@ -272,7 +264,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         levels = data.level.scale * data.level.values
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
         motions = []
-        for m, label in enumerate(compose_motion_labels(data, with_history=False)):
+        for m, label in enumerate(create_motion_labels(data, with_history=False)):
             bands = data.level.scale * np.array(self.bands(block=block, motion=m)).reshape(-1, 2)
             motions.append(ScaledMotion(label, levels, peaks[m], np.where(np.isnan(bands), levels[[0, -1]], bands)))
         block_text = data.blocks if data.sizes["block"] == 1 else f"block {block}"
@@ -285,7 +277,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         )
 
 
-def _find_lowest_uplift(
+def _compute_lowest_uplift(
     blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model
 ) -> float:
     """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""
@@ -386,132 +378,3 @@ class _LevelDescription:
             return f"at every level looked at, {self.range}"
         open_end = f"up to {high:.5g}{self.unit}" if math.isnan(low) else f"from {low:.5g}{self.unit} on"
         return f"at all levels looked at {open_end}"
-
-
-_NO_BALANCE: Final = (
-    "the outcome changes without the block coming to the balance point: by a touch of the ground without speed, or at "
-    "a rest"
-)
-
-
-@dataclass(frozen=True)
-class CriticalScale:
-    """Critical scale of a motion with its derivatives, computed by `critical_scale`.
-
-    Attributes
-    ----------
-    scale : float
-        Smallest floating-point scale that overturns the block, next to a scale that does not.
-    gradient : Gradient
-        Derivatives with respect to the unscaled motion and the initial state, with the scale in `Gradient.value`. If
-        the outcome changes although the block does not reach the balance point, all derivatives are NaN, and
-        `Gradient.reason` explains this.
-    p, alpha, restitution : float
-        Derivatives with respect to relative changes of these parameters on both sides. Times 1e-3, they are changes of
-        the scale for 0.1 %.
-
-    See Also
-    --------
-    rocking.gradient : Compute derivatives of a response.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    >>> critical = rocking.critical_scale(block, record, (2.0, 6.0))
-    >>> f"scale {critical.scale:.4f}, +0.1 % of p {1e-3 * critical.p:+.4f}"
-    'scale 3.2561, +0.1 % of p -0.0023'
-    """
-
-    scale: float
-    gradient: Gradient
-    p: float
-    alpha: float
-    restitution: float
-
-
-def critical_scale(
-    block: Body,
-    motion: Motion,
-    bounds: tuple[float, float],
-    *,
-    model: Model = "nonlinear",
-    initial_rotation: float = 0.0,
-    initial_velocity: float = 0.0,
-) -> CriticalScale:
-    """Find a critical scale of a motion, at which a block begins to overturn, and its derivatives.
-
-    Parameters
-    ----------
-    block : Block
-        Block, or another body that can overturn.
-    motion : Motion
-        Motion, both components of which are scaled.
-    bounds : (float, float)
-        Positive scales that bracket the critical scale: the block stands at the lower one and overturns at the higher
-        one. If the outcome changes several times between them, one of the changes is found.
-    model, initial_rotation, initial_velocity : optional
-        As for `simulate`.
-
-    Returns
-    -------
-    CriticalScale
-        Scale, and derivatives with respect to every sample, the initial state and the block's parameters.
-
-    Raises
-    ------
-    InvalidMotion
-        If `motion` is not a `Motion`.
-    InvalidOption
-        If there is no motion, the block overturns at the lower scale or stands at the higher one, or the scales are not
-        positive and increasing.
-
-    See Also
-    --------
-    rocking.incremental_dynamic_analysis : Find all bands of levels that overturn.
-    rocking.gradient : Compute derivatives of a response.
-
-    Notes
-    -----
-    At the critical scale the response approaches the balance point and stays there. The derivatives follow from the
-    implicit function theorem (see "Impacts: restitution and sensitivity" in the documentation).
-
-    Examples
-    --------
-    >>> import rocking
-    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    >>> f"{rocking.critical_scale(block, record, (2.0, 6.0)).scale:.6f}"
-    '3.256134'
-    """
-    if check_motion(motion) is None:
-        raise InvalidOption("a critical scale requires a {}; got None", "motion")
-    low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
-    checks.positive(low, "bounds", InvalidOption)
-
-    run = partial(simulate, block, model=model, initial_rotation=initial_rotation, initial_velocity=initial_velocity)
-    for bound, expected in ((low, False), (high, True)):
-        if run(motion * bound).overturned is not expected:
-            behaviour, correction = ("does not overturn", "raise") if expected else ("overturns", "lower")
-            message = f"the block {behaviour} at the scale {bound:g}: {correction} it in {{}}"
-            raise InvalidOption(message, "bounds", value=bounds)
-    _, scale = bisect(low, high, lambda scale: run(motion * scale).overturned)
-    response = run(motion * scale)
-    derivatives = response.sensitivity.events
-    by_scale, *by_block = (float(derivatives[name][-1]) for name in ("motion", "p", "alpha", "restitution"))
-    event_gradient, scale_change = gradient(response, "event", -1), -scale / by_scale
-    reason = event_gradient.reason
-    if not abs(by_scale) > 1e6:
-        reason, scale_change = _NO_BALANCE, math.nan
-    motion_gradient = replace(
-        event_gradient,
-        value=scale,
-        coefficients=scale * scale_change * event_gradient.coefficients,
-        vertical=None if event_gradient.vertical is None else scale * scale_change * event_gradient.vertical,
-        initial_rotation=scale_change * event_gradient.initial_rotation,
-        initial_velocity=scale_change * event_gradient.initial_velocity,
-        reason=reason,
-        motion=motion,
-    )
-    return CriticalScale(scale, motion_gradient, *(scale_change * derivative for derivative in by_block))

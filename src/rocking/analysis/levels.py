@@ -54,7 +54,7 @@ def _is_missing(label: object) -> bool:
     return is_none or label == "" or (isinstance(label, float) and math.isnan(label))
 
 
-def compose_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_history: bool = True) -> list[str]:
+def create_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_history: bool = True) -> list[str]:
     """Compose labels of motions or records, with vertical components and processing."""
     names = data[coordinate].values
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
@@ -67,7 +67,7 @@ def compose_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_
 
 def describe_motions(data: xr.Dataset) -> str:
     """Describe motions by name or number, with the numbers of scaled or processed ones."""
-    labels = compose_motion_labels(data)
+    labels = create_motion_labels(data)
     changed_count = sum(bool(history) for history in data.histories)
     if len(labels) == 1:
         return labels[0]
@@ -144,8 +144,8 @@ def assign_clusters(motions: Sequence[Motion], labels: object = None) -> Integer
     if labels is None:
         stations_by_family = {family: station for family, station in zip(families, stations, strict=True) if station}
         if len(stations_by_family) > len(set(stations_by_family.values())):
-            sentence = f"components of one station count as independent of each other: {{}} may be {BY_STATION}"
-            note(Message(f"{sentence}, which joins them", ("clusters",)))
+            message = f"components of one station count as independent of each other: {{}} may be {BY_STATION}"
+            note(Message(f"{message}, which joins them", ("clusters",)))
         return families
     if isinstance(labels, str) and labels == BY_STATION:
         labels = stations

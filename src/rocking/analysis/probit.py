@@ -319,7 +319,7 @@ def _shorten_steps(data: Outcomes, beta: Floats, step: Floats, current: Floats) 
     return step, following
 
 
-def find_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
+def compute_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
     """Find fits on the boundary of the confidence region, without curves that fall.
 
     Intervals are extremes in this region, as for the profile likelihood. For clusters of several outcomes the region is

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.analysis.curve import FragilityCurve, find_extremes, format_intensity
+from rocking.analysis.curve import FragilityCurve, compute_extremes, format_intensity
 from rocking.analysis.hazard import (
     HazardCurve,
     compute_log_rate,
@@ -72,13 +72,13 @@ class Rate:
     bounds: tuple[float, float] = (0.0, math.inf)
 
     def __repr__(self) -> str:
-        rate, between = format_digits(self.annual_rate, self.interval, self.bounds)
-        return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
+        rate, interval_text = format_digits(self.annual_rate, self.interval, self.bounds)
+        return f"<Rate: {self.limit_state}: {rate} a year ({interval_text}), {self.in_words()}>"
 
     def in_words(self) -> str:
         """Return the period and its interval as "once in ... years", with the significant digits."""
-        period, between = self._format_period()
-        return f"once in {period} year{'' if period == '1' else 's'} ({between})"
+        period, interval_text = self._format_period()
+        return f"once in {period} year{'' if period == '1' else 's'} ({interval_text})"
 
     def probability(self, years: float) -> float:
         """Compute the probability of at least one exceedance in a time (years), for independent exceedances."""
@@ -159,9 +159,9 @@ class Risk(Result):
             probability_texts = format_digits(probability, (ends[0], ends[1]), (ends[2], ends[3]))
             rate_texts = format_digits(rate.annual_rate, rate.interval, rate.bounds)
             rows.append([rate.limit_state, *rate_texts, *rate._format_period(), *probability_texts])
-        between = f"{100 * self.curves[0].confidence:g} % between"
+        heading = f"{100 * self.curves[0].confidence:g} % between"
         quantities = "annual rate", "once in (years)", f"probability in {format_count(years, 'year')}"
-        header = ["limit state", *(title for quantity in quantities for title in (quantity, between))]
+        header = ["limit state", *(title for quantity in quantities for title in (quantity, heading))]
         notes = [note for rate in self.rates for note in describe_extrapolated_shares(rate)]
         if any(rate.interval[0] == 0.0 or math.isinf(rate.interval[1]) for rate in self.rates):
             notes.append("intervals are those of the fragility, whose summary says why they have no end")
@@ -244,7 +244,7 @@ def check_measure(hazard: HazardCurve, measure: Measure) -> None:
 
 def _compute_rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     total = compute_log_rate(curve.fitted, hazard)[0]
-    low, high = find_extremes(curve.region, lambda fits: compute_log_rate(fits, hazard))
+    low, high = compute_extremes(curve.region, lambda fits: compute_log_rate(fits, hazard))
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value[0])) for value in (total, low, high))
     below, above = compute_shares_beyond(curve.fitted, hazard)
@@ -263,7 +263,7 @@ class Survival(Result):
     A curve of several blocks (for example an ensemble that represents one uncertain block) does not separate their
     dispersion from the record-to-record variability: for rates and `probability`, the block parameters are resampled
     for every motion. If a single one of the blocks has stood all the time, the probability is `mean_probability`, and
-    `most_probable` is its bound.
+    `max_probability` is its bound.
 
     Attributes
     ----------
@@ -355,14 +355,14 @@ class Survival(Result):
             return math.nan
         hazard, years = self.hazard, self.years
         if self.several_blocks:
-            _, high = find_extremes(self.curve.region, lambda fits: compute_log_survival(fits, hazard, years))
+            _, high = compute_extremes(self.curve.region, lambda fits: compute_log_survival(fits, hazard, years))
             return math.exp(min(float(high[0]), 0.0))
-        low, _ = find_extremes(self.curve.region, lambda fits: compute_log_rate_within(fits, hazard))
+        low, _ = compute_extremes(self.curve.region, lambda fits: compute_log_rate_within(fits, hazard))
         return math.exp(-math.exp(float(low[0])) * years)
 
     @property
     def contradicts_hazard(self) -> bool:
-        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence."""
+        """Whether the survival, at its `max_probability`, is less probable than 1 - confidence."""
         return self.max_probability < 1.0 - self.confidence
 
     def summary(self) -> str:
@@ -412,8 +412,9 @@ class Survival(Result):
         """Describe the probability of the survival under the hazard curve."""
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
-        chance, between = format_digits(self.probability, self.interval, bounds)
-        estimate, likeliest = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})", self.probability
+        chance, interval_text = format_digits(self.probability, self.interval, bounds)
+        confidence, likeliest = 100.0 * self.curve.confidence, self.probability
+        estimate = f"{chance} ({confidence:g} % interval {interval_text})"
         if self.several_blocks:
             single = f"at most {self.max_probability:.2g} if one of the blocks has stood all the time"
             estimate = f"{single}, and {estimate} if each motion met another of them"

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from rocking.analysis.levels import (
     RATIO_VARIABLES,
-    compose_motion_labels,
     compute_ratios,
+    create_motion_labels,
     describe_motions,
     describe_pool,
     list_missing_notes,
@@ -275,7 +275,7 @@ class RockingSpectrum(DatasetResult):
             x=data[against].values,
             curves=[*map(SpectrumCurves, labels, map(self._select_peaks, datasets), fractiles, shares)],
             fractiles=data.fractile.values.tolist(),
-            motions=compose_motion_labels(data),
+            motions=create_motion_labels(data),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
             title=title or escape_dollars(", ".join(title_parts)),
             ax=ax,
@@ -302,15 +302,13 @@ def _combine_peaks(
 
     peak, overturned, ratio, fractiles, share = values
     dims, share_dims, half_diagonal = ("motion", *names), names[-share.ndim :], 0.75 * table.gravity / axes["p"] ** 2
-    peak_meaning = "peak rotation over the slenderness; infinite where the block overturns"
+    meaning = "peak rotation over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
             "peak_rotation": variable(dims, peak, "peak rotation; pi/2: overturns", "rad"),
-            "peak_over_alpha": variable(dims, ratio, peak_meaning, "1"),
+            "peak_over_alpha": variable(dims, ratio, meaning, "1"),
             "overturned": (dims, overturned, table.overturned.attrs),
-            "fractile_over_alpha": variable(
-                ("fractile", *share_dims), fractiles, f"fractile of the {peak_meaning}", "1"
-            ),
+            "fractile_over_alpha": variable(("fractile", *share_dims), fractiles, f"fractile of the {meaning}", "1"),
             "overturned_share": variable(share_dims, share, "share of the motions that overturn the block", "1"),
         },
         {

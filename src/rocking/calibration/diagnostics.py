@@ -169,11 +169,11 @@ class Diagnostics:
 def diagnose(search: SearchResult, populations: Floats) -> Diagnostics:
     """Compute the diagnostics of a search from the draws of its posterior."""
     candidates, effective = search.evidence.candidates, float(np.median(search.evidence.count_effective(populations)))
-    bounds_reached = find_bounds_reached(candidates.space, unpack(populations)[0])
+    bounds_reached = list_bounds_reached(candidates.space, unpack(populations)[0])
     return Diagnostics(len(candidates.points), effective, search.agreement, bounds_reached)
 
 
-def find_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
+def list_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
     """Return estimates whose interval ends at a bound, from draws of the population's centre."""
     reached = []
     for name, values in space.parameters_by_name(centres).items():

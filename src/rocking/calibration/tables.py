@@ -254,9 +254,8 @@ def read_observed(
     columns = table.columns
     intensities = [name for name in columns if name in HEADINGS]
     if "overturned" not in columns or len(intensities) + ("motion" in columns) != 1:
-        raise table.create_error(
-            f"the columns must be overturned and either motion or one of {', '.join(HEADINGS)}, not {','.join(columns)}"
-        )
+        expected = f"overturned and either motion or one of {', '.join(HEADINGS)}"
+        raise table.create_error(f"the columns must be {expected}, not {','.join(columns)}")
     has_trials = "trials" in columns
     observed: dict[str, Any] = {
         "exceeded": table.numbers("overturned") if has_trials else [*table.booleans("overturned")],

@@ -50,7 +50,7 @@ _ROUNDING: Final = 2.0**-51
 
 _MAX_CAPACITY: Final = 1 << 23
 
-IMPACT: Final = np.dtype(
+IMPACT_DTYPE: Final = np.dtype(
     [("time", float), ("side", np.int8), ("interval", float), ("speed_before", float), ("speed_after", float)]
 )
 
@@ -227,7 +227,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
         raise InvalidOption(f"{{}} must be finite and at least 1e-15; got {tolerance!r}", "tolerance", value=tolerance)
     if amplitude == 1.0:
-        return ChatteringSequence(np.zeros(0, IMPACT), True, 0.0, 0.0, 0.0)
+        return ChatteringSequence(np.zeros(0, IMPACT_DTYPE), True, 0.0, 0.0, 0.0)
     capacity, half_period = 512, math.pi / frequency
     while True:
         status, impacts, phases = _resolve_sequence(amplitude, frequency, restitution, tolerance, capacity)
@@ -282,8 +282,8 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     ratios = np.full(n, math.nan)
     intervals = _resolve_sequence(amplitude, frequency, restitution, -1.0, n + 2)[1]["interval"]
     intervals = intervals[intervals > 0.0]
-    n_known = max(0, intervals.size - 2)
-    ratios[:n_known] = intervals[2:] / intervals[:n_known]
+    known_count = max(0, intervals.size - 2)
+    ratios[:known_count] = intervals[2:] / intervals[:known_count]
     return ratios
 
 
@@ -300,7 +300,7 @@ def _resolve_sequence(
     table = np.zeros(capacity, RESOLVED_IMPACT)
     status, count, rest, lower, upper = resolve_impacts(a - 1.0, 1.0 / (omega * omega), eta, tolerance, table)
     table = table[:count]
-    impacts = np.zeros(count, IMPACT)
+    impacts = np.zeros(count, IMPACT_DTYPE)
     impacts["interval"] = table["interval"] / omega
     impacts["time"] = np.cumsum(table["interval"]) / omega
     impacts["side"] = np.where(np.arange(count) % 2 == 0, 1, -1)

@@ -26,7 +26,7 @@ MAX_ORDER: Final = 40
 #: Context in which very large amplitudes yield infinite results without warnings.
 _IGNORE_OVERFLOW: Final = np.errstate(over="ignore", invalid="ignore")
 
-CYCLE: Final = np.dtype(
+CYCLE_DTYPE: Final = np.dtype(
     [("n", np.int64), ("sign", np.int8), ("order", np.int8)]
     + [(name, float) for name in ("term", "interval", "time", "phase", "speed_before", "speed_after")]
 )
@@ -153,7 +153,7 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     pairs = 64
     while (count := write_eq65_terms(restitution, *(terms := np.zeros((2, pairs))))) == pairs:
         pairs *= 2
-    table = np.zeros(2 * count, CYCLE)
+    table = np.zeros(2 * count, CYCLE_DTYPE)
     is_even = np.arange(2 * count) % 2 == 0
     table["n"] = np.arange(2 * count)
     table["sign"] = np.where(is_even, -1, 1)

@@ -81,7 +81,7 @@ class UpliftOutcome(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
-_EPISODE: Final = np.dtype(
+_EPISODE_DTYPE: Final = np.dtype(
     [(name, float) for name in ("uplift", "proven", "rest", "lower", "upper", "duration")]
     + [("impacts", np.int64), ("ground", float)]
 )
@@ -449,7 +449,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     sequences = response.sequences[np.isfinite(response.sequences["upper"])]
     uplifts = response.events["time"][response.events["kind"] == "uplift"]
     impacts = response.impacts["time"]
-    episodes = np.zeros(len(sequences), _EPISODE)
+    episodes = np.zeros(len(sequences), _EPISODE_DTYPE)
     uplift_indices = np.searchsorted(uplifts, sequences["end"], side="left") - 1
     episodes["uplift"] = np.where(uplift_indices >= 0, np.append(uplifts, 0.0)[uplift_indices], 0.0)
     for name, field in (("proven", "start"), ("rest", "end"), ("lower", "lower"), ("upper", "upper")):

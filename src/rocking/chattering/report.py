@@ -6,6 +6,7 @@ import math
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -190,10 +191,8 @@ def chattering_report(
     series = math.nan
     with suppress(InvalidOption):  # double precision does not resolve this many terms
         series = float(chattering_time(a, omega, eta, method="series", order=order))
-    times = {
-        method: float(chattering_time(a, omega, eta, method=method, resolved=resolved))
-        for method in ("exact", "asymptotic", "semianalytical")
-    }
+    compute = partial(chattering_time, a, omega, eta, resolved=resolved)
+    times = {method: float(compute(method=method)) for method in ("exact", "asymptotic", "semianalytical")}
     values: dict[str, Any] = {
         "a": a,
         "omega": omega,

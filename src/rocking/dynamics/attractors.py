@@ -111,7 +111,7 @@ def _create_trap(
     if side < 0:  # at rest, whatever the previous state
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
     _, derivative = strobe.derivative(point, attractor.period)
-    norm_matrix, rate = _find_contracting_norm(derivative, size)
+    norm_matrix, rate = _compute_contracting_norm(derivative, size)
     if not np.isfinite(norm_matrix).all():
         return None
 
@@ -146,7 +146,7 @@ def _create_trap(
     return None
 
 
-def _find_contracting_norm(derivative: Floats, size: Floats) -> tuple[Floats, float]:
+def _compute_contracting_norm(derivative: Floats, size: Floats) -> tuple[Floats, float]:
     """Find a matrix L and a rate such that |L M x| <= rate |L x|, and |L x| is at least |x| relative to the sizes.
 
     L is NaN if rounding error hides the eigenvalues of the derivative.

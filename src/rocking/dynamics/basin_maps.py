@@ -206,11 +206,11 @@ class _BasinGrid:
 
     def follow_all(self) -> None:
         """Follow all cells in random order."""
-        n_cells = len(self.outcome)
-        cells = np.random.default_rng(0).permutation(n_cells)
-        chunk_starts = range(_CELLS_BEFORE_SEARCH, n_cells, _CELLS_PER_SEARCH)
-        with Progress("basins", n_cells) as bar:
-            for first, last in zip((0, *chunk_starts), (*chunk_starts, n_cells), strict=True):
+        cell_count = len(self.outcome)
+        cells = np.random.default_rng(0).permutation(cell_count)
+        chunk_starts = range(_CELLS_BEFORE_SEARCH, cell_count, _CELLS_PER_SEARCH)
+        with Progress("basins", cell_count) as bar:
+            for first, last in zip((0, *chunk_starts), (*chunk_starts, cell_count), strict=True):
                 self._follow_cells(cells[first:last])
                 bar.advance(last - first)
 
@@ -240,15 +240,15 @@ class _BasinGrid:
         all_attractors = self.known_attractors.attractors
         index_of_code = np.full(_FIRST_ATTRACTOR + len(all_attractors) + 1, -1, dtype=np.int16)
         index_of_code[codes] = np.arange(len(codes))
-        found = [all_attractors[code - _FIRST_ATTRACTOR] for code in codes if code >= _FIRST_ATTRACTOR]
-        others = codes[len(found) :].tolist()
-        names = [*(known.name for known in found), *(_OUTCOME_NAMES[code] for code in others)]
-        period = [known.period for known in found] + [0] * len(others)
-        impacts = [known.impacts for known in found] + [-1] * len(others)
-        rests = [known.rests for known in found] + [False] * len(others)
-        multiplier = [float(np.abs(known.multipliers).max()) for known in found] + [np.nan] * len(others)
+        reached = [all_attractors[code - _FIRST_ATTRACTOR] for code in codes if code >= _FIRST_ATTRACTOR]
+        others = codes[len(reached) :].tolist()
+        names = [*(known.name for known in reached), *(_OUTCOME_NAMES[code] for code in others)]
+        period = [known.period for known in reached] + [0] * len(others)
+        impacts = [known.impacts for known in reached] + [-1] * len(others)
+        rests = [known.rests for known in reached] + [False] * len(others)
+        multiplier = [float(np.abs(known.multipliers).max()) for known in reached] + [np.nan] * len(others)
         points = np.full((len(codes), max(1, *period), 2), np.nan)
-        for k, known in enumerate(found):
+        for k, known in enumerate(reached):
             points[k, : known.period] = known.states
         error = np.sqrt(share * (1.0 - share) / total)
         coordinate = self.strobe.body.coordinate
@@ -271,7 +271,7 @@ class _BasinGrid:
             {
                 rate: variable(rate, self.v, "velocity at the start of a period", f"{unit}/s"),
                 name: variable(name, self.x, f"{name} at the start of a period", unit),
-                "attractor": _make_distinct(names),
+                "attractor": _distinguish_names(names),
             },
             {
                 "program": f"rocking {VERSION}",
@@ -284,7 +284,7 @@ class _BasinGrid:
         )
 
 
-def _make_distinct(names: list[str]) -> list[str]:
+def _distinguish_names(names: list[str]) -> list[str]:
     """Append a letter to names that are equal."""
     labels = []
     for k, name in enumerate(names):

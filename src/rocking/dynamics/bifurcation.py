@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,7 +78,7 @@ class BifurcationDiagram(DatasetResult):
     [1, 2]
     """
 
-    TABLES = MappingProxyType({"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")})
+    TABLES: ClassVar = {"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")}
 
     def changes(self, direction: str | None = None, start: int = 0) -> list[tuple[float, float, int, int]]:
         """List the changes of the period in the order of the computation.
@@ -89,9 +88,8 @@ class BifurcationDiagram(DatasetResult):
         ``data``. Raise `InvalidOption` if there is no such direction or start.
         """
         directions = self.data.direction.values.tolist()
-        index = directions.index(
-            checks.choice(directions[0] if direction is None else direction, "direction", InvalidOption, directions)
-        )
+        requested = directions[0] if direction is None else direction
+        index = directions.index(checks.choice(requested, "direction", InvalidOption, directions))
         number = checks.integer(start, "start", InvalidOption, minimum=0, maximum=self.data.sizes["start"] - 1)
         values, periods = self.data.value.values, self.data.period.values[index, :, number]
         if directions[index] == "down":

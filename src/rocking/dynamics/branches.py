@@ -37,10 +37,10 @@ UPLIFT: Final = "uplift"
 OVERTURNING: Final = "overturning"
 
 #: Ends of a branch without a bifurcation.
-LIMIT: Final = "limit of the parameter"
-CLOSED: Final = "where it began"
-TOO_MANY_POINTS: Final = "too many points"
-LOST: Final = "lost"
+END_AT_LIMIT: Final = "limit of the parameter"
+END_CLOSED: Final = "where it began"
+END_TOO_MANY_POINTS: Final = "too many points"
+END_LOST: Final = "lost"
 
 
 class Bifurcation(NamedTuple):
@@ -192,8 +192,9 @@ class Branch(Result):
 
     def _columns(self, table: str) -> list[Column]:
         if table == "bifurcations":
-            name, rows = add_unit(self.name, self.unit), [(kind, x, *ends) for kind, x, ends, _ in self.bifurcations]
-            names = "kind", name, f"{name}_lower", f"{name}_upper"
+            rows = [(kind, value, *bracket) for kind, value, bracket, _ in self.bifurcations]
+            parameter = add_unit(self.name, self.unit)
+            names = "kind", parameter, f"{parameter}_lower", f"{parameter}_upper"
             return [Column(name, [row[k] for row in rows]) for k, name in enumerate(names)]
         coordinate = self.family(float(self.values[0]))[0].coordinate
         return [

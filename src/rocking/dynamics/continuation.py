@@ -127,15 +127,15 @@ def continue_orbit(
     low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
     start = checks.between(value, "value", InvalidOption, low, high)
     max_step = checks.positive(step, "step", InvalidOption)
-    n_points = checks.integer(max_points, "max_points", InvalidOption, minimum=1)
+    point_count = checks.integer(max_points, "max_points", InvalidOption, minimum=1)
     equations = OrbitEquations.from_orbit(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
     backward, forward = (_BranchWalk(equations, z, direction, max_step) for direction in (-1.0, 1.0))
-    backward.follow(n_points)
-    if backward.end == branches.CLOSED:  # a closed branch is complete
-        forward.end = branches.CLOSED
+    backward.follow(point_count)
+    if backward.end == branches.END_CLOSED:  # a closed branch is complete
+        forward.end = branches.END_CLOSED
     else:
-        forward.follow(n_points)
+        forward.follow(point_count)
     points = [*reversed(backward.points), *forward.points[1:]]
     values, states, multipliers, peaks = (np.array(column) for column in zip(*points, strict=True))
     return Branch(
@@ -153,7 +153,7 @@ class _BranchWalk:
         self.response = equations.simulate_period(z)
         self.points = [equations.evaluate_point(z, self.response)]
         self.bifurcations: list[Bifurcation] = []
-        self.end = branches.TOO_MANY_POINTS
+        self.end = branches.END_TOO_MANY_POINTS
         #: Length of the last failed step, less later steps, and number of later successful steps.
         self.distance_to_end, self.successes = math.inf, 0
         #: Whether the last step failed only because of a bend of the branch.
@@ -164,11 +164,11 @@ class _BranchWalk:
     def follow(self, max_points: int) -> None:
         """Follow the branch over a number of points, or to its end."""
         if self.points[0][0] == self.equations.bounds[0 if self.direction < 0.0 else 1]:
-            self.end = branches.LIMIT
+            self.end = branches.END_AT_LIMIT
             return
         solution = self.equations.solve(self.z, PARAMETER_AXIS)
         if solution is None:
-            self.end = branches.LOST
+            self.end = branches.END_LOST
             return
         self.move_to(solution, self.direction * PARAMETER_AXIS)
         self.last_recorded = self.z
@@ -193,7 +193,7 @@ class _BranchWalk:
         if self.distance_to_end < _MIN_STEP:
             reason = self.find_end_reason()
             values = [(self.z + step * self.tangent)[2] for step in (0.0, self.distance_to_end)]
-            ending = [] if reason == branches.LOST else [equations.create_bifurcation(reason, self.z, values)]
+            ending = [] if reason == branches.END_LOST else [equations.create_bifurcation(reason, self.z, values)]
             self.bifurcations += ending
             return reason
         result = self.try_step()
@@ -217,12 +217,12 @@ class _BranchWalk:
         self.successes += 1
         self.distance_to_end = math.inf if self.successes > 5 else self.distance_to_end - self.step
         if at_limit:
-            return branches.LIMIT
+            return branches.END_AT_LIMIT
         if grazing := self.extrapolate_grazing():
             self.bifurcations.append(grazing)
             return branches.GRAZING
         if len(self.points) > 12 and self.has_returned():
-            return branches.CLOSED
+            return branches.END_CLOSED
         self.shift_start()
         if self.distance_to_end < math.inf:
             self.step = 0.5 * self.distance_to_end
@@ -266,7 +266,7 @@ class _BranchWalk:
             return None  # A multiplier passes 1 and -1, or changes sign through infinity at a grazing impact.
         if self.turns_without_fold(new_tests) and max(abs(tests.multiplier_one), abs(new_tests.multiplier_one)) > 0.05:
             return None  # The turn is too far away, or a difference of the parameter extends past an end.
-        return (point, at_limit) if equations.find_kind(point.z) == equations.kind else None
+        return (point, at_limit) if equations.determine_kind(point.z) == equations.kind else None
 
     def turns_without_fold(self, tests: TestFunctions) -> bool:
         """Whether the parameter turns before a point although no multiplier passes 1.
@@ -357,11 +357,11 @@ class _BranchWalk:
         rests_differently = False
         for step in _STEPS_BEYOND_END:
             try:
-                kind_beyond = self.equations.find_kind(beyond + step * self.tangent)
+                kind_beyond = self.equations.determine_kind(beyond + step * self.tangent)
             except RockingError:
                 continue
             if kind_beyond.unknown:
-                return branches.LOST
+                return branches.END_LOST
             if kind_beyond.overturns:
                 return branches.OVERTURNING
             if kind_beyond.rests_forever != kind.rests_forever:
@@ -372,4 +372,4 @@ class _BranchWalk:
                 return branches.GRAZING
             rests_differently = kind.rests and not kind.rests_forever
         # A body that uplifts and rests as before has touched or missed a stop in between.
-        return branches.GRAZING if rests_differently else branches.LOST
+        return branches.GRAZING if rests_differently else branches.END_LOST

@@ -80,18 +80,18 @@ class PeriodicForcing:
         inputs = f"{describe_input(self.body)} under {describe_input(self.motion)}"
         return f"<{type(self).__name__}: {inputs}; {self.model} model>"
 
-    def _copy_settings(self, *, record: bool) -> state.Record:
+    def _copy_settings(self, *, stores_nodes: bool) -> state.Record:
         settings = self._settings.copy()
-        settings["record"] = record
+        settings["record"] = stores_nodes
         return settings
 
     def _create_problem(self) -> PeriodicProblem:
-        settings = self._copy_settings(record=False)
+        settings = self._copy_settings(stores_nodes=False)
         return PeriodicProblem(self._ground, self._body_records[0], settings, state.new_table(0), self._steps)
 
     def _create_derivative_arguments(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
         """Create the problem and the workspace of the derivative kernels."""
-        trail = Trail(self._ground, self._body_records[0], self._copy_settings(record=True), NO_NODES)
+        trail = Trail(self._ground, self._body_records[0], self._copy_settings(stores_nodes=True), NO_NODES)
         return trail, state.new_scratch(), state.new_record(state.VARIATION), state.new_table(512)
 
     def _check_starts(self, starts: ArrayLike, name: str) -> Floats:
@@ -109,9 +109,8 @@ class PeriodicForcing:
         flat = pairs.reshape(-1, 2)
         (coordinate, velocity), record, (low, high) = flat.T, self._body_records[0], self.body.stops
         if record["next_side"][0] == 0:  # a stop, which the body cannot pass
-            leads_into_stop = (coordinate == low) & (velocity < 0.0) | (
-                bool(record["two_stops"]) & (coordinate == high) & (velocity > 0.0)
-            )
+            leads_into_second = bool(record["two_stops"]) & (coordinate == high) & (velocity > 0.0)
+            leads_into_stop = (coordinate == low) & (velocity < 0.0) | leads_into_second
             if np.any(leads_into_stop):
                 x, v = float(coordinate[leads_into_stop][0]), float(velocity[leads_into_stop][0])
                 message = f"{{}} must not point into a stop; got {v:g} m/s at {x:g} m"

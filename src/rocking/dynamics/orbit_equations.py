@@ -196,7 +196,7 @@ class OrbitEquations:
                 return BranchPoint(z, jacobian, self.map_state(*self.to_physical(z))[1], step_count)
         return None
 
-    def find_kind(self, z: Floats) -> OrbitKind:
+    def determine_kind(self, z: Floats) -> OrbitKind:
         """Determine the kind of the orbit at a point."""
         state, value = self.to_physical(z)
         return determine_kind(self.create_map(value), state, self.period)

@@ -305,7 +305,7 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
         if not has_few:
             all_peaks = np.concatenate([motion.peak for motion in motions])
             peaks = np.linspace(0.0, float(np.max(all_peaks[np.isfinite(all_peaks)], initial=0.0)), 200)[1:]
-            reached = np.sort([find_reaching_levels(motion, peaks) for motion in motions], axis=0)
+            reached = np.sort([compute_reaching_levels(motion, peaks) for motion in motions], axis=0)
             for share, linestyle in _FRACTILE_LINES.items():
                 # Lowest level that suffices for this fraction of the motions.
                 level = reached[int(np.ceil(share * len(motions))) - 1]
@@ -323,7 +323,7 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
     return page.figure
 
 
-def find_reaching_levels(motion: ScaledMotion, peaks: Floats) -> Floats:
+def compute_reaching_levels(motion: ScaledMotion, peaks: Floats) -> Floats:
     """Find the lowest level at which a motion reaches each peak rotation; infinite if never."""
     overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
     is_below = motion.levels < overturns
