@@ -94,8 +94,8 @@ def coarsely() -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def shortened() -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(search, "_PROPOSAL", (64, 1))
-            patched.setattr(search, "_COMPARISON", (64, 2))
+            patched.setattr(search, "_PROPOSAL_SIZES", (64, 1))
+            patched.setattr(search, "_COMPARISON_SIZES", (64, 2))
             patched.setattr(search, "_EXPONENTS", (0.1, 1.0))
             patched.setattr(search, "_MAX_EXTENSIONS", 0)
             patched.setattr(history, "_START_COUNT", 256)

@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 import rocking
 from rocking.calibration import search as searching
-from rocking.calibration.diagnostics import Scores, find_bounds_reached
+from rocking.calibration.diagnostics import Scores, list_bounds_reached
 from rocking.calibration.history import HistoryCalibration
 from rocking.calibration.outcomes import label_groups
 from rocking.calibration.search import MAX_R_HAT, Candidates, Evidence, Problem, sample_posterior, search
@@ -319,8 +319,8 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
 def test_a_search_goes_on_while_few_candidates_speak_for_what_it_found(
     threshold_evidence, monkeypatch, candidates, goes_on, populations
 ):
-    monkeypatch.setattr(searching, "_PROPOSAL", (populations, 2))
-    monkeypatch.setattr(searching, "_COMPARISON", (populations, 4))
+    monkeypatch.setattr(searching, "_PROPOSAL_SIZES", (populations, 2))
+    monkeypatch.setattr(searching, "_COMPARISON_SIZES", (populations, 4))
     evidence, thresholds = threshold_evidence
     space = evidence.candidates.space
 
@@ -329,7 +329,7 @@ def test_a_search_goes_on_while_few_candidates_speak_for_what_it_found(
 
     found = search(Problem(space, evidence.observed, 0.01, tried), candidates, np.random.default_rng(5))
     assert max(found.agreement.values()) < MAX_R_HAT
-    drawn = found.evidence.candidates.even_count + sum(count for count, _ in found.evidence.candidates.proposals)
+    drawn = found.evidence.candidates.filling_count + sum(count for count, _ in found.evidence.candidates.proposals)
     assert drawn == pytest.approx((13.0 / 7.0 if goes_on else 1.0) * candidates, rel=0.05)
     assert (found.effective_candidates < 100.0) == goes_on
 
@@ -691,7 +691,7 @@ def test_a_posterior_whose_interval_ends_at_a_bound_is_told(share, told):
     space = Space.from_bounds((1.0, 10.0), 0.2, 0.9, two_sided=False)
     ends = np.log([9.9, 3.0])
     centres = np.repeat(ends, [round(1000 * share), 1000 - round(1000 * share)])[:, None]
-    notes = [str(one) for one in find_bounds_reached(space, centres)]
+    notes = [str(one) for one in list_bounds_reached(space, centres)]
     assert len(notes) == told
     assert all("8 % of the posterior" in note and "sets the upper end of the interval" in note for note in notes)
 

@@ -33,7 +33,7 @@ from rocking.explorer.inputs import read_case
 from rocking.explorer.launch import start_listening
 from rocking.explorer.studies import StudyView
 from rocking.inputs import quantities
-from rocking.plot.canvas import find_cell_edges
+from rocking.plot.canvas import compute_cell_edges
 from rocking.response.summary import round_ratio
 
 pytestmark = pytest.mark.browser
@@ -1004,7 +1004,7 @@ def test_uneven_cells_of_a_study_lie_where_their_values_do(opened, tmp_path_fact
     picture = np.asarray(Image.open(io.BytesIO(page.page.locator("#map").screenshot())).convert("RGB"), dtype=int)
     pixels = "const {frame} = Bokeh.index.find_one(" + f"{MODELS}.find((each) => each.type === 'Figure'))"
     inks = np.array([[0xC9, 0xDC, 0xF0], [0xD4, 0x66, 0x0F]])
-    right, up = find_cell_edges(blocks.p[:, 0]), find_cell_edges(np.sort(levels) / 9.80665)
+    right, up = compute_cell_edges(blocks.p[:, 0]), compute_cell_edges(np.sort(levels) / 9.80665)
     judged = 0
     for row, column, part in itertools.product(range(3), range(5), (0.1, 0.9)):
         x, y = right[column] + part * np.diff(right)[column], up[row] + part * np.diff(up)[row]

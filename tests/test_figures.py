@@ -20,6 +20,7 @@ from rocking.plot.curves import (
     RiskLine,
     ScaledMotion,
     SpectrumCurves,
+    compute_reaching_levels,
     draw_fragility,
     draw_ida,
     draw_measured_history,
@@ -28,7 +29,6 @@ from rocking.plot.curves import (
     draw_risk,
     draw_spectrum,
     draw_survival,
-    find_reaching_levels,
 )
 from rocking.plot.maps import draw_basins, draw_outcome_map, draw_regions, draw_rose, draw_shares
 from rocking.plot.orbits import draw_bifurcation, draw_branches, draw_intervals, draw_orbit
@@ -311,12 +311,12 @@ def test_the_lowest_level_that_reaches_a_peak_is_on_the_curve_before_it_turns_ba
     levels = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     peak = np.array([0.1, 0.3, 0.2, 0.6, np.inf])
     motion = ScaledMotion("a", levels, peak, np.array([[4.5, 5.0]]))
-    reached = find_reaching_levels(motion, np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7]))
+    reached = compute_reaching_levels(motion, np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7]))
     np.testing.assert_allclose(reached, [1.0, 1.0, 1.5, 2.0, 3.5, 4.0, 4.5])
     standing = motion._replace(peak=np.append(peak[:4], 0.65), bands=np.empty((0, 2)))
-    np.testing.assert_allclose(find_reaching_levels(standing, np.array([0.65, 0.7])), [5.0, np.inf])
+    np.testing.assert_allclose(compute_reaching_levels(standing, np.array([0.65, 0.7])), [5.0, np.inf])
     always = motion._replace(bands=np.array([[1.0, 5.0]]))
-    np.testing.assert_allclose(find_reaching_levels(always, np.array([0.1, 0.9])), [1.0, 1.0])
+    np.testing.assert_allclose(compute_reaching_levels(always, np.array([0.1, 0.9])), [1.0, 1.0])
 
 
 def test_the_intervals_of_a_sequence_are_drawn_with_the_limit_of_their_ratios():

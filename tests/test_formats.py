@@ -21,7 +21,7 @@ from oracles import record_files as written
 from oracles.damaged_files import TOKENS
 
 from rocking import records
-from rocking.analysis.levels import number_clusters
+from rocking.analysis.levels import assign_clusters
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.records import channels, formats, identify, read
 from rocking.records.formats import source, through_obspy
@@ -334,7 +334,7 @@ def test_the_owner_at_the_end_of_a_title_of_at2_is_no_part_of_the_component(owne
         assert (channel.name, channel.azimuth, channel.station) == (name, azimuth, place)
         assert channel.metadata.get("station line", "") == owner.strip(" ,()")
         components[name] = channel.motion()
-    assert number_clusters(list(components.values()), "station").tolist() == [0, 0, 0]
+    assert assign_clusters(list(components.values()), "station").tolist() == [0, 0, 0]
 
 
 def test_knet_counts_keep_their_offset() -> None:

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 import rocking
 from rocking import fit_fragility, fragility
-from rocking.analysis.levels import number_clusters, number_families
+from rocking.analysis.levels import assign_clusters, assign_families
 from rocking.block import Blocks
 from rocking.core.progress import notes_for
 from rocking.errors import InvalidOption
@@ -562,16 +562,16 @@ def test_components_of_one_station_are_one_cluster_where_that_is_asked_for_and_n
     named = [rocking.records.load(name) for name in ("el-centro-meloland-270", "ridgecrest-clc-090")]
     beside = rocking.records.load("el-centro-meloland-360").scaled(2.0)
     with notes_for("everybody"):
-        assert number_clusters([*named, named[0].scaled(0.5), PULSES[0], PULSES[1]]).tolist() == [0, 1, 0, 2, 3]
+        assert assign_clusters([*named, named[0].scaled(0.5), PULSES[0], PULSES[1]]).tolist() == [0, 1, 0, 2, 3]
         assert capsys.readouterr().err == ""
-        assert number_clusters([*named, beside]).tolist() == [0, 1, 2]
+        assert assign_clusters([*named, beside]).tolist() == [0, 1, 2]
         assert (
             "components of one station count as independent of each other: clusters may be" in capsys.readouterr().err
         )
-        assert number_clusters([*named, beside, PULSES[0], PULSES[1]], "station").tolist() == [0, 1, 0, 2, 3]
+        assert assign_clusters([*named, beside, PULSES[0], PULSES[1]], "station").tolist() == [0, 1, 0, 2, 3]
         assert capsys.readouterr().err == ""
     with pytest.raises(InvalidOption, match="clusters station requires records that name their station"):
-        number_clusters(PULSES, "station")
+        assign_clusters(PULSES, "station")
 
 
 def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_one():
@@ -579,8 +579,8 @@ def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_o
     up, down = (pulse.with_vertical(rocking.pulses.one_sine(a, 3.0)) for a in (0.5, -0.5))
     longer = rocking.pulses.one_sine(1.0, 1.5)
     given = [pulse, longer, up, pulse.scaled(-3.0), up.scaled(-0.3), down, longer.scaled(1e-6), up.scaled(0.3)]
-    assert number_families(given).tolist() == [0, 1, 2, 0, 2, 3, 1, 2]
-    assert number_families(given, reversed_too=False).tolist() == [0, 1, 2, 3, 4, 5, 1, 2]
+    assert assign_families(given).tolist() == [0, 1, 2, 0, 2, 3, 1, 2]
+    assert assign_families(given, reversed_too=False).tolist() == [0, 1, 2, 3, 4, 5, 1, 2]
 
 
 @pytest.mark.parametrize("missing", [None, "", math.nan, np.nan])

@@ -19,7 +19,6 @@ from rocking.plot.canvas import (
     add_text,
     add_ticks,
     collect_handles,
-    find_magnification,
     open_figure,
 )
 
@@ -54,6 +53,12 @@ _ARROW: Final = {
     "mutation_scale": 6,
 }
 _MARK: Final[dict[str, Any]] = {"color": ABOVE, "markersize": 4.5, "markeredgewidth": 0.0, "zorder": 4}
+
+
+def find_magnification(largest: float) -> tuple[float, str]:
+    """Find a power of a thousand that scales values up to `largest`, and its words for a label."""
+    power = 3 * max(0, math.ceil((-math.log10(largest) - 0.5) / 3.0)) if largest > 0.0 else 0
+    return 10.0**power, f"$10^{{{power}}}$ " if power else ""
 
 
 class Detail(NamedTuple):

@@ -13,11 +13,12 @@ from . import (
     solid,
     studies,
 )
+from .analysis.critical import critical_scale
 from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility import Fragility, fit_fragility, fragility
 from .analysis.hazard import HazardCurve
-from .analysis.incremental import critical_scale, incremental_dynamic_analysis
+from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey

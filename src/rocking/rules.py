@@ -49,7 +49,7 @@ __all__ = [
 _ROTATION_SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linspace(0.5, 0.999, 26))
 
 #: Ratio of damping to -ln e^2 (Makris and Konstantinidis 2003).
-_DAMPING: Final = 0.34
+_DAMPING_FACTOR: Final = 0.34
 
 #: Relative width of the bracket of the lowest level that overturns.
 _TOLERANCE: Final = 1e-4
@@ -285,7 +285,7 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     ASCE (2005). Seismic Design Criteria for Structures, Systems, and Components in Nuclear Facilities. ASCE/SEI 43-05,
     Appendix A, section A.2.
     """
-    return _find_min_ratio(blocks, motion, _create_energy_oscillator)
+    return _compute_min_ratio(blocks, motion, _create_energy_oscillator)
 
 
 @_rule("m", "1.070")
@@ -324,13 +324,11 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Makris, N. and Konstantinidis, D. (2003). The rocking spectrum and the limitations of practical design
     methodologies. Earthquake Engineering and Structural Dynamics 32(2), 265-289.
     """
-    lowest = math.exp(-0.5 / _DAMPING)
-    if blocks.restitution.min() <= lowest:
-        raise InvalidBlock(
-            f"the rule priestley requires a restitution above {lowest:.2g}, where its damping is below critical; got "
-            f"{blocks.restitution.min():g}; omit this rule"
-        )
-    return _find_min_ratio(blocks, motion, _create_free_rocking_oscillator)
+    lowest, restitution = math.exp(-0.5 / _DAMPING_FACTOR), blocks.restitution.min()
+    if restitution <= lowest:
+        message = f"the rule priestley requires a restitution above {lowest:.2g}, where its damping is below critical"
+        raise InvalidBlock(f"{message}; got {restitution:g}; omit this rule")
+    return _compute_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 
 
 def apply_rules(
@@ -395,11 +393,11 @@ def _create_free_rocking_oscillator(p: float, alpha: float, restitution: float, 
     """Create the oscillators of Priestley, Evison and Carr (1978) with the period of free rocking."""
     periods = 4.0 / p * np.arccosh(1.0 / (1.0 - _ROTATION_SHARES))
     displacements = 0.75 * gravity / p**2 * (math.sin(alpha) - np.sin(alpha * (1.0 - _ROTATION_SHARES)))
-    damping = -2.0 * _DAMPING * math.log(restitution)
+    damping = -2.0 * _DAMPING_FACTOR * math.log(restitution)
     return _Oscillator(periods, damping, displacements, (periods / (2.0 * np.pi)) ** 2)
 
 
-def _find_min_ratio(
+def _compute_min_ratio(
     blocks: Blocks, motion: Motion, create_oscillator: Callable[[float, float, float, float], _Oscillator]
 ) -> tuple[Floats, Floats]:
     """Find demand and capacity of the sides of blocks at the rotation with the smallest ratio."""
@@ -466,10 +464,8 @@ def compare_rules(
     names = None if rules is None else checks.items(rules, "rules", InvalidOption)
     # Raise errors before the simulations.
     compute_intensities([*named_motions.values()], Measure("pga"))
-    ratios = [
-        {name: float(rating.ratio[0]) for name, rating in apply_rules(block, motion, names).items()}
-        for motion in named_motions.values()
-    ]
+    ratings = [apply_rules(block, motion, names) for motion in named_motions.values()]
+    ratios = [{name: float(rating.ratio[0]) for name, rating in by_name.items()} for by_name in ratings]
     responses, margins = [], []
     with Progress("checking", total=len(named_motions)) as bar:
         for motion in named_motions.values():

@@ -1,7 +1,8 @@
+from .critical import CriticalScale
 from .curve import FragilityCurve
 from .directions import ResponseRose
 from .efficiency import MeasureComparison
-from .incremental import CriticalScale, IncrementalDynamicAnalysis
+from .incremental import IncrementalDynamicAnalysis
 from .overturning import OverturningMap, OverturningMode, mode_name
 from .probit import Goodness, Probit
 from .risk import Rate, Risk, Survival

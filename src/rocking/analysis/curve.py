@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -127,7 +127,7 @@ class FragilityCurve:
     @property
     def median_interval(self) -> tuple[float, float]:
         """Confidence interval of the median, 0 or infinite if the data allow a curve that does not rise."""
-        low, high = find_extremes(self.region, _compute_log_medians)
+        low, high = compute_extremes(self.region, _compute_log_medians)
         with np.errstate(over="ignore"):
             return float(np.exp(low[0])), float(np.exp(high[0]))
 
@@ -139,9 +139,8 @@ class FragilityCurve:
     def probability(self, intensity: ArrayLike) -> Floats:
         """Compute the fitted probability at intensities >= 0 (SI units or a block's own), with their shape."""
         intensities = check_intensities(intensity)
-        return unwrap_scalar(
-            compute_probabilities(self.fitted, _compute_logarithm(intensities).ravel())[0].reshape(intensities.shape)
-        )
+        probabilities = compute_probabilities(self.fitted, _compute_logarithm(intensities).ravel())
+        return unwrap_scalar(probabilities[0].reshape(intensities.shape))
 
     def intensity_of(self, probability: float) -> float:
         """Compute the intensity (SI units or a block's own) for a fitted probability between 0 and 1.
@@ -173,7 +172,7 @@ class FragilityCurve:
 
         intensities = check_intensities(intensity)
         log_intensity = _compute_logarithm(intensities).ravel()
-        score_bounds = find_extremes(self.region, lambda fits: compute_normal_scores(fits, log_intensity))
+        score_bounds = compute_extremes(self.region, lambda fits: compute_normal_scores(fits, log_intensity))
         low, high = (unwrap_scalar(np.asarray(ndtr(scores)).reshape(intensities.shape)) for scores in score_bounds)
         return low, high
 
@@ -211,10 +210,9 @@ def fit_curve(
     exceeded = np.where(np.abs(trials - exceeded) <= 1e-12 * trials, trials, exceeded)
     z = np.log(intensity)
     outcomes = Outcomes(z, exceeded, trials)
-    reason = probit.explain_missing_fit(outcomes, measure.format_value)
-    if reason is not None:
-        raise Unfitted(f"no lognormal can be fitted to {name!r}: {reason}")
-    fitted = probit.fit(outcomes.alone())
+    if message := probit.explain_missing_fit(outcomes, measure.format_value):
+        raise Unfitted(f"no lognormal can be fitted to {name!r}: {message}")
+    fitted = probit.fit(outcomes.as_batch())
     log_median = float(-fitted.intercept[0] / fitted.slope[0])
     if not z.min() - math.log(_MAX_MEDIAN_RATIO) <= log_median <= z.max() + math.log(_MAX_MEDIAN_RATIO):
         raise Unfitted(
@@ -235,9 +233,9 @@ def fit_curve(
         confidence=confidence,
         clusters=cluster_count,
         independent=independent,
-        log_likelihood=float(probit.compute_log_likelihood(outcomes.alone(), np.column_stack(fitted))[0]),
+        log_likelihood=float(probit.compute_log_likelihood(outcomes.as_batch(), np.column_stack(fitted))[0]),
         goodness=probit.compute_goodness(outcomes, fitted, independent=independent),
-        region=probit.find_confidence_region(outcomes, fitted, None if independent else clusters, confidence),
+        region=probit.compute_confidence_region(outcomes, fitted, None if independent else clusters, confidence),
     )
 
 
@@ -247,16 +245,15 @@ def create_fragility_line(curve: FragilityCurve, intensity: Floats, measure: Mea
 
     groups = probit.group_outcomes(np.log(curve.intensity), curve.trials)
     counts = np.bincount(groups, curve.trials).astype(np.float64)
-    mean_intensity, observed = (
-        np.bincount(groups, totals) / counts for totals in (curve.trials * curve.intensity, curve.exceeded)
-    )
+    products = curve.trials * curve.intensity, curve.exceeded
+    mean_intensity, observed = (np.bincount(groups, product) / counts for product in products)
     is_rotation = curve.limit is not None and math.isfinite(curve.limit)
     limit_text = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
     parameters = f"median {format_intensity(curve.median, measure)}, dispersion {curve.dispersion:.3g}"
-    probability = curve.probability(intensity)
-    band, scale = curve.band(intensity) if curve.bounded else (probability, probability), measure.display_factor
+    probability, factor = curve.probability(intensity), measure.display_factor
+    band = curve.band(intensity) if curve.bounded else (probability, probability)
     label = f"{curve.limit_state}{limit_text}: {parameters}"
-    return FragilityLine(label, scale * intensity, probability, *band, scale * mean_intensity, observed)
+    return FragilityLine(label, factor * intensity, probability, *band, factor * mean_intensity, observed)
 
 
 def check_counts(values: ArrayLike, argument: str, size: int, minimum: float, maximum: ArrayLike) -> Floats:
@@ -272,7 +269,7 @@ def check_counts(values: ArrayLike, argument: str, size: int, minimum: float, ma
     return numbers
 
 
-def find_extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:
+def compute_extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:
     """Find the lowest and the highest values of a quantity (fits, n) in a region of fits."""
     values = quantity(region)
     return values.min(axis=0), values.max(axis=0)
@@ -285,10 +282,9 @@ def format_intensity(intensity: float, measure: Measure) -> str:
 
 def format_interval(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
     """Format an interval, with bounds in place of finite ends beyond them."""
-    format_end = f"{{:.{digits}g}}".format
-    return " to ".join(
-        "infinity" if math.isinf(end) else format_within(end, bounds if end else (0, 0), format_end) for end in ends
-    )
+    number = f"{{:.{digits}g}}".format
+    texts = ("infinity" if math.isinf(end) else format_within(end, bounds if end else (0, 0), number) for end in ends)
+    return " to ".join(texts)
 
 
 def format_median_interval(curve: FragilityCurve, scale: float) -> str:
@@ -331,13 +327,10 @@ def format_nrml(
     the lowest damaging intensity in OpenQuake's unit, and `attributes` the model's id, assetCategory and lossCategory.
     """
     checks.choice(attributes["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
-    for argument, name in (
-        ("taxonomy", taxonomy),
-        ("model_id", attributes["id"]),
-        ("asset_category", attributes["assetCategory"]),
-    ):
-        check_nrml_names([name], argument)
-    check_nrml_names([curve.limit_state for curve in curves], "a limit state")
+    check_nrml_names("taxonomy", taxonomy)
+    check_nrml_names("model_id", attributes["id"])
+    check_nrml_names("asset_category", attributes["assetCategory"])
+    check_nrml_names("a limit state", *(curve.limit_state for curve in curves))
     low, high = (measure[1] * end for end in data_range)
     low = max(low, no_damage or 0.0)
     if not high > low * (1.0 + 1e-5):
@@ -365,19 +358,16 @@ def format_nrml(
     return f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, encoding='unicode')}\n"
 
 
-def check_nrml_names(names: Iterable[str], argument: str) -> None:
+def check_nrml_names(argument: str, *names: str) -> None:
     """Raise an InvalidOption unless NRML allows all names."""
     for name in names:
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", checks.text(name, argument, InvalidOption)):
-            raise InvalidOption(
-                f"{{}} of NRML must consist of at most 100 letters, digits, dashes and underscores, not {name!r}",
-                argument,
-                value=name,
-            )
+            message = f"{{}} of NRML must consist of at most 100 letters, digits, dashes and underscores, not {name!r}"
+            raise InvalidOption(message, argument, value=name)
 
 
-def find_openquake_measure(measure: Measure, block: Body | None, model: Model) -> tuple[str, float]:
-    """Find OpenQuake's measure, and the factor from SI units or the block's own (g, or cm/s for PGV).
+def convert_to_openquake_measure(measure: Measure, block: Body | None, model: Model) -> tuple[str, float]:
+    """Return OpenQuake's name of a measure, and the factor from SI units or the block's own to g (PGV: cm/s).
 
     SA(T) does not state its damping, which is the damping of ground-motion models.
     """
@@ -386,11 +376,8 @@ def find_openquake_measure(measure: Measure, block: Body | None, model: Model) -
     unit = 1.0 if block is None else float(compute_units(block.as_bodies(), measure, model)[0])
     if measure.motion_measure_name == "pgv":
         return "PGV", 100.0 * unit
-    if measure.damping != DAMPING:
-        raise InvalidOption(
-            f"the {{}} of a spectral acceleration must be {DAMPING:g} of critical for OpenQuake; got "
-            f"{measure.damping:g}; fit the fragility against a measure with this damping",
-            "damping",
-            value=measure.damping,
-        )
+    if (damping := measure.damping) != DAMPING:
+        message = f"the {{}} of a spectral acceleration must be {DAMPING:g} of critical for OpenQuake; got {damping:g}"
+        correction = "fit the fragility against a measure with this damping"
+        raise InvalidOption(f"{message}; {correction}", "damping", value=damping)
     return "PGA" if measure.motion_measure_name == "pga" else f"SA({measure.period:g})", unit / STANDARD_GRAVITY

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.levels import compute_ratios
+from rocking.analysis.levels import RATIO_VARIABLES, compute_ratios, list_missing_notes
 from rocking.analysis.spectrum import compute_overturned_share
 from rocking.core import checks
 from rocking.core.constants import Model
@@ -18,7 +17,6 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.schemes import ChatteringScheme
-from rocking.engine.tasks import describe_missing
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
@@ -104,9 +102,8 @@ def response_rose(
     import xarray as xr
 
     if not isinstance(solid, Solid):
-        raise InvalidBlock(
-            f"a Solid is required, not a {type(solid).__name__}; create one with rocking.Solid.from_mesh"
-        )
+        kind = type(solid).__name__
+        raise InvalidBlock(f"a Solid is required, not a {kind}; create one with rocking.Solid.from_mesh")
     named_pairs = _name_pairs(pairs)
     angles = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
     scales = Scales.from_levels(levels, measure)
@@ -117,44 +114,32 @@ def response_rose(
     with Progress("simulating", total=len(angles)) as bar:
         for k, (azimuth, block) in enumerate(zip(angles.tolist(), blocks, strict=True)):
             components = [first.rotated(second, azimuth, recorded=recorded) for first, second in named_pairs.values()]
-            motions = [
-                motion.scaled(factor)
-                for motion, pair_factors in zip(components, factors, strict=True)
-                for factor in pair_factors.tolist()
-            ]
+            pairs_and_factors = zip(components, factors.tolist(), strict=True)
+            motions = [motion.scaled(factor) for motion, row in pairs_and_factors for factor in row]
             table = simulate_many(block, motions, model=model, chattering=chattering)
-            is_overturned = table.overturned.values
-            ratio = compute_ratios(
-                table.peak_rotation.values, is_overturned, table.unfinished.values, min(block.balance)
-            )
-            overturned[..., k], peak[..., k] = is_overturned.reshape(shape[:2]), ratio.reshape(shape[:2])
+            overturned[..., k] = table.overturned.values.reshape(shape[:2])
+            outcomes = (table[name].values for name in RATIO_VARIABLES)
+            peak[..., k] = compute_ratios(min(block.balance), *outcomes).reshape(shape[:2])
             bar.advance()
     worst_peak = np.where(overturned.any(axis=2), np.inf, peak.max(axis=2))
-    dims = ("pair", "level", "azimuth")
-    return ResponseRose(
-        xr.Dataset(
-            {
-                "overturned": variable(dims, overturned, "whether the body overturns in the plane of the azimuth"),
-                "peak_over_slenderness": variable(
-                    dims, peak, "largest rotation over the smaller slenderness; inf: overturns, NaN: not finished", "1"
-                ),
-                "overturned_share": variable(
-                    dims[1:], compute_overturned_share(peak), "share of the pairs that overturn the body", "1"
-                ),
-                "anywhere": variable(
-                    "level", compute_overturned_share(worst_peak), "share that does at any azimuth", "1"
-                ),
-            },
-            {
-                "pair": [*named_pairs],
-                "level": variable(
-                    "level", scales.values, "of the geometric mean of both components", scales.attributes["units"]
-                ),
-                "azimuth": variable("azimuth", angles, "clockwise from north", "deg"),
-            },
-            {"description": solid.description, "model": model, "measure": (scales.measure or FACTOR).quantity},
-        )
+    share, share_anywhere = compute_overturned_share(peak), compute_overturned_share(worst_peak)
+    dims, unit = ("pair", "level", "azimuth"), scales.attributes["units"]
+    peak_meaning = "largest rotation over the smaller slenderness; inf: overturns, NaN: not finished"
+    dataset = xr.Dataset(
+        {
+            "overturned": variable(dims, overturned, "whether the body overturns in the plane of the azimuth"),
+            "peak_over_slenderness": variable(dims, peak, peak_meaning, "1"),
+            "overturned_share": variable(dims[1:], share, "share of the pairs that overturn the body", "1"),
+            "anywhere": variable("level", share_anywhere, "share that does at any azimuth", "1"),
+        },
+        {
+            "pair": [*named_pairs],
+            "level": variable("level", scales.values, "of the geometric mean of both components", unit),
+            "azimuth": variable("azimuth", angles, "clockwise from north", "deg"),
+        },
+        {"description": solid.description, "model": model, "measure": (scales.measure or FACTOR).quantity},
     )
+    return ResponseRose(dataset)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -182,9 +167,11 @@ class ResponseRose(DatasetResult):
     [0.0, 0.0]
     """
 
-    TABLES = MappingProxyType(
-        {"responses": ("overturned", "peak_over_slenderness"), "shares": ("overturned_share",), "levels": ("anywhere",)}
-    )
+    TABLES: ClassVar = {
+        "responses": ("overturned", "peak_over_slenderness"),
+        "shares": ("overturned_share",),
+        "levels": ("anywhere",),
+    }
     POOLED = ("pair", "azimuth")
 
     def _headline(self) -> str:
@@ -194,25 +181,21 @@ class ResponseRose(DatasetResult):
 
     def _format_levels(self) -> list[str]:
         """Format the levels."""
-        data = self.data
-        unit = data.level.attrs.get("units", "1")
-        return [
-            f"{data.measure} {value:.4g}{'' if unit == '1' else f' {unit}'}" for value in data.level.values.tolist()
-        ]
+        level = self.data.level
+        unit = f" {level.attrs.get('units', '1')}".removesuffix(" 1")
+        return [f"{self.data.measure} {value:.4g}{unit}" for value in level.values.tolist()]
 
     def summary(self) -> str:
         data = self.data
         rows = []
         for k, name in enumerate(self._format_levels()):
             shares = data.overturned_share.values[k]
-            worst_azimuths = data.azimuth.values[shares == shares.max()]
-            azimuth_text = (
-                f"{worst_azimuths[0]:g} deg" if len(worst_azimuths) == 1 else f"{len(worst_azimuths)} azimuths"
-            )
+            worst = data.azimuth.values[shares == shares.max()]
+            azimuth_text = f"{worst[0]:g} deg" if len(worst) == 1 else f"{len(worst)} azimuths"
             rows.append([name, shares.min(), shares.max(), azimuth_text, float(data.anywhere[k])])
         table = format_table(["level", "least share", "largest share", "at", "at any azimuth"], rows)
-        missing = describe_missing(np.isnan(data.peak_over_slenderness.values))
-        return f"{self._headline()}\n\n{table}" + f"\nnote: {missing}" * bool(missing)
+        notes = list_missing_notes(np.isnan(data.peak_over_slenderness.values))
+        return "\n".join([self._headline(), "", table, *notes])
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
@@ -230,16 +213,14 @@ class ResponseRose(DatasetResult):
         from rocking.core.arrays import select_evenly
         from rocking.plot.maps import draw_shares
 
-        data = self.data
-        indices = [*select_evenly(data.sizes["level"], 4)]
-        azimuth = data.azimuth.values
+        data, level_names = self.data, self._format_levels()
+        indices = select_evenly(data.sizes["level"], 4)
+        azimuth, shares = data.azimuth.values, data.overturned_share.values[indices]
         # An opposite azimuth that was not requested has the same outcome.
         opposite = np.mod(azimuth + 180.0, 360.0)
         is_new = ~np.isin(opposite, azimuth)
         full_circle = np.concatenate([azimuth, opposite[is_new]])
         order = np.argsort(full_circle)
-        shares = data.overturned_share.values[indices]
-        level_names = self._format_levels()
         return draw_shares(
             azimuth=full_circle[order],
             shares=np.concatenate([shares, shares[:, is_new]], axis=1)[:, order],
@@ -255,13 +236,12 @@ def _name_pairs(pairs: Pairs) -> dict[str, Pair]:
     entries = [*pairs.values()] if isinstance(pairs, Mapping) else checks.items(pairs, "pairs", InvalidOption)
     lists = [list_motions(pair) for pair in entries if not isinstance(pair, Motion)]
     if not lists or len(lists) < len(entries) or any(len(components) != 2 for components in lists):
-        raise InvalidOption(
-            "{} must contain a pair of horizontal components for each site, as [(first, second)]", "pairs", value=pairs
-        )
+        message = "{} must contain a pair of horizontal components for each site, as [(first, second)]"
+        raise InvalidOption(message, "pairs", value=pairs)
     names = [f"{first.name} and {second.name}" for first, second in lists]
     unique_names = [f"{name} #{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
-    motion_pairs = ((first, second) for first, second in lists)
-    return dict(zip(map(str, pairs) if isinstance(pairs, Mapping) else unique_names, motion_pairs, strict=True))
+    keys = map(str, pairs) if isinstance(pairs, Mapping) else unique_names
+    return {key: (first, second) for key, (first, second) in zip(keys, lists, strict=True)}
 
 
 def _compute_pair_factors(scales: Scales, pair: Pair) -> Any:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +12,13 @@ from numpy.typing import ArrayLike
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import (
     MIRROR_NOTE,
+    assign_clusters,
+    assign_families,
     compute_intensities,
     compute_units,
     describe_pool,
     describe_sample,
     normalise_weights,
-    number_clusters,
-    number_families,
 )
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
@@ -112,29 +111,24 @@ def compare_measures(
     period_values = checks.positive_numbers(periods, "periods", InvalidOption)
     spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
     measures = [Measure("pga"), Measure("pgv"), *spectral_measures, Measure("pga_ratio"), Measure("pgv_ratio")]
-    cluster_numbers = number_clusters(motions, clusters)
+    cluster_numbers = assign_clusters(motions, clusters)
     _check_sample_size(len(np.unique(cluster_numbers)), clusters)
     analysis = incremental_dynamic_analysis(bodies, motions, measure="pga_ratio", model=model, rtol=rtol)
     levels = analysis.data.overturning_level.transpose("motion", "block").values
-    factors = levels * compute_units(bodies, measures[-2], model) / compute_intensities(motions, measures[0])[:, None]
-    intensity = [
-        factors * compute_intensities(motions, measure)[:, None] / compute_units(bodies, measure, model)
-        for measure in measures
-    ]
-    families = number_families(motions, reversed_too=bodies.is_symmetric)
+    values = [compute_intensities(motions, measure)[:, None] for measure in measures]
+    units = [compute_units(bodies, measure, model) for measure in measures]
+    factors = levels * units[-2] / values[0]  # on the motions; levels are of pga_ratio
+    intensity = np.array([factors * value / unit for value, unit in zip(values, units, strict=True)])
+    families = assign_families(motions, reversed_too=bodies.is_symmetric)
     is_first = np.isin(np.arange(len(motions)), np.unique(families, return_index=True)[1])
     is_counted = is_first[:, None] & np.isfinite(levels)
     cluster_counts = [len(np.unique(cluster_numbers[overturns])) for overturns in is_counted[:, block_weights > 0.0].T]
     _check_sample_size(min(cluster_counts), clusters)
-    dataset = _combine_dispersions(
-        measures, np.array(intensity), is_counted, block_weights, dof=min(cluster_counts) - 1
-    )
+    dataset = _combine_dispersions(measures, intensity, is_counted, block_weights, dof=min(cluster_counts) - 1)
     attributes = {"blocks": describe_pool(blocks, weights), "model": model, "damping": damping}
-    attributes["sample"] = describe_sample(cluster_numbers, clusters)
+    attributes |= {"sample": describe_sample(cluster_numbers, clusters), "sides_differ": analysis.data.sides_differ}
     coordinates = {name: analysis.data[name] for name in ("motion", "vertical") if name in analysis.data.coords}
-    return MeasureComparison(
-        dataset.assign_coords(coordinates).assign_attrs(attributes, sides_differ=analysis.data.sides_differ)
-    )
+    return MeasureComparison(dataset.assign_coords(coordinates).assign_attrs(attributes))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,12 +159,10 @@ class MeasureComparison(DatasetResult):
     'PGV 0.03'
     """
 
-    TABLES = MappingProxyType(
-        {
-            "measures": ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"),
-            "intensities": ("intensity",),
-        }
-    )
+    TABLES: ClassVar = {
+        "measures": ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"),
+        "intensities": ("intensity",),
+    }
     POOLED = ("motion", "block")
 
     @property
@@ -199,7 +191,7 @@ class MeasureComparison(DatasetResult):
         if missing := int(np.sum(np.isnan(data.intensity.values[0]))):
             pairs = format_count(missing, "pair")
             lines.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
-        return "\n".join(lines + ([f"note: {MIRROR_NOTE}"] if data.sides_differ else []))
+        return "\n".join(lines + [f"note: {MIRROR_NOTE}"] * data.sides_differ)
 
     def to_dict(self) -> dict[str, Any]:
         data, names = self.data, self.TABLES["measures"]
@@ -256,10 +248,7 @@ def _combine_dispersions(
             "dispersion_high": variable("measure", high, "upper end of its interval", "1"),
             "dispersion_of_all": variable("measure", pooled, f"{spread} about one mean of all blocks", "1"),
         },
-        {
-            "measure": [measure.short_name for measure in measures],
-            "unit": ("measure", [measure.units for measure in measures]),
-        },
+        {"measure": [item.short_name for item in measures], "unit": ("measure", [item.units for item in measures])},
     )
 
 
@@ -267,6 +256,5 @@ def _check_sample_size(count: int, clusters: object) -> None:
     """Raise an error for a sample of one cluster, or of one motion without clusters."""
     if count < 2:
         argument, kind = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
-        raise InvalidOption(
-            f"fewer than two {{}}{kind} overturn a block at any scale; a dispersion requires at least two", argument
-        )
+        message = f"fewer than two {{}}{kind} overturn a block at any scale; a dispersion requires at least two"
+        raise InvalidOption(message, argument)

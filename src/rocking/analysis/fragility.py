@@ -15,8 +15,8 @@ from rocking.analysis.curve import (
     FragilityCurve,
     LossCategory,
     check_counts,
+    convert_to_openquake_measure,
     create_fragility_line,
-    find_openquake_measure,
     fit_curve,
     format_intensity,
     format_interval,
@@ -25,8 +25,12 @@ from rocking.analysis.curve import (
 )
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
+    RATIO_VARIABLES,
+    assign_clusters,
+    assign_groups,
     check_limit_states,
     check_state_mapping,
+    compute_exceedances,
     compute_intensities,
     compute_ratios,
     compute_units,
@@ -35,11 +39,8 @@ from rocking.analysis.levels import (
     describe_pool,
     describe_sample,
     describe_undecided,
-    exceeds_limit,
     find_single_block,
     normalise_positive_weights,
-    number_clusters,
-    number_groups,
     simulate_levels,
 )
 from rocking.analysis.risk import Risk, Survival, compute_mean_survival, compute_risk
@@ -138,15 +139,15 @@ class Fragility(Result):
             ]
             for curve in self.curves
         ]
-        between = f"{100 * self.curves[0].confidence:g} % between"
-        table = format_table(["limit state", "exceeded", "median", between, "dispersion", between, "p of fit"], rows)
+        heading = f"{100 * self.curves[0].confidence:g} % between"
+        table = format_table(["limit state", "exceeded", "median", heading, "dispersion", heading, "p of fit"], rows)
         notes = [f"note: {sentence}" for sentence in self.notes]
         return "\n".join([f"{self.description}; intensity: {self.measure.label}", "", table, *notes])
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Limitations of the curves (small samples, poor fits, undecided outcomes), one sentence each."""
-        notes = [text for text in (self.missing, self.undecided) if text]
+        notes = [message for message in (self.missing, self.undecided) if message]
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
@@ -162,10 +163,8 @@ class Fragility(Result):
             if curve.bounded and math.isinf(curve.dispersion_interval[1])
         ]
         if not independent:
-            notes.append(
-                f"there is no p of fit: the test takes all outcomes for independent, and those of one {self.source} "
-                "belong together"
-            )
+            reason = f"the test takes all outcomes for independent, and those of one {self.source} belong together"
+            notes.append(f"there is no p of fit: {reason}")
         elif self.curves[0].goodness.degrees_of_freedom < 1:
             notes.append("there is no p of fit: the test needs three groups of outcomes, of five or so each")
         return tuple(notes)
@@ -254,18 +253,14 @@ class Fragility(Result):
 
     def _columns(self, table: str) -> list[Column]:
         if table == "curves":
-            intensities = np.linspace(0.0, self.range[1], _POINTS)
-            values = np.concatenate(
-                [[intensities, curve.probability(intensities), *curve.band(intensities)] for curve in self.curves],
-                axis=1,
-            )
-            names = [curve.limit_state for curve in self.curves for _ in intensities]
-            columns = zip((self.measure.column, "probability", "lower", "upper"), values, strict=True)
-            return [Column("limit_state", names), *(Column(name, column) for name, column in columns)]
+            x = np.linspace(0.0, self.range[1], _POINTS)
+            values = np.hstack([[x, curve.probability(x), *curve.band(x)] for curve in self.curves])
+            limit_states = np.repeat([curve.limit_state for curve in self.curves], _POINTS)
+            names = ("limit_state", self.measure.column, "probability", "lower", "upper")
+            return [*map(Column, names, [limit_states, *values])]
         if self.outcomes is None:
-            raise InvalidOption(
-                "this fragility was fitted to observed outcomes, so that there are no simulations to write"
-            )
+            origin = "this fragility was fitted to observed outcomes"
+            raise InvalidOption(f"{origin}, so that there are no simulations to write")
         return [Column(str(name), self.outcomes[name]) for name in self.outcomes]
 
     def to_nrml(
@@ -304,12 +299,12 @@ class Fragility(Result):
         if block is not None:
             gather_bodies(block)
         unit_block = self.block if block is None else block
-        imt = find_openquake_measure(self.measure, unit_block, self.model)
-        no_damage = None
-        if unit_block is not None and imt[0] == "PGA" and not self.with_vertical:
-            no_damage = min(unit_block.uplift_thresholds(self.model)) / STANDARD_GRAVITY
-        attributes = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
-        write_text(path, format_nrml(self.curves, imt, self.range, no_damage, taxonomy, self.description, **attributes))
+        measure = convert_to_openquake_measure(self.measure, unit_block, self.model)
+        uplift = None
+        if unit_block is not None and measure[0] == "PGA" and not self.with_vertical:
+            uplift = min(unit_block.uplift_thresholds(self.model)) / STANDARD_GRAVITY
+        options = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
+        write_text(path, format_nrml(self.curves, measure, self.range, uplift, taxonomy, self.description, **options))
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import draw_fragility
@@ -319,13 +314,13 @@ class Fragility(Result):
         if not first_curve.bounded:
             band_label = f"no band: {self._few_clusters_text}"
         intensity = np.linspace(0.0, self.range[1], _POINTS)
-        limit_states = [curve.limit_state for curve in self.curves]
+        limit_state = first_curve.limit_state if len(self.curves) == 1 else "the limit state"
+        verb = "" if limit_state == "overturning" else "exceeding "
         return draw_fragility(
             lines=[create_fragility_line(curve, intensity, self.measure) for curve in self.curves],
             intensity_label=self.measure.label,
             band_label=band_label,
-            probability_label=f"probability of {'' if limit_states == ['overturning'] else 'exceeding '}"
-            + (limit_states[0] if len(limit_states) == 1 else "the limit state"),
+            probability_label=f"probability of {verb}{limit_state}",
             title=title or escape_dollars(self.description),
             ax=ax,
             figsize=figsize,
@@ -411,13 +406,9 @@ def fragility(
     if stripes is not None and stripes.size < 2:
         raise InvalidOption(f"{{}} must contain at least two levels; got {stripes.size}", "levels", value=levels)
     motions = list_motions(motions)
-    values, cluster_numbers, units = (
-        compute_intensities(motions, measure),
-        number_clusters(motions, clusters),
-        compute_units(bodies, measure, model),
-    )
-    options: dict[str, Any] = {"chattering": chattering}
-    options["polarity"] = "+" if mirrored else polarity
+    values, cluster_numbers = compute_intensities(motions, measure), assign_clusters(motions, clusters)
+    units = compute_units(bodies, measure, model)
+    options: dict[str, Any] = {"chattering": chattering, "polarity": "+" if mirrored else polarity}
     if stripes is None:
         table = simulate_many(bodies, motions, model=model, **options).expand_dims("level")
         intensity = (values[:, None] / units)[None, :, :, None]
@@ -427,21 +418,20 @@ def fragility(
     table = table if "polarity" in table.dims else table.expand_dims("polarity")
     table = table.transpose("level", "motion", "block", "polarity")
     missing = table.unfinished.values
-    ratio = compute_ratios(table.peak_rotation.values, table.overturned.values, missing, slenderness[:, None])
-    trial_clusters = np.broadcast_to(cluster_numbers[None, :, None, None], ratio.shape)
+    ratio = compute_ratios(slenderness[:, None], *(table[name].values for name in RATIO_VARIABLES))
     x, trials = (np.broadcast_to(array, ratio.shape).ravel() for array in (intensity, block_weights[:, None]))
+    trial_clusters = np.broadcast_to(cluster_numbers[:, None, None], ratio.shape).ravel()
     outcomes = create_outcome_table(table, measure, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
     # Abandoned simulations and blocks of weight 0 are reported, but excluded from the fit.
     is_counted = (trials > 0.0) & ~missing.ravel()
-    x, trials, trial_clusters = (x[is_counted], trials[is_counted], trial_clusters.ravel()[is_counted])
-    data = {
-        name: (x, trials * exceeds_limit(ratio, limit, name).ravel()[is_counted], trials)
-        for name, limit in states.items()
-    }
+    x, trials, trial_clusters = x[is_counted], trials[is_counted], trial_clusters[is_counted]
+    curves = []
     try:
-        curves = [fit_curve(name, data[name], trial_clusters, confidence, measure, states[name]) for name in states]
+        for name, limit in states.items():
+            data = x, trials * compute_exceedances(ratio, limit, name).ravel()[is_counted], trials
+            curves.append(fit_curve(name, data, trial_clusters, confidence, measure, limit))
     except Unfitted as error:
         error.outcomes = outcomes
         raise
@@ -534,7 +524,7 @@ def fit_fragility(
         checks.between(float(end), "intensity", InvalidOption, 1e-50, 1e50)
     counts = check_counts(trials, "trials", x.size, 1.0, 2.0**53)
     outcomes = check_state_mapping(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
-    groups = None if clusters is None else number_groups(clusters, "clusters", x.size)
+    groups = None if clusters is None else assign_groups(clusters, "clusters", x.size)
     checks.fraction(confidence, "confidence", InvalidOption)
     curves = [
         fit_curve(name, (x, check_counts(values, "exceeded", x.size, 0.0, counts), counts), groups, confidence, measure)

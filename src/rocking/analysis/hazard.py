@@ -100,13 +100,11 @@ class HazardCurve(Result):
         measure_input: Any = self.measure
         measure = Measure.parse(measure_input)
         if measure.units == "1":
-            raise InvalidOption(
-                f"a hazard curve must be of pga, pgv or sa, which do not depend on a block; got {measure.name}"
-            )
+            message = "a hazard curve must be of pga, pgv or sa, which do not depend on a block"
+            raise InvalidOption(f"{message}; got {measure.name}")
         for name, value in (("intensity", intensity), ("rate", rate), ("measure", measure)):
             object.__setattr__(self, name, value)
-        for array in (intensity, rate):
-            array.setflags(write=False)
+        intensity.flags.writeable = rate.flags.writeable = False
 
     @classmethod
     def read(cls, path: str | Path, *, site: int = 0, period: float | None = None) -> HazardCurve:
@@ -142,8 +140,8 @@ class HazardCurve(Result):
         try:
             lines = file.read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
-            raise InvalidOption(f"the file cannot be read: {reason}", path=str(file)) from error
+            message = error.strerror if isinstance(error, OSError) else "it is not a text file"
+            raise InvalidOption(f"the file cannot be read: {message}", path=str(file)) from error
         try:
             if lines and "investigation_time" in lines[0]:
                 return cls(*_parse_openquake(lines, site, period), file.stem)
@@ -174,11 +172,9 @@ class HazardCurve(Result):
         }
 
     def summary(self) -> str:
-        rows = [
-            [self.measure.display_factor * x, rate, 1.0 / rate]
-            for x, rate in zip(self.intensity, self.rate, strict=True)
-        ]
-        return format_table([self.measure.label, "annual rate", "return period (years)"], rows)
+        columns = self.measure.display_factor * self.intensity, self.rate, 1.0 / self.rate
+        header = [self.measure.label, "annual rate", "return period (years)"]
+        return format_table(header, [*zip(*columns, strict=True)])
 
     def _headline(self) -> str:
         low, high = convert_range(self)
@@ -229,9 +225,8 @@ def normalise_heading(cell: str) -> str:
 
 def _parse_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:
     """Read intensities (SI), annual rates and measure from a table of two columns with comments (#)."""
-    (_, header), *rows = read_csv_rows("\n".join("" if line.lstrip().startswith("#") else line for line in lines)) or [
-        (1, [])
-    ]
+    text = "\n".join("" if line.lstrip().startswith("#") else line for line in lines)
+    (_, header), *rows = read_csv_rows(text) or [(1, [])]
     heading = [normalise_heading(cell) for cell in header]
     intensity_headings = [cell for cell in heading if cell in HEADINGS]
     if len(intensity_headings) != 1 or heading.count("annual_rate") != 1:
@@ -240,23 +235,20 @@ def _parse_table(lines: list[str], period: float | None) -> tuple[Floats, Floats
             f"got {', '.join(header) or 'nothing'}"
         )
     kind, factor = HEADINGS[intensity_headings[0]]
-    intensity, rate = np.empty(len(rows)), np.empty(len(rows))
+    intensity, rate = np.empty((2, len(rows)))
     for k, (line, row) in enumerate(rows):
         try:
             cells = dict(zip(heading, row, strict=True))
             intensity[k], rate[k] = (float(cells[name]) for name in (intensity_headings[0], "annual_rate"))
         except ValueError:
-            sentence = (
-                f"expected an intensity and a rate in {len(heading)} cells, as in the heading; got {','.join(row)}"
-            )
-            raise InvalidOption(sentence, line=line) from None
+            expected = f"an intensity and a rate in {len(heading)} cells, as in the heading"
+            raise InvalidOption(f"expected {expected}; got {','.join(row)}", line=line) from None
     if kind == "sa" and period is None:
         raise InvalidOption("a spectral acceleration requires {}, in s", "period")
     if kind != "sa" and period is not None:
-        raise InvalidOption(
-            f"{{}} applies only to spectral acceleration, but the intensity measure of this curve is {kind}", "period"
-        )
-    measure = Measure("sa", period) if kind == "sa" else Measure(kind)
+        message = f"{{}} applies only to spectral acceleration, but the intensity measure of this curve is {kind}"
+        raise InvalidOption(message, "period")
+    measure = Measure(kind, period)
     with np.errstate(over="ignore"):  # infinite values are rejected later
         return factor * intensity, rate, measure
 
@@ -268,10 +260,8 @@ def _parse_openquake(lines: list[str], site: int, period: float | None) -> tuple
     header, *rows = [*csv.reader(lines[1:])] or [[]]
     levels = {k: cell.strip()[4:] for k, cell in enumerate(header) if cell.strip().startswith("poe-")}
     if kind not in _OPENQUAKE_MEASURES or not levels:
-        raise InvalidOption(
-            f"the imt of a hazard curve must be one of {', '.join(_OPENQUAKE_MEASURES)}; got "
-            f"{fields.get('imt', 'none')}"
-        )
+        message = f"the imt of a hazard curve must be one of {', '.join(_OPENQUAKE_MEASURES)}"
+        raise InvalidOption(f"{message}; got {fields.get('imt', 'none')}")
     if site >= len(rows):
         raise InvalidOption(f"there is no site {site}; the file contains {len(rows)}, counted from 0")
     try:
@@ -282,17 +272,14 @@ def _parse_openquake(lines: list[str], site: int, period: float | None) -> tuple
     except (ValueError, IndexError, KeyError) as error:
         raise InvalidOption(f"the hazard curve of site {site} is incomplete or damaged: {error}") from None
     if period not in (None, spectral_period):
-        raise InvalidOption(
-            f"{{}} is {period:g} s, but the intensity measure of this curve is {fields['imt']}; omit it", "period"
-        )
+        message = f"{{}} is {period:g} s, but the intensity measure of this curve is {fields['imt']}; omit it"
+        raise InvalidOption(message, "period")
     measure_name, factor = _OPENQUAKE_MEASURES[kind]
-    measure = Measure(measure_name) if spectral_period is None else Measure("sa", spectral_period)
     # Probabilities printed as 0 or 1 contain no information on the rate.
     is_informative = (probabilities > 0.0) & (probabilities < 1.0)
-    indices, rate = _select_corners(
-        -np.log1p(-probabilities[is_informative]) / checks.positive(years, "investigation_time", InvalidOption)
-    )
-    return factor * intensity[is_informative][indices], rate, measure
+    rates = -np.log1p(-probabilities[is_informative]) / checks.positive(years, "investigation_time", InvalidOption)
+    indices, rate = _select_corners(rates)
+    return factor * intensity[is_informative][indices], rate, Measure(measure_name, spectral_period)
 
 
 def _select_corners(rate: Floats) -> tuple[Integers, Floats]:
@@ -324,10 +311,9 @@ def compute_log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
         near, far = np.where(is_mirrored, lower, -upper), np.where(is_mirrored, upper, -lower)
         end = np.where(is_mirrored, *ends)
         z = a + b * end
-        decay = (
-            np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * erfcx(far * _SQRT_HALF) / erfcx(near * _SQRT_HALF)
-        )
-        tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * erfcx(near * _SQRT_HALF)) + np.log1p(-decay)
+        near_tail, far_tail = erfcx(near * _SQRT_HALF), erfcx(far * _SQRT_HALF)
+        decay = np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * far_tail / near_tail
+        tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * near_tail) + np.log1p(-decay)
         central = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
     # The weakest motions always exceed the limit of a curve that does not rise, unless its probability is 0.
     unbounded = np.where(np.isneginf(a), -np.inf, np.inf)
@@ -368,8 +354,9 @@ def _repeat_ends(values: Floats) -> Floats:
     return np.concatenate([values[:1], values, values[-1:]])
 
 
-def _compute_log_total(fitted: Probit, hazard: HazardCurve) -> float:
-    return float(np.logaddexp.reduce(compute_log_parts(fitted, hazard)[0]))
+def compute_log_rate(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Compute logarithms of integrals of P(x) |d rate(x)|, with the curve's extrapolations, shape (fits, 1)."""
+    return np.asarray(np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1)[:, None])
 
 
 def _compute_log_products(fitted: Probit, hazard: HazardCurve, log_intensity: Floats) -> tuple[Floats, Floats]:
@@ -385,7 +372,7 @@ def _compute_log_products(fitted: Probit, hazard: HazardCurve, log_intensity: Fl
 
 def compute_shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
     """Compute shares of the integral of P(x) |d rate(x)| below and above the hazard curve, by parts."""
-    parts, total = compute_log_parts(fitted, hazard)[0], _compute_log_total(fitted, hazard)
+    parts, total = compute_log_parts(fitted, hazard)[0], compute_log_rate(fitted, hazard)[0, 0]
     first, last = _compute_log_products(fitted, hazard, np.log(hazard.intensity[[0, -1]]))[0]
     with np.errstate(all="ignore"):
         below = np.exp(parts[0] - total) * max(-math.expm1(min(first - parts[0], 0.0)), 0.0)
@@ -395,7 +382,6 @@ def compute_shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, f
 
 def compute_share_density(fitted: Probit, hazard: HazardCurve, intensity: Floats) -> Floats:
     """Compute the density of the rate by ln x, normalised to an integral of 1."""
+    log_density = _compute_log_products(fitted, hazard, np.log(intensity))[1] - compute_log_rate(fitted, hazard)[0, 0]
     with np.errstate(under="ignore"):
-        return np.asarray(
-            np.exp(_compute_log_products(fitted, hazard, np.log(intensity))[1] - _compute_log_total(fitted, hazard))
-        )
+        return np.asarray(np.exp(log_density))

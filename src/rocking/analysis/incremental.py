@@ -1,43 +1,40 @@
-"""Incremental dynamic analysis, and critical scales of motions."""
+"""Incremental dynamic analysis: bands of levels at which scaled motions overturn blocks."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis.levels import (
     MIRROR_NOTE,
-    Boundaries,
-    compose_motion_labels,
+    Brackets,
     compute_intensities,
     compute_units,
+    create_motion_labels,
     describe_blocks,
     describe_undecided,
     find_boundaries,
+    list_missing_notes,
     simulate_levels,
 )
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.core.bisection import bisect
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
 from rocking.core.tables import add_unit, escape_dollars, format_count, format_table
 from rocking.engine.problem import compute_slenderness, compute_thresholds, gather_bodies, never_rests
 from rocking.engine.schemes import Certified
-from rocking.engine.tasks import Setup, describe_missing, simulate_each
+from rocking.engine.tasks import Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.records.named import Motions, check_motion, list_motions
-from rocking.response import Gradient, Response, gradient
-from rocking.simulation.simulate import simulate
+from rocking.records.named import Motions, list_motions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -120,43 +117,36 @@ def incremental_dynamic_analysis(
     slenderness = compute_slenderness(bodies)
     values = compute_intensities(motion_list, measure)
     if never_rests(bodies):
-        raise InvalidOption(
-            "{} must be below 1 for an incremental dynamic analysis, because otherwise the block never comes to rest",
-            "restitution",
-        )
+        reason = "because otherwise the block never comes to rest"
+        raise InvalidOption(f"{{}} must be below 1 for an incremental dynamic analysis, {reason}", "restitution")
     relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model}
-    lowest_uplift = _find_lowest_uplift(bodies, motion_list, values, measure, model)
+    lowest_uplift = _compute_lowest_uplift(bodies, motion_list, values, measure, model)
     if levels is None:
         table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
     else:
         level_values = checks.increasing_numbers(levels, "levels", InvalidOption)
         table = simulate_levels(bodies, motion_list, measure, level_values, **options)
     factors = compute_units(bodies, measure, model)[None, :] / values[:, None]
+    # The scheme of the levels determines how often the restitution is drawn.
+    setup = Setup(bodies, model, Certified())
 
-    def find_overturned(column: Integers, level: Floats) -> Integers:
+    def simulate_overturned(column: Integers, level: Floats) -> Integers:
         is_overturned = np.empty(column.size, dtype=np.int64)
         motion, block = np.divmod(column, len(bodies))
-        # Use the scheme of the levels, which determines how often the restitution is drawn.
-        setup = Setup(bodies, model, Certified())
         for k, outcomes in simulate_each(setup, motion_list, block, motion, level * factors[motion, block]):
             is_overturned[k] = outcomes["overturned"]
         return is_overturned
 
-    overturned_grid = table.overturned.transpose("level", "motion", "block").values
-    flat_grid = overturned_grid.reshape(len(overturned_grid), -1).astype(np.int64)
-    brackets = find_boundaries(table.level.values, flat_grid, find_overturned, rtol=relative_width)
+    grid = table.overturned.transpose("level", "motion", "block").values
+    flat_grid = grid.reshape(len(grid), -1).astype(np.int64)
+    brackets = find_boundaries(table.level.values, flat_grid, simulate_overturned, rtol=relative_width)
     dataset = _combine_bands(table, flat_grid, brackets, slenderness, measure)
-    attributes = {
-        "blocks": describe_blocks(blocks),
-        "lowest_uplift": lowest_uplift,
-        "sides_differ": int(not bodies.is_symmetric),
-    }
-    scales = (table.level.values[:, None, None] * factors)[..., None]
-    attributes["undecided"] = describe_undecided(
-        Setup(bodies, model, Certified()), motion_list, scales, overturned_grid[..., None]
-    )
-    return IncrementalDynamicAnalysis(dataset.assign_attrs(attributes))
+    scales = table.level.values[:, None, None] * factors
+    undecided = describe_undecided(setup, motion_list, scales[..., None], grid[..., None])
+    sides_differ, block_text = int(not bodies.is_symmetric), describe_blocks(blocks)
+    attributes = {"blocks": block_text, "lowest_uplift": lowest_uplift, "sides_differ": sides_differ}
+    return IncrementalDynamicAnalysis(dataset.assign_attrs(attributes, undecided=undecided))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,26 +177,21 @@ class IncrementalDynamicAnalysis(DatasetResult):
     [False, False, True]
     """
 
-    TABLES = MappingProxyType(
-        {
-            "levels": ("peak_rotation", "peak_over_alpha", "overturned"),
-            "bands": ("band_motion", "band_block", "band_start", "band_end"),
-        }
-    )
+    TABLES: ClassVar = {
+        "levels": ("peak_rotation", "peak_over_alpha", "overturned"),
+        "bands": ("band_motion", "band_block", "band_start", "band_end"),
+    }
     POOLED = ("motion", "level", "block", "band")
 
     def _table(self, name: str) -> xr.Dataset:
         part = super()._table(name)
         if name == "levels":
             return part
-        motion_index = self.data.band_motion.values  # the names of the other table permit a join
-        labels = {
-            name: ("band", self.data[name].values[motion_index])
-            for name in ("motion", "vertical", "record")
-            if name in self.data.coords
-        }
-        block = ("band", self.data.band_block.values)
-        return part[[]].assign(labels | {"block": block, "band_start": part.band_start, "band_end": part.band_end})
+        index, coords = self.data.band_motion.values, self.data.coords  # the names of the other table permit a join
+        labels = {name: coords[name].values[index] for name in ("motion", "vertical", "record") if name in coords}
+        labels["block"] = self.data.band_block.values
+        columns = {name: ("band", values) for name, values in labels.items()}
+        return part[[]].assign(columns | {"band_start": part.band_start, "band_end": part.band_end})
 
     def bands(self, *, block: int = 0, motion: int = 0) -> list[tuple[float, float]]:
         """Return start and end of the bands of levels that overturn a block under a motion, both by position.
@@ -222,31 +207,27 @@ class IncrementalDynamicAnalysis(DatasetResult):
         return checks.integer(position, dimension, InvalidOption, 0, self.data.sizes[dimension] - 1)
 
     def summary(self) -> str:
-        data = self.data
-        has_several_blocks = data.sizes["block"] > 1
-        level_description = _LevelDescription(data.level)
+        data, levels = self.data, _LevelDescription(self.data.level)
+        block_count = data.sizes["block"]
+        has_several_blocks = block_count > 1
         coordinate = "record" if "record" in data.coords else "motion"
         rows = [
-            [
-                label,
-                *([b] if has_several_blocks else []),
-                level_description.describe_bands(self.bands(block=b, motion=m)),
-            ]
-            for m, label in enumerate(compose_motion_labels(data, coordinate, with_history=False))
-            for b in range(data.sizes["block"])
+            [label, *([b] * has_several_blocks), levels.describe_bands(self.bands(block=b, motion=m))]
+            for m, label in enumerate(create_motion_labels(data, coordinate, with_history=False))
+            for b in range(block_count)
         ]
-        blocks = data.blocks if not has_several_blocks else format_count(data.sizes["block"], "block")
-        table = format_table([coordinate, *(["block"] if has_several_blocks else []), "overturns"], rows)
+        blocks = format_count(block_count, "block") if has_several_blocks else data.blocks
+        table = format_table([coordinate, *(["block"] * has_several_blocks), "overturns"], rows)
         headline = f"{blocks}, {data.model} model; {data.level.label} that overturns"
-        notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
-        notes.append(f"note: {data.undecided}")
-        notes += [f"note: {text}"] if (text := describe_missing(np.isnan(data.peak_over_alpha.values))) else []
-        return "\n".join([headline, level_description.summary(data.lowest_uplift), "", table, *notes])
+        notes = [*[f"note: {MIRROR_NOTE}"] * data.sides_differ, f"note: {data.undecided}"]
+        notes += list_missing_notes(np.isnan(data.peak_over_alpha.values))
+        return "\n".join([headline, levels.summary(data.lowest_uplift), "", table, *notes])
 
     def to_dict(self) -> dict[str, Any]:
         data, units = self.data, self.data.level.units
         peaks = data.peak_over_alpha.transpose("motion", "block", "level").values
         lowest = data.overturning_level.transpose("motion", "block").values
+        ends = add_unit("from", units), add_unit("to", units)
         return {
             "blocks": data.blocks,
             "model": data.model,
@@ -261,10 +242,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
                     **({"vertical": str(data.vertical.values[m])} if "vertical" in data.coords else {}),
                     "block": b,
                     add_unit("overturning_level", units): float(lowest[m, b]),
-                    "overturns": [
-                        {add_unit("from", units): low, add_unit("to", units): high}
-                        for low, high in self.bands(block=b, motion=m)
-                    ],
+                    "overturns": [dict(zip(ends, band, strict=True)) for band in self.bands(block=b, motion=m)],
                     "peak_over_alpha": peaks[m, b],
                 }
                 for m in range(data.sizes["motion"])
@@ -280,13 +258,11 @@ class IncrementalDynamicAnalysis(DatasetResult):
 
         data, block = self.data, self._check_position(block, "block")
         levels = data.level.scale * data.level.values
-        ends = np.array([levels[0], levels[-1]])
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
         motions = []
-        for m, label in enumerate(compose_motion_labels(data, with_history=False)):
+        for m, label in enumerate(create_motion_labels(data, with_history=False)):
             bands = data.level.scale * np.array(self.bands(block=block, motion=m)).reshape(-1, 2)
-            bands = np.where(np.isnan(bands), ends, bands)
-            motions.append(ScaledMotion(label, levels, peaks[m], bands))
+            motions.append(ScaledMotion(label, levels, peaks[m], np.where(np.isnan(bands), levels[[0, -1]], bands)))
         block_text = data.blocks if data.sizes["block"] == 1 else f"block {block}"
         return draw_ida(
             motions=motions,
@@ -297,19 +273,16 @@ class IncrementalDynamicAnalysis(DatasetResult):
         )
 
 
-def _find_lowest_uplift(
+def _compute_lowest_uplift(
     blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model
 ) -> float:
     """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""
-    thresholds, weight_thresholds = compute_thresholds(blocks, model)
-    factors = np.array(
-        [compute_uplift_factors(motion, thresholds, blocks.gravity, weight_thresholds) for motion in motions]
-    )
-    lowest = float(np.min(factors * values[:, None] / compute_units(blocks, measure, model)))
+    (thresholds, weight_thresholds), gravity = compute_thresholds(blocks, model), blocks.gravity
+    factors = [compute_uplift_factors(motion, thresholds, gravity, weight_thresholds) for motion in motions]
+    lowest = float(np.min(np.array(factors) * values[:, None] / compute_units(blocks, measure, model)))
     if math.isinf(lowest):
-        raise InvalidOption(
-            "no motion lifts a block at any level, because of direction or vertical component; use other motions"
-        )
+        message = "no motion lifts a block at any level, because of direction or vertical component"
+        raise InvalidOption(f"{message}; use other motions")
     return lowest
 
 
@@ -333,7 +306,7 @@ def _simulate_until_overturned(
 
 
 def _combine_bands(
-    table: xr.Dataset, flat_grid: Integers, brackets: Boundaries, alpha: Floats, measure: Measure
+    table: xr.Dataset, flat_grid: Integers, brackets: Brackets, alpha: Floats, measure: Measure
 ) -> xr.Dataset:
     """Pair the levels of outcome changes in a (level, column) grid, NaN for bands beyond it."""
     import xarray as xr
@@ -349,13 +322,8 @@ def _combine_bands(
     lowest = np.full((table.sizes["motion"], len(alpha)), np.inf)
     np.minimum.at(lowest, (motion, block), np.array(starts, dtype=float))
     lowest[np.isinf(lowest)] = np.nan
-    attributes = {
-        "units": measure.units,
-        "long_name": measure.quantity,
-        "label": measure.label,
-        "scale": measure.display_factor,
-    }
-    attributes |= measure.options()
+    attributes: dict[str, Any] = {"units": measure.units, "long_name": measure.quantity, "label": measure.label}
+    attributes |= {"scale": measure.display_factor, **measure.options()}
     table = table.assign_coords(level=("level", table.level.values, attributes))
     slenderness = xr.DataArray(alpha, dims="block")
     over_alpha = (table.peak_rotation / slenderness).where(~table.overturned, np.inf).where(~table.unfinished)
@@ -380,7 +348,7 @@ class _LevelDescription:
 
     def summary(self, lowest_uplift: float) -> str:
         """Describe the levels, and whether all of them are below the level (SI) at which a motion lifts a block."""
-        text = f"looked at: {format_count(len(self.values), 'level')}, {self.range}"
+        sentence = f"looked at: {format_count(len(self.values), 'level')}, {self.range}"
         if len(self.values) > 1:
             steps, ratios = np.diff(self.values), self.values[1:] / self.values[:-1]
             apart = f"up to {steps.max():.5g}{self.unit}"
@@ -388,17 +356,16 @@ class _LevelDescription:
                 apart = f"{steps[0]:.5g}{self.unit}"
             elif np.allclose(ratios, ratios[0], rtol=1e-6):
                 apart = f"{100.0 * (ratios[0] - 1.0):.3g} %"
-            text += f", {apart} apart; bands and gaps that lie between two of them are not seen"
-        lifting = self.scale * lowest_uplift
-        if self.values[-1] < lifting:
-            text += f"\nnone of them lifts a block; that begins at {lifting:.5g}{self.unit}: are the levels right?"
-        return text
+            sentence += f", {apart} apart; bands and gaps that lie between two of them are not seen"
+        uplift = self.scale * lowest_uplift
+        if self.values[-1] < uplift:
+            sentence += f"\nnone of them lifts a block; that begins at {uplift:.5g}{self.unit}: are the levels right?"
+        return sentence
 
     def describe_bands(self, bands: Sequence[tuple[float, float]]) -> str:
         """Describe the bands that overturn (SI). NaN marks unknown ends beyond the levels."""
-        return "; ".join(self._describe_band(*(self.scale * end for end in band)) for band in bands) or (
-            f"at no level looked at, {self.range}"
-        )
+        texts = [self._describe_band(*(self.scale * end for end in band)) for band in bands]
+        return "; ".join(texts) or f"at no level looked at, {self.range}"
 
     def _describe_band(self, low: float, high: float) -> str:
         if not (math.isnan(low) or math.isnan(high)):
@@ -407,139 +374,3 @@ class _LevelDescription:
             return f"at every level looked at, {self.range}"
         open_end = f"up to {high:.5g}{self.unit}" if math.isnan(low) else f"from {low:.5g}{self.unit} on"
         return f"at all levels looked at {open_end}"
-
-
-_NO_BALANCE: Final = (
-    "the outcome changes without the block coming to the balance point: by a touch of the ground without speed, or at "
-    "a rest"
-)
-
-
-@dataclass(frozen=True)
-class CriticalScale:
-    """Critical scale of a motion with its derivatives, computed by `critical_scale`.
-
-    Attributes
-    ----------
-    scale : float
-        Smallest floating-point scale that overturns the block, next to a scale that does not.
-    gradient : Gradient
-        Derivatives with respect to the unscaled motion and the initial state, with the scale in `Gradient.value`. If
-        the outcome changes although the block does not reach the balance point, all derivatives are NaN, and
-        `Gradient.reason` explains this.
-    p, alpha, restitution : float
-        Derivatives with respect to relative changes of these parameters on both sides. Times 1e-3, they are changes of
-        the scale for 0.1 %.
-
-    See Also
-    --------
-    rocking.gradient : Compute derivatives of a response.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    >>> critical = rocking.critical_scale(block, record, (2.0, 6.0))
-    >>> f"scale {critical.scale:.4f}, +0.1 % of p {1e-3 * critical.p:+.4f}"
-    'scale 3.2561, +0.1 % of p -0.0023'
-    """
-
-    scale: float
-    gradient: Gradient
-    p: float
-    alpha: float
-    restitution: float
-
-
-def critical_scale(
-    block: Body,
-    motion: Motion,
-    bounds: tuple[float, float],
-    *,
-    model: Model = "nonlinear",
-    initial_rotation: float = 0.0,
-    initial_velocity: float = 0.0,
-) -> CriticalScale:
-    """Find a critical scale of a motion, at which a block begins to overturn, and its derivatives.
-
-    Parameters
-    ----------
-    block : Block
-        Block, or another body that can overturn.
-    motion : Motion
-        Motion, both components of which are scaled.
-    bounds : (float, float)
-        Positive scales that bracket the critical scale: the block stands at the lower one and overturns at the higher
-        one. If the outcome changes several times between them, one of the changes is found.
-    model, initial_rotation, initial_velocity : optional
-        As for `simulate`.
-
-    Returns
-    -------
-    CriticalScale
-        Scale, and derivatives with respect to every sample, the initial state and the block's parameters.
-
-    Raises
-    ------
-    InvalidMotion
-        If `motion` is not a `Motion`.
-    InvalidOption
-        If there is no motion, the block overturns at the lower scale or stands at the higher one, or the scales are not
-        positive and increasing.
-
-    See Also
-    --------
-    rocking.incremental_dynamic_analysis : Find all bands of levels that overturn.
-    rocking.gradient : Compute derivatives of a response.
-
-    Notes
-    -----
-    At the critical scale the response approaches the balance point and stays there. The derivatives follow from the
-    implicit function theorem (see "Impacts: restitution and sensitivity" in the documentation).
-
-    Examples
-    --------
-    >>> import rocking
-    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    >>> f"{rocking.critical_scale(block, record, (2.0, 6.0)).scale:.6f}"
-    '3.256134'
-    """
-    if check_motion(motion) is None:
-        raise InvalidOption("a critical scale requires a {}; got None", "motion")
-    low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
-    checks.positive(low, "bounds", InvalidOption)
-
-    def simulate_scaled(scale: float) -> Response:
-        return simulate(
-            block, motion * scale, model=model, initial_rotation=initial_rotation, initial_velocity=initial_velocity
-        )
-
-    for bound, expected in ((low, False), (high, True)):
-        if simulate_scaled(bound).overturned is not expected:
-            behaviour, correction = ("does not overturn", "raise") if expected else ("overturns", "lower")
-            raise InvalidOption(
-                f"the block {behaviour} at the scale {bound:g}: {correction} it in {{}}", "bounds", value=bounds
-            )
-    _, scale = bisect(low, high, lambda scale: simulate_scaled(scale).overturned)
-    response = simulate_scaled(scale)
-    scale_derivatives = {
-        name: float(response.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")
-    }
-    event_gradient, scale_change = gradient(response, "event", -1), -scale / scale_derivatives["motion"]
-    reason = event_gradient.reason
-    if not abs(scale_derivatives["motion"]) > 1e6:
-        reason, scale_change = _NO_BALANCE, math.nan
-    motion_gradient = replace(
-        event_gradient,
-        value=scale,
-        coefficients=scale * scale_change * event_gradient.coefficients,
-        vertical=None if event_gradient.vertical is None else scale * scale_change * event_gradient.vertical,
-        initial_rotation=scale_change * event_gradient.initial_rotation,
-        initial_velocity=scale_change * event_gradient.initial_velocity,
-        reason=reason,
-        motion=motion,
-    )
-    p, alpha, restitution = (scale_change * scale_derivatives[name] for name in ("p", "alpha", "restitution"))
-    return CriticalScale(scale, motion_gradient, p, alpha, restitution)

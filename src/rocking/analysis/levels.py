@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -32,20 +33,19 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def number_labels(labels: Sequence[object]) -> Integers:
+def assign_numbers(labels: Sequence[object]) -> Integers:
     """Replace labels by integers in the order of first appearance."""
     numbers: dict[object, int] = {}
     return np.array([numbers.setdefault(label, len(numbers)) for label in labels], dtype=np.int64)
 
 
-def number_groups(labels: object, name: str, count: int, item: str = "outcome") -> Integers:
+def assign_groups(labels: object, name: str, count: int, item: str = "outcome") -> Integers:
     """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
     entries = checks.items(labels, name, InvalidOption)
     if len(entries) != count or not all(isinstance(label, Hashable) for label in entries):
-        raise InvalidOption(
-            f"{{}} must contain {count} labels (numbers or texts), one for each {item}", name, value=labels
-        )
-    return number_labels([(k,) if _is_missing(label) else label for k, label in enumerate(entries)])
+        message = f"{{}} must contain {count} labels (numbers or texts), one for each {item}"
+        raise InvalidOption(message, name, value=labels)
+    return assign_numbers([(k,) if _is_missing(label) else label for k, label in enumerate(entries)])
 
 
 def _is_missing(label: object) -> bool:
@@ -54,7 +54,7 @@ def _is_missing(label: object) -> bool:
     return is_none or label == "" or (isinstance(label, float) and math.isnan(label))
 
 
-def compose_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_history: bool = True) -> list[str]:
+def create_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_history: bool = True) -> list[str]:
     """Compose labels of motions or records, with vertical components and processing."""
     names = data[coordinate].values
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
@@ -67,7 +67,7 @@ def compose_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_
 
 def describe_motions(data: xr.Dataset) -> str:
     """Describe motions by name or number, with the numbers of scaled or processed ones."""
-    labels = compose_motion_labels(data)
+    labels = create_motion_labels(data)
     changed_count = sum(bool(history) for history in data.histories)
     if len(labels) == 1:
         return labels[0]
@@ -96,8 +96,7 @@ BY_STATION: Final = "station"
 
 def describe_blocks(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Describe a block by its sizes or parameters, several by their number."""
-    block = find_single_block(blocks)
-    if block is None:
+    if (block := find_single_block(blocks)) is None:
         return format_count(len(gather_bodies(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
         return block.description
@@ -138,29 +137,28 @@ def compute_intensities(motions: Sequence[Motion], measure: Measure) -> Floats:
     return np.array([measure.require_positive_value(motion, motion.name) for motion in motions])
 
 
-def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integers:
+def assign_clusters(motions: Sequence[Motion], labels: object = None) -> Integers:
     """Assign numbers to clusters of motions with equal labels ("station": of one record) or equal up to a factor."""
-    families, origins = number_families(motions), [motion.description.origin or Origin() for motion in motions]
+    families, origins = assign_families(motions), [motion.description.origin or Origin() for motion in motions]
     stations = [f"{origin.event}, {origin.station}" if origin.station else "" for origin in origins]
     if labels is None:
         stations_by_family = {family: station for family, station in zip(families, stations, strict=True) if station}
         if len(stations_by_family) > len(set(stations_by_family.values())):
-            sentence = f"components of one station count as independent of each other: {{}} may be {BY_STATION}"
-            note(Message(f"{sentence}, which joins them", ("clusters",)))
+            message = f"components of one station count as independent of each other: {{}} may be {BY_STATION}"
+            note(Message(f"{message}, which joins them", ("clusters",)))
         return families
     if isinstance(labels, str) and labels == BY_STATION:
         labels = stations
         if not any(stations):
-            raise InvalidOption(
-                f"{{}} {BY_STATION} requires records that name their station; give a label for each motion", "clusters"
-            )
+            message = f"{{}} {BY_STATION} requires records that name their station; give a label for each motion"
+            raise InvalidOption(message, "clusters")
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     count = len(motions)
-    label_numbers = number_groups(labels, "clusters", count, "motion")
+    label_numbers = assign_groups(labels, "clusters", count, "motion")
     links = coo_array((np.ones(count), (families, count + label_numbers)), shape=(2 * count, 2 * count))
-    return number_labels(connected_components(links, directed=False)[1][families].tolist())
+    return assign_numbers(connected_components(links, directed=False)[1][families].tolist())
 
 
 def describe_sample(clusters: Integers, labels: object) -> str:
@@ -169,23 +167,19 @@ def describe_sample(clusters: Integers, labels: object) -> str:
     return text if labels is None else f"{text} in {format_count(len(np.unique(clusters)), 'cluster')}"
 
 
-def number_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
+def assign_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
     """Assign numbers to families of motions that are equal up to a factor, also a negative one if ``reversed_too``."""
     # Invariants of scale and sign. Only motions with equal invariants are compared in full.
-    invariants = np.empty((len(motions), 2))
+    invariants, first_members = np.empty((len(motions), 2)), list[int]()
+    families = np.empty(len(motions), dtype=np.int64)
     for k, motion in enumerate(motions):
         magnitudes = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
         invariants[k] = (magnitudes / magnitudes.max()).mean(), np.sqrt(((magnitudes / magnitudes.max()) ** 2).mean())
-    representatives: list[int] = []
-    families = np.empty(len(motions), dtype=np.int64)
-    for k, motion in enumerate(motions):
-        candidates = np.flatnonzero(np.all(np.abs(invariants[representatives] - invariants[k]) <= 1e-9, axis=1))
-        matches = (
-            int(j) for j in candidates if is_multiple(motions[representatives[j]], motion, reversed_too=reversed_too)
-        )
-        families[k] = next(matches, len(representatives))
-        if families[k] == len(representatives):
-            representatives.append(k)
+        candidates = np.flatnonzero(np.all(np.abs(invariants[first_members] - invariants[k]) <= 1e-9, axis=1)).tolist()
+        is_alike = (is_multiple(motions[first_members[j]], motion, reversed_too=reversed_too) for j in candidates)
+        families[k] = next(compress(candidates, is_alike), len(first_members))
+        if families[k] == len(first_members):
+            first_members.append(k)
     return families
 
 
@@ -216,12 +210,16 @@ def simulate_levels(
     return ordered.assign_coords(body_coordinates(blocks))
 
 
-def compute_ratios(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: Floats | float) -> Floats:
+#: Variables of a table of simulations from which `compute_ratios` is computed.
+RATIO_VARIABLES: Final = ("peak_rotation", "overturned", "unfinished")
+
+
+def compute_ratios(slenderness: Floats | float, peak: Floats, overturned: Flags, unfinished: Flags) -> Floats:
     """Compute ratios of peak rotation to slenderness: infinite for overturning, NaN for abandoned simulations."""
     return np.asarray(np.where(unfinished, np.nan, np.where(overturned, np.inf, peak / slenderness)))
 
 
-def exceeds_limit(ratio: Floats, limit: float, name: str) -> Floats:
+def compute_exceedances(ratio: Floats, limit: float, name: str) -> Floats:
     """Compare ratios of peak rotation to slenderness with a limit (infinite: overturning); 1 if exceeded, else 0."""
     limit = check_limit(limit, name)
     return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
@@ -259,6 +257,7 @@ def create_outcome_table(
 
     signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
     motion_names = [name for name in ("motion", "vertical") if name in table.coords]
+    exceeded = {state: compute_exceedances(ratio, limit, state).ravel() for state, limit in limit_states.items()}
     return pd.DataFrame(
         {
             **{name: expand(table[name].values[:, None, None]) for name in motion_names},
@@ -269,10 +268,7 @@ def create_outcome_table(
             "peak_over_alpha": ratio.ravel(),
             "overturned": table.overturned.values.ravel(),
             "unfinished": table.unfinished.values.ravel(),
-            **{
-                f"exceeded_{name}": exceeds_limit(ratio, limit, name).ravel().astype(bool)
-                for name, limit in limit_states.items()
-            },
+            **{f"exceeded_{state}": flags.astype(bool) for state, flags in exceeded.items()},
         }
     )
 
@@ -296,6 +292,11 @@ def note_missing(unfinished: Flags) -> None:
         note(f"{text}, and each counts as half overturned")
 
 
+def list_missing_notes(unfinished: Flags) -> list[str]:
+    """List the note on abandoned simulations, if there are any."""
+    return [f"note: {message}"] if (message := describe_missing(unfinished)) else []
+
+
 def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags) -> str:
     """Describe how many outcomes of a sample change when motions are scaled by 1 +- 3e-6.
 
@@ -315,7 +316,7 @@ def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLi
 
 
 @dataclass(frozen=True, eq=False)
-class Boundaries:
+class Brackets:
     """Brackets (low, high) of changes of the outcome in columns of a grid, sorted by column and level."""
 
     column: Integers
@@ -332,48 +333,40 @@ class Boundaries:
 
 def find_boundaries(
     levels: Floats, outcome: Integers, find_outcome: Callable[[Integers, Floats], Integers], *, rtol: float
-) -> Boundaries:
+) -> Brackets:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
     A bracket with a third outcome is split, but in an interval with 64 changes or more only one half is followed.
     Changes between two levels of equal outcome are not detected.
     """
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
-    brackets = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
+    brackets = Brackets(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
     origin = np.arange(len(brackets.level))
     remaining = _count_bisections(brackets, rtol)
     with Progress("refining", remaining) as bar:
         while (is_wide := bisection.is_wide(brackets.low, brackets.high, rtol)).any():
             outcomes = brackets.below.copy()
             outcomes[is_wide] = find_outcome(brackets.column[is_wide], brackets.level[is_wide])
-            brackets, origin = _bisect_brackets(brackets, is_wide, outcomes, origin)
+            brackets, origin = _bisect(brackets, is_wide, outcomes, origin)
             # A third outcome adds brackets, for which the progress bar does not move back.
             previous, remaining = remaining, min(remaining, _count_bisections(brackets, rtol))
             bar.advance(previous - remaining)
     order = np.lexsort((brackets.low, brackets.column))
-    return Boundaries(*(values[order] for values in vars(brackets).values()))
+    return Brackets(*(values[order] for values in vars(brackets).values()))
 
 
-def _count_bisections(brackets: Boundaries, rtol: float) -> int:
+def _count_bisections(brackets: Brackets, rtol: float) -> int:
     """Count the bisections that brackets still need."""
     return int(np.ceil(np.log2(np.maximum(1.0, (brackets.high - brackets.low) / (rtol * brackets.high)))).sum())
 
 
-def _bisect_brackets(
-    brackets: Boundaries, is_wide: Flags, outcomes: Integers, origin: Integers
-) -> tuple[Boundaries, Integers]:
+def _bisect(brackets: Brackets, is_wide: Flags, outcomes: Integers, origin: Integers) -> tuple[Brackets, Integers]:
     """Bisect wide brackets, and split those with a third outcome."""
+    column, low, high, below, above = vars(brackets).values()
     has_few_changes = np.bincount(origin)[origin] < 64
-    is_third = is_wide & has_few_changes & (outcomes != brackets.below) & (outcomes != brackets.above)
-    moves_up = is_wide & (outcomes == brackets.below)
-    low, high = bisection.halve(brackets.low, brackets.high, moves_up, is_wide & ~moves_up)
-    lower = Boundaries(brackets.column, low, high, brackets.below, np.where(is_third, outcomes, brackets.above))
-    upper = Boundaries(
-        brackets.column[is_third],
-        brackets.level[is_third],
-        brackets.high[is_third],
-        outcomes[is_third],
-        brackets.above[is_third],
-    )
-    both = (np.concatenate(pair) for pair in zip(vars(lower).values(), vars(upper).values(), strict=True))
-    return Boundaries(*both), np.concatenate([origin, origin[is_third]])
+    is_third = is_wide & has_few_changes & (outcomes != below) & (outcomes != above)
+    moves_up = is_wide & (outcomes == below)
+    new_low, new_high = bisection.halve(low, high, moves_up, is_wide & ~moves_up)
+    lower = column, new_low, new_high, below, np.where(is_third, outcomes, above)
+    upper = (values[is_third] for values in (column, brackets.level, high, outcomes, above))
+    return Brackets(*map(np.append, lower, upper)), np.append(origin, origin[is_third])

@@ -6,13 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.analysis.levels import Boundaries, find_boundaries
+from rocking.analysis.levels import Brackets, find_boundaries, list_missing_notes
 from rocking.block import Block, Blocks
 from rocking.block.single import require_block
 from rocking.core import checks
@@ -22,7 +21,7 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import add_unit, columns_to_records, escape_dollars, format_cell, format_table
 from rocking.engine.schemes import Certified
-from rocking.engine.tasks import OUTCOME, Setup, describe_missing, simulate_each
+from rocking.engine.tasks import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.inputs.pulses import find_family
 from rocking.motion.motion import Motion
@@ -166,9 +165,8 @@ def overturning_map(
     relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
     require_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
-        raise InvalidOption(
-            "{} must be below 1 for an overturning map, because otherwise the block never comes to rest", "restitution"
-        )
+        message = "{} must be below 1 for an overturning map, because otherwise the block never comes to rest"
+        raise InvalidOption(message, "restitution")
     min_p = min(side.p for side in block.sides)
     create_pulse, frequency = _create_pulse_function(pulse, parameters), min_p / (2.0 * math.pi)
     unit = _call_pulse(create_pulse, 1.0, frequency)
@@ -182,24 +180,21 @@ def overturning_map(
                 f"at twice the frequency; the shapes at {frequency:g} Hz and at {ratio * frequency:g} Hz differ",
                 "pulse",
             )
-    p, alpha, restitution = (
-        np.array([getattr(side, name) for side in block.sides]) for name in ("p", "alpha", "restitution")
-    )
+    p, alpha, restitution = np.array([(side.p, side.alpha, side.restitution) for side in block.sides]).T
     # Blocks of one shape with values of p that correspond to the ratios for a pulse of the block's frequency.
     blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
-    setup, threshold = (Setup(blocks, model, Certified(relative_width * unit.end)), min(block.uplift_thresholds(model)))
+    setup, threshold = Setup(blocks, model, Certified(relative_width * unit.end)), min(block.uplift_thresholds(model))
 
     def simulate_modes(
         column: Integers, level: Floats, advance: Callable[[int], None] = lambda count: None
     ) -> tuple[Integers, Floats]:
         """Simulate the block of each column at its level, and return modes and peak rotations."""
-        records = np.empty(column.size, dtype=OUTCOME)
+        results = np.empty(column.size, dtype=OUTCOME)
         for k, outcomes in simulate_each(setup, [unit], column, np.zeros_like(column), threshold * level):
-            records[k] = outcomes
+            results[k] = outcomes
             advance(len(outcomes))
-        return np.where(records["unfinished"], OverturningMode.UNFINISHED, classify_modes(records, unit.end)), records[
-            "peak_rotation"
-        ]
+        modes = np.where(results["unfinished"], OverturningMode.UNFINISHED, classify_modes(results, unit.end))
+        return modes, results["peak_rotation"]
 
     row, column = (index.ravel() for index in np.indices((levels.size, ratios.size)))
     with Progress("mapping", row.size) as bar:
@@ -247,21 +242,18 @@ def mode_name(mode: int) -> str:
     return f"overturns after {mode} impact{'s' if mode > 1 else ''}"
 
 
-def classify_modes(records: NDArray[np.void], duration: float) -> Integers:
+def classify_modes(results: NDArray[np.void], duration: float) -> Integers:
     """Classify the outcomes of blocks under a motion with a duration (s) from the engine's results."""
-    has_rested = (records["uplifts"] > 1) | ((records["rests"] > 0) & (records["last_rest"] <= duration))
-    standing_modes = np.where(
-        records["uplifts"] == 0,
-        OverturningMode.NO_UPLIFT,
-        np.where(has_rested, OverturningMode.RESTS, OverturningMode.ROCKS),
-    )
-    overturning_modes = np.where(records["uplifts"] > 1, OverturningMode.OVERTURNS_AFTER_REST, records["impacts"])
-    return np.where(records["overturned"], overturning_modes, standing_modes)
+    uplifts = results["uplifts"]
+    has_rested = (uplifts > 1) | ((results["rests"] > 0) & (results["last_rest"] <= duration))
+    lifted_modes = np.where(has_rested, OverturningMode.RESTS, OverturningMode.ROCKS)
+    standing_modes = np.where(uplifts == 0, OverturningMode.NO_UPLIFT, lifted_modes)
+    overturning_modes = np.where(uplifts > 1, OverturningMode.OVERTURNS_AFTER_REST, results["impacts"])
+    return np.where(results["overturned"], overturning_modes, standing_modes)
 
 
 def _is_overturning(modes: Integers) -> Flags:
-    is_overturning: Flags = (modes >= 0) | (modes == OverturningMode.OVERTURNS_AFTER_REST)
-    return is_overturning
+    return np.asarray((modes >= 0) | (modes == OverturningMode.OVERTURNS_AFTER_REST))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -291,12 +283,10 @@ class OverturningMap(DatasetResult):
     ['no uplift', 'rocks until the pulse is over', 'overturns without impact']
     """
 
-    TABLES = MappingProxyType(
-        {
-            "modes": ("mode", "peak_rotation"),
-            "boundaries": ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above"),
-        }
-    )
+    TABLES: ClassVar = {
+        "modes": ("mode", "peak_rotation"),
+        "boundaries": ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above"),
+    }
     POOLED = ("boundary",)
 
     @staticmethod
@@ -313,18 +303,11 @@ class OverturningMap(DatasetResult):
             for mode, percent in zip(modes, percents, strict=True)
         ]
         rows = [(float(ratio), self._describe_lowest(k)) for k, ratio in enumerate(self.data.frequency)]
-        return "\n\n".join(
-            [
-                f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model",
-                format_table(["outcome", "share of the map"], shares),
-                format_some_rows(["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"], rows),
-                *(
-                    [f"note: {missing}"]
-                    if (missing := describe_missing(self.data.mode.values == OverturningMode.UNFINISHED))
-                    else []
-                ),
-            ]
-        )
+        header = ["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"]
+        headline = f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model"
+        tables = format_table(["outcome", "share of the map"], shares), format_some_rows(header, rows)
+        notes = list_missing_notes(self.data.mode.values == OverturningMode.UNFINISHED)
+        return "\n\n".join([headline, *tables, *notes])
 
     def _describe_lowest(self, k: int) -> str:
         """Describe the lowest amplitude of the grid's range that overturns at a frequency."""
@@ -371,10 +354,8 @@ class OverturningMap(DatasetResult):
     @property
     def _proportions(self) -> str:
         """Describe the block's slenderness and restitution, which usually are equal on both sides."""
-        alpha, restitution = (
-            ", ".join(dict.fromkeys(f"{value:.5g}" for value in self.data.attrs[name]))
-            for name in (add_unit("alpha", "rad"), "restitution")
-        )
+        sides = self.data.attrs[add_unit("alpha", "rad")], self.data.restitution
+        alpha, restitution = (", ".join(dict.fromkeys(f"{value:.5g}" for value in values)) for values in sides)
         return f"alpha = {alpha} rad, restitution = {restitution}"
 
 
@@ -384,17 +365,13 @@ def _create_pulse_function(
     """Create a function of amplitude (m/s^2, peak for named pulses) and frequency (Hz) that returns a pulse."""
     if callable(pulse):
         if parameters:
-            raise InvalidOption(
-                f"{{}} is a function, so that no parameters are accepted; got {', '.join(parameters)}; set them in it",
-                "pulse",
-                value=parameters,
-            )
+            message = f"{{}} is a function, so that no parameters are accepted; got {', '.join(parameters)}"
+            raise InvalidOption(f"{message}; set them in it", "pulse", value=parameters)
         return pulse
     family = find_family(pulse)
     if family.name not in PULSES:
-        raise InvalidOption(
-            f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse", value=pulse
-        )
+        message = f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}"
+        raise InvalidOption(message, "pulse", value=pulse)
 
     def create_named_pulse(amplitude: float, frequency: float) -> Motion:
         motion = family.create_motion({"amplitude": 1.0, "frequency": frequency} | parameters)
@@ -404,11 +381,9 @@ def _create_pulse_function(
 
 
 def _call_pulse(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
-    motion = check_motion(pulse(amplitude, frequency))
-    if motion is None:
-        raise InvalidMotion(
-            f"the pulse of amplitude {amplitude:g} and frequency {frequency:g} is None; return a Motion"
-        )
+    if (motion := check_motion(pulse(amplitude, frequency))) is None:
+        arguments = f"amplitude {amplitude:g} and frequency {frequency:g}"
+        raise InvalidMotion(f"the pulse of {arguments} is None; return a Motion")
     return motion
 
 
@@ -419,15 +394,12 @@ def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio:
     if abs(ratio * second.duration - first.duration) > _SHAPE_TOLERANCE * first.duration:
         return False
     phases = (np.arange(400) + 0.5) / 400
-    first_values, second_values = (
-        first.acceleration(phases * first.duration),
-        second.acceleration(phases * second.duration) / factor,
-    )
-    return bool(np.abs(second_values - first_values).mean() <= _SHAPE_TOLERANCE * np.abs(first_values).max())
+    values, scaled_values = (motion.acceleration(phases * motion.duration) for motion in (first, second))
+    return bool(np.abs(scaled_values / factor - values).mean() <= _SHAPE_TOLERANCE * np.abs(values).max())
 
 
 def _combine_modes(
-    levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, brackets: Boundaries, attributes: dict[str, Any]
+    levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, brackets: Brackets, attributes: dict[str, Any]
 ) -> xr.Dataset:
     import xarray as xr
 
@@ -440,13 +412,12 @@ def _combine_modes(
         "n >= 0: overturns after n impacts"
     )
     normalisation = "over the smallest acceleration that lifts the block"
+    lowest_meaning = f"lowest amplitude that overturns the block, {normalisation}"
     return xr.Dataset(
         {
             "mode": variable(("amplitude", "frequency"), modes, meaning),
             "peak_rotation": variable(("amplitude", "frequency"), peaks, "largest rotation in size", "rad"),
-            "overturning_amplitude": variable(
-                "frequency", lowest, f"lowest amplitude that overturns the block, {normalisation}", "1"
-            ),
+            "overturning_amplitude": variable("frequency", lowest, lowest_meaning, "1"),
             "boundary_frequency": variable("boundary", ratios[brackets.column], unit="1"),
             "boundary_amplitude": variable("boundary", brackets.level, unit="1"),
             "mode_below": variable("boundary", brackets.below, meaning),

@@ -43,7 +43,7 @@ class Outcomes(NamedTuple):
     exceeded: Floats
     trials: Floats
 
-    def alone(self) -> Outcomes:
+    def as_batch(self) -> Outcomes:
         """Return one data set with an additional dimension of length 1."""
         return Outcomes(self.z, self.exceeded[None, :], self.trials[None, :])
 
@@ -83,10 +83,8 @@ class Probit(NamedTuple):
 
 
 #: Level curves at 0 and 1, and steps below and above all possible intensities.
-_STEP_INTERCEPT: Final = 1000.0 * STEEP
-_WHOLE_PLANE: Final = Probit(
-    np.array([-np.inf, np.inf, _STEP_INTERCEPT, -_STEP_INTERCEPT]), np.array([0.0, 0.0, STEEP, STEEP])
-)
+_STEP: Final = 1000.0 * STEEP
+_WHOLE_PLANE: Final = Probit(*np.array([[-np.inf, np.inf, _STEP, -_STEP], [0.0, 0.0, STEEP, STEEP]]))
 
 
 def compute_normal_scores(fits: Probit, z: Floats) -> Floats:
@@ -152,10 +150,8 @@ def explain_missing_fit(data: Outcomes, format_intensity: Callable[[float], str]
     exceeded_z, other_z, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
     if not exceeded_z.size or not other_z.size:
         quantifier, remedy = ("no", "stronger") if not exceeded_z.size else ("every", "weaker")
-        return (
-            f"{quantifier} outcome of {count} exceeds the limit, {_describe_range(z, format_intensity)}; "
-            f"use {remedy} motions"
-        )
+        ends = dict.fromkeys(format_intensity(math.exp(end)) for end in (z.min(), z.max()))
+        return f"{quantifier} outcome of {count} exceeds the limit, at {' to '.join(ends)}; use {remedy} motions"
     if z.min() == z.max():
         return f"all outcomes are at one intensity, {format_intensity(math.exp(z[0]))}; use several intensities"
     if other_z.max() <= exceeded_z.min() + _compute_overlap(z):
@@ -166,18 +162,12 @@ def explain_missing_fit(data: Outcomes, format_intensity: Callable[[float], str]
             f"the outcomes are separated, none exceeds the limit {gap}, so that the fragility is a step; use more "
             "motions near it"
         )
-    if not _is_rising(data.alone())[0]:
+    if not _is_rising(data.as_batch())[0]:
         return (
             "the fitted curve does not rise, because the limit is exceeded no more often at higher intensities; use "
             "another measure or more motions"
         )
     return None
-
-
-def _describe_range(z: Floats, format_intensity: Callable[[float], str]) -> str:
-    """Describe the range of intensities."""
-    low, high = (format_intensity(math.exp(end)) for end in (z.min(), z.max()))
-    return f"at {low}" if low == high else f"at {low} to {high}"
 
 
 def fit(data: Outcomes) -> Probit:
@@ -235,12 +225,9 @@ def compute_log_likelihood(data: Outcomes, beta: Floats) -> Floats:
 def compute_covariance(data: Outcomes, fitted: Probit) -> Floats:
     """Compute the inverse of Fisher's expected information of intercept and slope for one fit, shape (2, 2)."""
     scaled, scaled_fit, centre, spread = _standardise(data, fitted)
-    counts = scaled._replace(exceeded=np.zeros_like(data.trials))
+    information = _differentiate(scaled.as_batch(), np.column_stack(scaled_fit))[1][0]
     transform = np.array([[1.0, -centre / spread], [0.0, 1.0 / spread]])
-    return np.asarray(
-        transform @ np.linalg.inv(_differentiate(counts, np.column_stack(scaled_fit))[1][0]) @ transform.T,
-        dtype=np.float64,
-    )
+    return np.asarray(transform @ np.linalg.inv(information) @ transform.T, dtype=np.float64)
 
 
 def _standardise(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
@@ -268,9 +255,8 @@ def compute_goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Go
 
     groups = group_outcomes(data.z, data.trials)
     probability = compute_probabilities(fitted, data.z)[0]
-    expected, variance = (
-        np.bincount(groups, data.trials * terms) for terms in (probability, probability * (1.0 - probability))
-    )
+    expected = np.bincount(groups, data.trials * probability)
+    variance = np.bincount(groups, data.trials * (probability * (1.0 - probability)))
     observed = np.bincount(groups, data.exceeded)
     degrees_of_freedom = len(observed) - 2
     if degrees_of_freedom < 1:
@@ -333,7 +319,7 @@ def _shorten_steps(data: Outcomes, beta: Floats, step: Floats, current: Floats) 
     return step, following
 
 
-def find_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
+def compute_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
     """Find fits on the boundary of the confidence region, without curves that fall.
 
     Intervals are extremes in this region, as for the profile likelihood. For clusters of several outcomes the region is
@@ -348,10 +334,9 @@ def find_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers | 
     elif (cluster_count := int(clusters.max()) + 1) < _MIN_CLUSTERS:
         return _WHOLE_PLANE
     else:
-        boundary = _trace_region(scaled, best, 0.5 * float(stdtrit(cluster_count - 1.0, 0.5 + 0.5 * confidence)) ** 2)
-        boundary = (
-            np.column_stack(best) + (boundary - np.column_stack(best)) @ _compute_stretch(scaled, clusters, best).T
-        )
+        maximum, drop = np.column_stack(best), 0.5 * float(stdtrit(cluster_count - 1.0, 0.5 + 0.5 * confidence)) ** 2
+        offsets = _trace_region(scaled, best, drop) - maximum
+        boundary = maximum + offsets @ _compute_stretch(scaled, clusters, best).T
     intercepts, slopes = _cut_at_zero_slope(boundary).T
     slopes = slopes / spread
     return Probit(intercepts - slopes * centre, slopes)
@@ -360,14 +345,12 @@ def find_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers | 
 def _trace_region(data: Outcomes, best: Probit, drop: float) -> Floats:
     """Trace the points around the maximum at which the log-likelihood is lower by `drop`, shape (rays, 2)."""
     z, index = np.unique(data.z, return_inverse=True)
-    exceeded, trials = (
-        np.broadcast_to(np.bincount(index, counts).astype(np.float64), (_RAY_COUNT, z.size)) for counts in data[1:]
-    )
-    rays = Outcomes(z, exceeded, trials)
+    merged = Outcomes(z, *(np.bincount(index, counts).astype(np.float64) for counts in data[1:]))
+    rays = Outcomes(z, *(np.broadcast_to(counts, (_RAY_COUNT, z.size)) for counts in merged[1:]))
     maximum = np.column_stack(best)
-    floor = compute_log_likelihood(Outcomes(z, exceeded[:1], trials[:1]), maximum)[0] - drop
+    floor = compute_log_likelihood(merged.as_batch(), maximum)[0] - drop
     angle = np.linspace(0.0, 2.0 * math.pi, _RAY_COUNT, endpoint=False)
-    root = np.linalg.cholesky(compute_covariance(Outcomes(z, exceeded[0], trials[0]), best))
+    root = np.linalg.cholesky(compute_covariance(merged, best))
     directions = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ root.T
     distance = np.ones(_RAY_COUNT)
     for _ in range(100):
@@ -391,8 +374,7 @@ def _trace_region(data: Outcomes, best: Probit, drop: float) -> Floats:
 
 def _cut_at_zero_slope(boundary: Floats) -> Floats:
     """Cut the region off at slope 0."""
-    following = np.roll(boundary, -1, axis=0)
-    (intercept, slope), (next_intercept, next_slope) = boundary.T, following.T
+    (intercept, slope), (next_intercept, next_slope) = boundary.T, np.roll(boundary, -1, axis=0).T
     is_rising = slope >= 0.0
     is_crossing = is_rising != (next_slope >= 0.0)
     share = slope[is_crossing] / (slope[is_crossing] - next_slope[is_crossing])
@@ -420,10 +402,9 @@ def _sum_by_cluster(data: Outcomes, clusters: Integers, fitted: Probit) -> tuple
     z_scores = fitted.intercept + fitted.slope * z
     density, log_below, log_above = _compute_log_normals(z_scores)
     ratio_below, ratio_above = np.exp(density - log_below), np.exp(density - log_above)
-    score = exceeded * ratio_below - (trials - exceeded) * ratio_above
-    information = exceeded * ratio_below * (ratio_below + z_scores) + (trials - exceeded) * ratio_above * (
-        ratio_above - z_scores
-    )
+    weight_below, weight_above = exceeded * ratio_below, (trials - exceeded) * ratio_above
+    score = weight_below - weight_above
+    information = weight_below * (ratio_below + z_scores) + weight_above * (ratio_above - z_scores)
     scores = np.stack([np.bincount(clusters, score * power) for power in (np.ones_like(z), z)], axis=1)
     level, mixed, square = (np.bincount(clusters, information * power) for power in (np.ones_like(z), z, z * z))
     informations = np.stack([level, mixed, mixed, square], axis=1).reshape(-1, 2, 2)

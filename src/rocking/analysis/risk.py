@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.analysis.curve import FragilityCurve, find_extremes, format_intensity
+from rocking.analysis.curve import FragilityCurve, compute_extremes, format_intensity
 from rocking.analysis.hazard import (
     HazardCurve,
-    compute_log_parts,
+    compute_log_rate,
     compute_log_rate_within,
     compute_log_survival,
     compute_share_density,
     compute_shares_beyond,
     create_hazard_line,
 )
-from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
+from rocking.analysis.probit import Outcomes, fit_or_limits
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import Result
@@ -72,13 +72,13 @@ class Rate:
     bounds: tuple[float, float] = (0.0, math.inf)
 
     def __repr__(self) -> str:
-        rate, between = format_digits(self.annual_rate, self.interval, self.bounds)
-        return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
+        rate, interval_text = format_digits(self.annual_rate, self.interval, self.bounds)
+        return f"<Rate: {self.limit_state}: {rate} a year ({interval_text}), {self.in_words()}>"
 
     def in_words(self) -> str:
         """Return the period and its interval as "once in ... years", with the significant digits."""
-        period, between = self._format_period()
-        return f"once in {period} year{'' if period == '1' else 's'} ({between})"
+        period, interval_text = self._format_period()
+        return f"once in {period} year{'' if period == '1' else 's'} ({interval_text})"
 
     def probability(self, years: float) -> float:
         """Compute the probability of at least one exceedance in a time (years), for independent exceedances."""
@@ -152,26 +152,16 @@ class Risk(Result):
     def summary(self, years: float = 50.0) -> str:
         """Return rates, return periods, and probabilities in a time (years) as a text table."""
         years = checks.positive(years, "years", InvalidOption)
-        confidence, rows = 100 * self.curves[0].confidence, []
+        rows = []
         for rate in self.rates:
-            probabilities = [
-                -math.expm1(-annual_rate * years) for annual_rate in (rate.annual_rate, *rate.interval, *rate.bounds)
-            ]
-            rows.append(
-                [
-                    rate.limit_state,
-                    *format_digits(rate.annual_rate, rate.interval, rate.bounds),
-                    *rate._format_period(),
-                    *format_digits(
-                        probabilities[0], (probabilities[1], probabilities[2]), (probabilities[3], probabilities[4])
-                    ),
-                ]
-            )
-        between = f"{confidence:g} % between"
-        header = [
-            "limit state", "annual rate", between, "once in (years)", between,
-            f"probability in {format_count(years, 'year')}", between,
-        ]  # fmt: skip
+            values = rate.annual_rate, *rate.interval, *rate.bounds
+            probability, *ends = (-math.expm1(-value * years) for value in values)
+            probability_texts = format_digits(probability, (ends[0], ends[1]), (ends[2], ends[3]))
+            rate_texts = format_digits(rate.annual_rate, rate.interval, rate.bounds)
+            rows.append([rate.limit_state, *rate_texts, *rate._format_period(), *probability_texts])
+        heading = f"{100 * self.curves[0].confidence:g} % between"
+        quantities = "annual rate", "once in (years)", f"probability in {format_count(years, 'year')}"
+        header = ["limit state", *(title for quantity in quantities for title in (quantity, heading))]
         notes = [note for rate in self.rates for note in describe_extrapolated_shares(rate)]
         if any(rate.interval[0] == 0.0 or math.isinf(rate.interval[1]) for rate in self.rates):
             notes.append("intervals are those of the fragility, whose summary says why they have no end")
@@ -205,16 +195,12 @@ class Risk(Result):
         # Limit the figure to intensities that contribute to the rates.
         low, high = self.hazard.intensity[[0, -1]]
         intensity = np.geomspace(1e-2 * low, 1e2 * high, 800)
+        labels = [f"{rate.limit_state}: {rate.in_words()}" for rate in self.rates]
+        densities = [compute_share_density(curve.fitted, self.hazard, intensity) for curve in self.curves]
         return draw_risk(
             intensity=self.hazard.measure.display_factor * intensity,
             hazard=create_hazard_line(self.hazard, intensity),
-            lines=[
-                RiskLine(
-                    f"{rate.limit_state}: {rate.in_words()}",
-                    compute_share_density(curve.fitted, self.hazard, intensity),
-                )
-                for rate, curve in zip(self.rates, self.curves, strict=True)
-            ],
+            lines=[*map(RiskLine, labels, densities)],
             intensity_label=self.hazard.measure.label,
             title=title or escape_dollars(self.description),
             ax=ax,
@@ -257,15 +243,10 @@ def check_measure(hazard: HazardCurve, measure: Measure) -> None:
 
 
 def _compute_rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
-    parts = compute_log_parts(curve.fitted, hazard)[0]
-    total = np.logaddexp.reduce(parts)
-
-    def compute_log_rate(fits: Probit) -> Floats:
-        return np.asarray(np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1)[:, None])
-
-    low, high = find_extremes(curve.region, compute_log_rate)
+    total = compute_log_rate(curve.fitted, hazard)[0]
+    low, high = compute_extremes(curve.region, lambda fits: compute_log_rate(fits, hazard))
     with np.errstate(over="ignore", under="ignore"):
-        rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
+        rate, lower, upper = (float(np.exp(value[0])) for value in (total, low, high))
     below, above = compute_shares_beyond(curve.fitted, hazard)
     # Motions above the last point add no more than its rate. If most of the rate is theirs, only this bound is known.
     min_rate = (1.0 - above) * rate + float(hazard.rate[-1]) if above > 0.5 else 0.0
@@ -282,7 +263,7 @@ class Survival(Result):
     A curve of several blocks (for example an ensemble that represents one uncertain block) does not separate their
     dispersion from the record-to-record variability: for rates and `probability`, the block parameters are resampled
     for every motion. If a single one of the blocks has stood all the time, the probability is `mean_probability`, and
-    `most_probable` is its bound.
+    `max_probability` is its bound.
 
     Attributes
     ----------
@@ -374,24 +355,22 @@ class Survival(Result):
             return math.nan
         hazard, years = self.hazard, self.years
         if self.several_blocks:
-            _, high = find_extremes(self.curve.region, lambda fits: compute_log_survival(fits, hazard, years))
+            _, high = compute_extremes(self.curve.region, lambda fits: compute_log_survival(fits, hazard, years))
             return math.exp(min(float(high[0]), 0.0))
-        low, _ = find_extremes(self.curve.region, lambda fits: compute_log_rate_within(fits, hazard))
+        low, _ = compute_extremes(self.curve.region, lambda fits: compute_log_rate_within(fits, hazard))
         return math.exp(-math.exp(float(low[0])) * years)
 
     @property
     def contradicts_hazard(self) -> bool:
-        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence."""
+        """Whether the survival, at its `max_probability`, is less probable than 1 - confidence."""
         return self.max_probability < 1.0 - self.confidence
 
     def summary(self) -> str:
         measure, percent = self.measure, f"{100.0 * self.confidence:g} %"
         header = [measure.label, "probability", "at most a year", "at most once in (years)"]
+        factor, data_range = measure.display_factor, self._known_range
         columns: list[list[Any]] = [
-            [
-                format_within(x, self._known_range, lambda end: f"{measure.display_factor * end:.5g}")
-                for x in self.intensity
-            ],
+            [format_within(x, data_range, lambda end: f"{factor * end:.5g}") for x in self.intensity],
             [*_PROBABILITIES],
             [f"{rate:.2g}" for rate in self.largest_rate],
             [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
@@ -405,21 +384,17 @@ class Survival(Result):
                 [format_within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
                 [f"{probability:.2g}" for probability in np.exp(-self.years * resolved * _PROBABILITIES)],
             ]
-        return "\n".join(
-            [
-                f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
-                f"most likely never {self._never_text}: one such motion would have exceeded the limit with {percent}",
-                f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
-                f"exceeded with {percent}" + (", if each met another of the blocks" if self.several_blocks else ""),
-                "",
-                format_table(header, [*map(list, zip(*columns, strict=True))]),
-                *(
-                    []
-                    if self.rate is None
-                    else ["", self._describe_survival(self.rate), *describe_extrapolated_shares(self.rate)]
-                ),
-            ]
-        )
+        lines = [
+            f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
+            f"most likely never {self._never_text}: one such motion would have exceeded the limit with {percent}",
+            f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
+            f"exceeded with {percent}" + (", if each met another of the blocks" if self.several_blocks else ""),
+            "",
+            format_table(header, [*zip(*columns, strict=True)]),
+        ]
+        if self.rate is not None:
+            lines += ["", self._describe_survival(self.rate), *describe_extrapolated_shares(self.rate)]
+        return "\n".join(lines)
 
     @property
     def _known_range(self) -> tuple[float, float]:
@@ -429,39 +404,33 @@ class Survival(Result):
 
     @property
     def _never_text(self) -> str:
-        text = format_intensity(min(self.never_reached_intensity, self._known_range[1]), self.measure)
-        return (
-            f"some intensity above {text}, beyond the data"
-            if self.never_reached_intensity > self._known_range[1]
-            else f"{text} or more"
-        )
+        intensity, highest = self.never_reached_intensity, self._known_range[1]
+        text = format_intensity(min(intensity, highest), self.measure)
+        return f"some intensity above {text}, beyond the data" if intensity > highest else f"{text} or more"
 
     def _describe_survival(self, rate: Rate) -> str:
         """Describe the probability of the survival under the hazard curve."""
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
-        chance, between = format_digits(self.probability, self.interval, bounds)
-        estimate, likeliest = (f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})", self.probability)
+        chance, interval_text = format_digits(self.probability, self.interval, bounds)
+        confidence, likeliest = 100.0 * self.curve.confidence, self.probability
+        estimate = f"{chance} ({confidence:g} % interval {interval_text})"
         if self.several_blocks:
-            estimate = (
-                f"at most {self.max_probability:.2g} if one of the blocks has stood all the time, and {estimate} "
-                "if each motion met another of them"
-            )
+            single = f"at most {self.max_probability:.2g} if one of the blocks has stood all the time"
+            estimate = f"{single}, and {estimate} if each motion met another of them"
         if not math.isnan(self.mean_probability):
             likeliest = self.mean_probability
             estimate = f"{likeliest:.2g} in the mean and {estimate}"
         name = "" if self.hazard is None else self.hazard.name
         years = format_count(self.years, "year")
-        text = f"under the hazard curve {name!r} the probability of {years} without it is {estimate}"
+        sentence = f"under the hazard curve {name!r} the probability of {years} without it is {estimate}"
         threshold = f"{1.0 - self.confidence:.3g}"
         if likeliest >= 1.0 - self.confidence:
-            return f"{text}, so they do not contradict each other"
+            return f"{sentence}, so they do not contradict each other"
         if not self.contradicts_hazard:
-            return f"{text}; below {threshold} they would contradict each other, which is not settled"
-        return (
-            f"{text}; all of that is below {threshold}, so they contradict each other: the hazard curve is "
-            "too high, or the block stronger than its fragility, or younger"
-        )
+            return f"{sentence}; below {threshold} they would contradict each other, which is not settled"
+        reasons = "the hazard curve is too high, or the block stronger than its fragility, or younger"
+        return f"{sentence}; all of that is below {threshold}, so they contradict each other: {reasons}"
 
     def to_dict(self) -> dict[str, Any]:
         column = self.measure.column
@@ -510,9 +479,8 @@ class Survival(Result):
         )
 
     def _headline(self) -> str:
-        return (
-            f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; most likely never {self._never_text}"
-        )
+        state, years = self.curve.limit_state, format_count(self.years, "year")
+        return f"{state}: not in {years}; most likely never {self._never_text}"
 
 
 def compute_mean_survival(
@@ -521,12 +489,10 @@ def compute_mean_survival(
     """Compute the mean survival probability of blocks, each with a curve fitted to its own outcomes."""
     table = outcomes.sort_values("block", kind="stable")
     blocks = table.drop_duplicates("block")
-    intensity, exceeded, missing = (
-        table[name].to_numpy(np.float64).reshape(len(blocks), -1)
-        for name in (column, f"exceeded_{limit_state}", "unfinished")
-    )
+    values = table[[column, f"exceeded_{limit_state}", "unfinished"]].to_numpy(np.float64)
+    intensity, exceeded, missing = values.T.reshape(3, len(blocks), -1)
     fits = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, 1.0 - missing))
     # For a curve that does not rise, the rate below the hazard curve is unbounded and therefore omitted.
-    rising = np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1)
-    rates = np.exp(np.where(fits.slope > 0.0, rising, compute_log_rate_within(fits, hazard)[:, 0]))
+    rising, level = compute_log_rate(fits, hazard), compute_log_rate_within(fits, hazard)
+    rates = np.exp(np.where(fits.slope > 0.0, rising[:, 0], level[:, 0]))
     return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis.levels import (
-    compose_motion_labels,
+    RATIO_VARIABLES,
     compute_ratios,
+    create_motion_labels,
     describe_motions,
     describe_pool,
+    list_missing_notes,
     normalise_weights,
     split_curves,
 )
@@ -28,7 +29,6 @@ from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import add_unit, escape_dollars
 from rocking.engine.problem import gather_bodies
 from rocking.engine.schemes import ChatteringScheme
-from rocking.engine.tasks import describe_missing
 from rocking.errors import InvalidOption
 from rocking.records.named import Motions, list_motions
 from rocking.simulation.ensemble import simulate_many
@@ -42,8 +42,6 @@ Abscissa = Literal["p", "period", "size"]
 
 
 _MEDIAN_SHARE: Final = np.array([0.5])
-
-_OUTCOME_NAMES: Final = ("peak_rotation", "overturned", "unfinished")
 
 _AXES: Final = ("p", "period", "size", "alpha", "restitution", "fractile")
 
@@ -120,8 +118,8 @@ def rocking_spectrum(
     >>> rocking_spectrum(blocks, motions).data.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
     [0.367, inf, inf]
     """
-    values = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
-    shares = np.array([checks.fraction(value, "each of fractiles", InvalidOption) for value in values])
+    requested = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
+    shares = np.array([checks.fraction(share, "each of fractiles", InvalidOption) for share in requested])
     options: dict[str, Any] = {"model": model, "chattering": chattering}
     bodies, motions = gather_bodies(blocks), list_motions(motions)
     if not isinstance(bodies, Blocks):
@@ -130,14 +128,10 @@ def rocking_spectrum(
         checks.grid_size({"motions": len(motions), "blocks": len(bodies)}, InvalidOption)
         names, shape = (*(name for name in axes if name != "p"), "p"), [*map(len, axes.values())]
         table = simulate_many(bodies, motions, **options)
-        peak, overturned, unfinished = (
-            np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in _OUTCOME_NAMES
-        )
-        ratio = compute_ratios(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
-        statistics = names, compute_fractiles(ratio, shares), compute_overturned_share(ratio)
-        return RockingSpectrum(
-            _combine_peaks(table, names, (peak, overturned, ratio), statistics, axes, shares, bodies.gravity)
-        )
+        outcomes = [np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in RATIO_VARIABLES]
+        ratio = compute_ratios(axes["alpha"].reshape(-1, *[1] * (len(names) - 1)), *outcomes)
+        values = [*outcomes[:2], ratio, compute_fractiles(ratio, shares), compute_overturned_share(ratio)]
+        return RockingSpectrum(_combine_peaks(table, names, values, axes | {"fractile": shares}))
     weight = normalise_weights(weights, len(bodies))
     median = float(compute_weighted_fractiles(bodies.p.mean(axis=1), weight, _MEDIAN_SHARE)[0])
     p_values = median * np.geomspace(0.5, 2.0, 25)
@@ -147,18 +141,15 @@ def rocking_spectrum(
     checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, InvalidOption)
     resized = bodies.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(p_values / median, n))
     table = simulate_many(resized, motions, **options)
-    peak, overturned, unfinished = (
-        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _OUTCOME_NAMES
-    )
-    ratio = compute_ratios(peak, overturned, unfinished, bodies.alpha.min(axis=1)[:, None])
+    table = table.transpose("motion", "block")
+    outcomes = [table[name].values.reshape(-1, n, count) for name in RATIO_VARIABLES]
+    ratio = compute_ratios(bodies.alpha.min(axis=1)[:, None], *outcomes)
     flat, tiled = ratio.reshape(-1, count), np.tile(weight, len(ratio))
-    statistics = ("p",), compute_weighted_fractiles(flat, tiled, shares), compute_overturned_share(flat, tiled)
-    data = _combine_peaks(
-        table, ("block", "p"), (peak, overturned, ratio), statistics, {"p": p_values}, shares, bodies.gravity
-    )
-    return RockingSpectrum(
-        data.assign_coords(weight=("block", weight)).assign_attrs(blocks=describe_pool(bodies, weights))
-    )
+    fractile_values = compute_weighted_fractiles(flat, tiled, shares)
+    values = [*outcomes[:2], ratio, fractile_values, compute_overturned_share(flat, tiled)]
+    data = _combine_peaks(table, ("block", "p"), values, {"p": p_values, "fractile": shares})
+    data = data.assign_coords(weight=("block", weight))
+    return RockingSpectrum(data.assign_attrs(blocks=describe_pool(bodies, weights)))
 
 
 def compute_fractiles(peaks: Floats, shares: Floats) -> Floats:
@@ -173,8 +164,7 @@ def compute_fractiles(peaks: Floats, shares: Floats) -> Floats:
     low, high = (np.take_along_axis(ordered, index, axis=0) for index in (floor, np.ceil(position).astype(np.int64)))
     weight = position - floor
     is_level = (weight == 0.0) | (low == high)
-    interpolated: Floats = low + weight * (np.where(is_level, 0.0, high) - np.where(is_level, 0.0, low))
-    return interpolated
+    return np.asarray(low + weight * (np.where(is_level, 0.0, high) - np.where(is_level, 0.0, low)))
 
 
 def compute_weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
@@ -224,31 +214,24 @@ class RockingSpectrum(DatasetResult):
     [False, True, True]
     """
 
-    TABLES = MappingProxyType(
-        {
-            "fractiles": ("fractile_over_alpha", "overturned_share"),
-            "peaks": ("peak_rotation", "peak_over_alpha", "overturned"),
-        }
-    )
+    TABLES: ClassVar = {
+        "fractiles": ("fractile_over_alpha", "overturned_share"),
+        "peaks": ("peak_rotation", "peak_over_alpha", "overturned"),
+    }
     POOLED = ("motion", "block")
 
     def summary(self) -> str:
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
         parts = [f"peak rotation over slenderness, {describe_motions(self.data)}, {self.data.model} model"]
         for title, curve in split_curves(self.data):
-            fractiles = curve.fractile_over_alpha.transpose("p", "fractile").values
+            fractiles = curve.fractile_over_alpha.transpose("p", "fractile").values.tolist()
+            columns = curve.p.values, curve["size"].values, fractiles, curve.overturned_share.values
             rows = [
-                [
-                    float(curve.p[j]),
-                    float(curve["size"][j]),
-                    *("overturns" if np.isinf(value) else float(value) for value in fractiles[j]),
-                    f"{100 * float(curve.overturned_share[j]):.0f} %",
-                ]
-                for j in range(self.data.sizes["p"])
+                [p, size, *("overturns" if value == np.inf else value for value in row), f"{100 * share:.0f} %"]
+                for p, size, row, share in zip(*columns, strict=True)
             ]
             parts.append(f"{title}\n{format_some_rows(header, rows)}")
-        missing = describe_missing(np.isnan(self.data.peak_over_alpha.values))
-        return "\n\n".join(parts + [f"note: {missing}"] * bool(missing))
+        return "\n\n".join([*parts, *list_missing_notes(np.isnan(self.data.peak_over_alpha.values))])
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
@@ -283,27 +266,16 @@ class RockingSpectrum(DatasetResult):
         checks.choice(against, "against", InvalidOption, get_args(Abscissa))
         # Lines are drawn in the order of the abscissa, whatever the order of p.
         data = self.data.sortby("p") if "p" in self.data.dims else self.data
-        named_curves = split_curves(data)
-        is_single = len(named_curves) == 1
-        curves = [
-            SpectrumCurves(
-                "" if is_single else name,
-                self._select_peaks(curve),
-                curve.fractile_over_alpha.transpose("fractile", "p").values,
-                curve.overturned_share.values,
-            )
-            for name, curve in named_curves
-        ]
-        title_parts = [
-            describe_motions(self.data),
-            *([named_curves[0][0]] if is_single else []),
-            f"{self.data.model} model",
-        ]
+        names, datasets = zip(*split_curves(data), strict=True)
+        fractiles = [curve.fractile_over_alpha.transpose("fractile", "p").values for curve in datasets]
+        shares = [curve.overturned_share.values for curve in datasets]
+        title_parts = [describe_motions(data), *(names if len(names) == 1 else ()), f"{data.model} model"]
+        labels = names if len(names) > 1 else ("",)
         return draw_spectrum(
             x=data[against].values,
-            curves=curves,
-            fractiles=self.data.fractile.values.tolist(),
-            motions=compose_motion_labels(self.data),
+            curves=[*map(SpectrumCurves, labels, map(self._select_peaks, datasets), fractiles, shares)],
+            fractiles=data.fractile.values.tolist(),
+            motions=create_motion_labels(data),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
             title=title or escape_dollars(", ".join(title_parts)),
             ax=ax,
@@ -323,38 +295,28 @@ class RockingSpectrum(DatasetResult):
 
 
 def _combine_peaks(
-    table: xr.Dataset,
-    names: tuple[str, ...],
-    peaks: tuple[Floats, Floats, Floats],
-    statistics: tuple[tuple[str, ...], Floats, Floats],
-    axes: dict[str, Floats],
-    shares: Floats,
-    gravity: float,
+    table: xr.Dataset, names: tuple[str, ...], values: Sequence[Floats], axes: dict[str, Floats]
 ) -> xr.Dataset:
-    """Combine peaks, outcomes and ratios over (motion, *names) with fractiles and shares over their dimensions."""
+    """Combine peaks, outcomes and ratios over (motion, *names) with fractiles and shares over their last dimensions."""
     import xarray as xr
 
-    (peak, overturned, over_alpha), (dims, fractiles, share) = peaks, statistics
-    normalisation = "over the slenderness; infinite where the block overturns"
+    peak, overturned, ratio, fractiles, share = values
+    dims, share_dims, half_diagonal = ("motion", *names), names[-share.ndim :], 0.75 * table.gravity / axes["p"] ** 2
+    meaning = "peak rotation over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
-            "peak_rotation": variable(("motion", *names), peak, "peak rotation; pi/2: overturns", "rad"),
-            "peak_over_alpha": variable(("motion", *names), over_alpha, f"peak rotation {normalisation}", "1"),
-            "overturned": (("motion", *names), overturned, table.overturned.attrs),
-            "fractile_over_alpha": variable(
-                ("fractile", *dims), fractiles, f"fractile of the peak rotation {normalisation}", "1"
-            ),
-            "overturned_share": variable(dims, share, "share of the motions that overturn the block", "1"),
+            "peak_rotation": variable(dims, peak, "peak rotation; pi/2: overturns", "rad"),
+            "peak_over_alpha": variable(dims, ratio, meaning, "1"),
+            "overturned": (dims, overturned, table.overturned.attrs),
+            "fractile_over_alpha": variable(("fractile", *share_dims), fractiles, f"fractile of the {meaning}", "1"),
+            "overturned_share": variable(share_dims, share, "share of the motions that overturn the block", "1"),
         },
         {
             "motion": table.motion,
             **{name: table[name] for name in ("vertical",) if name in table.coords},
-            **{
-                name: variable(name, values, unit=_UNITS[name])
-                for name, values in (axes | {"fractile": shares}).items()
-            },
+            **{name: variable(name, points, unit=_UNITS[name]) for name, points in axes.items()},
             "period": variable("p", 2.0 * np.pi / axes["p"], "2 pi/p", "s"),
-            "size": variable("p", 0.75 * gravity / axes["p"] ** 2, "half diagonal of the rectangular block", "m"),
+            "size": variable("p", half_diagonal, "half diagonal of the rectangular block", "m"),
         },
         {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )

@@ -63,11 +63,10 @@ class BlockUnderRecords(Result):
     def _create_labels(self) -> list[dict[str, Any]]:
         """Create the first columns of each row: record, motion, block."""
         columns = body_coordinates(self.block.as_bodies())
-        numbers = {
-            add_unit(name, attributes["units"]): float(values[0]) for name, (_, values, attributes) in columns.items()
-        }
+        block: dict[str, Any] = {"block": self.block.description}
+        block |= {add_unit(name, attrs["units"]): float(values[0]) for name, (_, values, attrs) in columns.items()}
         labels = create_record_columns(self.records, [require_motion(response) for response in self.responses])
-        return [{**label, "block": self.block.description, **numbers} for label in labels]
+        return [label | block for label in labels]
 
     def _headline(self) -> str:
         """Summarise the number of records that overturn the block."""
@@ -123,20 +122,15 @@ class Survey(BlockUnderRecords):
         return f"{self._headline()}\n\n{table}"
 
     def _headline(self) -> str:
-        undecided = sum(
-            response.stopped or response.unfinished or not response.perturbed().is_decided
-            for response in self.responses
-        )
+        undecided = sum(item.stopped or item.unfinished or not item.perturbed().is_decided for item in self.responses)
         undecided_text = f", undecided under {undecided}" if undecided else ""
         skipped_text = f"; {format_count(len(self.skipped), 'record')} skipped" if self.skipped else ""
         return super()._headline() + undecided_text + skipped_text
 
     def to_dict(self) -> dict[str, Any]:
-        numbers = self.block.as_bodies().parameters().items()
-        block = {
-            "description": self.block.description,
-            **{add_unit(name, unit): values[0].tolist() for name, (values, unit) in numbers},
-        }
+        parameters = self.block.as_bodies().parameters().items()
+        numbers = {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters}
+        block = {"description": self.block.description, **numbers}
         friction = {} if self.friction is None else {"friction": self.friction}
         return {"block": block, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
 
@@ -169,29 +163,27 @@ class RuleComparison(BlockUnderRecords):
         return tuple(margin > 1.0 and not (response.overturned or response.unfinished) for response, margin in pairs)
 
     def rows(self) -> list[dict[str, Any]]:
-        return [
-            {
-                **label,
-                add_unit("pga", "g"): round_decimal(require_motion(response).pga / STANDARD_GRAVITY),
-                add_unit("pgv", "m/s"): require_motion(response).pgv,
-                **ratios,
-                "simulated": margin,
-                "lowest_factor": 1.0 / margin,
-                "peak_over_slenderness": response.peak_over_slenderness,
-                "overturned": response.overturned,
-                "overturns_when_scaled_down": overturns_under_less,
-                "verdict": format_brief_outcome(response, PRECISION)
-                + (f"; overturns at x {_format_factor(1.0 / margin)}" if overturns_under_less else ""),
-            }
-            for label, response, ratios, margin, overturns_under_less in zip(
-                self._create_labels(),
-                self.responses,
-                self.ratios,
-                self.margins,
-                self.overturns_when_scaled_down,
-                strict=True,
+        rows, labels = [], self._create_labels()
+        columns = labels, self.responses, self.ratios, self.margins, self.overturns_when_scaled_down
+        for label, response, ratios, margin, overturns_when_scaled_down in zip(*columns, strict=True):
+            motion, verdict, factor = require_motion(response), format_brief_outcome(response, PRECISION), 1.0 / margin
+            if overturns_when_scaled_down:  # with more digits near 1
+                verdict += f"; overturns at x {factor:.{2 if factor < 0.985 else 4}f}"
+            rows.append(
+                label
+                | {
+                    add_unit("pga", "g"): round_decimal(motion.pga / STANDARD_GRAVITY),
+                    add_unit("pgv", "m/s"): motion.pgv,
+                    **ratios,
+                    "simulated": margin,
+                    "lowest_factor": factor,
+                    "peak_over_slenderness": response.peak_over_slenderness,
+                    "overturned": response.overturned,
+                    "overturns_when_scaled_down": overturns_when_scaled_down,
+                    "verdict": verdict,
+                }
             )
-        ]
+        return rows
 
     def summary(self) -> str:
         rules = [*self.ratios[0]]
@@ -203,17 +195,13 @@ class RuleComparison(BlockUnderRecords):
         # Rules of thumb are accurate to three digits at most.
         cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in titles] for row in rows]
         table = format_table(list(titles.values()), cells)
-        return "\n".join(
-            [
-                str(self.block),
-                "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on "
-                "the motion that was found to overturn the block, in steps of 5 %",
-                "",
-                table,
-                *(["", *self._count_disagreements(rules)] if rules else []),
-                *(f"note: {note}" for note in self._list_notes()),
-            ]
+        explanation = (
+            "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on the "
+            "motion that was found to overturn the block, in steps of 5 %"
         )
+        counts = ["", *self._count_disagreements(rules)] if rules else []
+        notes = (f"note: {note}" for note in self._list_notes())
+        return "\n".join([str(self.block), explanation, "", table, *counts, *notes])
 
     def to_dict(self) -> dict[str, Any]:
         return super().to_dict() | {"notes": self._list_notes()}
@@ -232,32 +220,23 @@ class RuleComparison(BlockUnderRecords):
             for ratios, response, is_ambiguous in zip(self.ratios, self.responses, excluded, strict=True)
             if not (is_ambiguous or response.unfinished)
         ]
+        count, total = len(compared), len(excluded)
         for rule in rules:
             unsafe = sum(ratios[rule] < 1.0 and overturned for ratios, overturned in compared)
             conservative = sum(ratios[rule] >= 1.0 and not overturned for ratios, overturned in compared)
-            correct = len(compared) - unsafe - conservative
-            lines.append(
-                f"{format_rule_name(rule)}: right {correct}, unsafe {unsafe}, "
-                f"over-conservative {conservative} of {len(compared)}"
-            )
+            errors = f"unsafe {unsafe}, over-conservative {conservative} of {count}"
+            lines.append(f"{format_rule_name(rule)}: right {count - unsafe - conservative}, {errors}")
         if any(excluded):
-            lines.append(
-                f"not counted: {sum(excluded)} of {len(excluded)}, where the block stands under the motion as it is, "
-                "but falls under the same motion scaled down"
-            )
+            reason = "where the block stands under the motion as it is, but falls under the same motion scaled down"
+            lines.append(f"not counted: {sum(excluded)} of {total}, {reason}")
         if unfinished := sum(response.unfinished for response in self.responses):
-            lines.append(f"not counted: {unfinished} of {len(excluded)}, whose simulation was not finished")
+            lines.append(f"not counted: {unfinished} of {total}, whose simulation was not finished")
         return lines
 
 
 def format_rule_name(rule: str) -> str:
     """Format the usual name of a rule of thumb."""
     return "ASCE 43-05" if rule == "asce_43_05" else rule.capitalize()
-
-
-def _format_factor(factor: float) -> str:
-    """Format a factor below 1, with more digits near 1."""
-    return f"{factor:.2f}" if factor < 0.985 else f"{factor:.4f}"
 
 
 def survey(
@@ -304,18 +283,16 @@ def survey(
     """
     named_motions = index_motions(motions)
     if not require_body(block).coordinate.limit:
-        raise InvalidOption(
-            f"a survey requires a Block, because only a block has an unstable equilibrium; got {type(block).__name__}"
-        )
+        message = "a survey requires a Block, because only a block has an unstable equilibrium"
+        raise InvalidOption(f"{message}; got {type(block).__name__}")
     if friction is not None:
         check_friction(friction)
     responses = []
     with Progress("simulating", total=len(named_motions)) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, **options))
-            _create_row(
-                responses[-1], precision
-            )  # the response caches the expensive results while the progress bar is shown
+            # The response caches the expensive results while the progress bar is shown.
+            _create_row(responses[-1], precision)
             bar.advance()
     return Survey(block, tuple(named_motions), tuple(responses), friction, precision)
 
@@ -333,11 +310,9 @@ def create_folder_names(records: Sequence[str]) -> list[str]:
 
 def create_record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
     """Create columns with the requested name of each record, and the name of its motion as in other analyses."""
-    names, verticals = list_motion_names(motions), collect_verticals(motions)
-    return [
-        {"record": record, "motion": names[k], **{name: column[1][k] for name, column in verticals.items()}}
-        for k, record in enumerate(records)
-    ]
+    columns = {"record": records, "motion": list_motion_names(motions)}
+    columns |= {name: values for name, (_, values, *_) in collect_verticals(motions).items()}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def require_motion(response: Response) -> Motion:
@@ -348,7 +323,7 @@ def require_motion(response: Response) -> Motion:
 
 def _create_row(response: Response, precision: float) -> dict[str, Any]:
     motion = require_motion(response)
-    nearby, within_precision = response.perturbed(), response.perturbed(*choose_steps(precision))
+    perturbed, within_precision = response.perturbed(), response.perturbed(*choose_steps(precision))
     return {
         add_unit("duration", "s"): motion.duration,
         add_unit("pga", "g"): round_decimal(motion.pga / STANDARD_GRAVITY),
@@ -356,8 +331,8 @@ def _create_row(response: Response, precision: float) -> dict[str, Any]:
         "processing": "; ".join(motion.history),
         "verdict": format_brief_outcome(response, precision),
         "overturned": response.overturned,
-        "decided": nearby.is_decided,
-        "overturned_share": float(nearby.overturned.mean()),
+        "decided": perturbed.is_decided,
+        "overturned_share": float(perturbed.overturned.mean()),
         "precision": precision,
         "overturned_share_at_precision": float(within_precision.overturned.mean()),
         "unfinished": response.unfinished,

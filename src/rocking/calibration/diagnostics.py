@@ -59,16 +59,12 @@ class Scores:
         """Compute the scores of predicted probabilities of m outcomes (bool)."""
         predicted, actual = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if predicted.shape != actual.shape or not predicted.size:
-            raise InvalidOption(
-                f"probabilities and outcomes must have the same shape; got {predicted.shape} and {actual.shape}"
-            )
+            shapes = f"{predicted.shape} and {actual.shape}"
+            raise InvalidOption(f"probabilities and outcomes must have the same shape; got {shapes}")
         if not np.all((predicted >= 0.0) & (predicted <= 1.0)):
             raise InvalidOption("{} must be between 0 and 1", "probabilities")
-        return cls(
-            accuracy=float(np.mean((predicted > 0.5) == actual)),
-            log_loss=float(compute_log_losses(predicted, actual).mean()),
-            brier=float(np.mean((predicted - actual) ** 2)),
-        )
+        terms = (predicted > 0.5) == actual, compute_log_losses(predicted, actual), (predicted - actual) ** 2
+        return cls(*(float(np.mean(values)) for values in terms))
 
 
 def compute_log_losses(probabilities: Floats, observed: Flags) -> Floats:
@@ -110,13 +106,11 @@ class BoundReached:
     share: float
 
     def __str__(self) -> str:
-        unit = find_parameter_unit(self.name)
-        bound = f"{self.bound:g}" + ("" if unit == "1" else f" {unit}")
+        bound = f"{self.bound:g} {find_parameter_unit(self.name)}".removesuffix(" 1")
         return (
             f"{self.name} reaches its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
             f"the outermost {100 * _EDGE_SHARE:.0f} % of the range, so that the bound sets the {self.end} end of the "
-            "interval; unless this bound is certain, "
-            f"set that of {self.name.partition('_')[0]} to {self.wider:g}"
+            f"interval; unless this bound is certain, set that of {self.name.partition('_')[0]} to {self.wider:g}"
         )
 
 
@@ -155,53 +149,45 @@ class Diagnostics:
     @property
     def notes(self) -> tuple[str, ...]:
         """Warnings about the estimates, one sentence each."""
-        notes = [f"{bound}" for bound in self.bounds_reached]
-        disagreeing = [f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > MAX_R_HAT]
+        notes, correction = [*map(str, self.bounds_reached)], "double the candidates, or narrow the bounds"
+        disagreeing = ", ".join(f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > MAX_R_HAT)
         if disagreeing:
-            advice = "the estimates average them; double the candidates, or narrow the bounds"
-            notes.append(f"independent runs disagree (R-hat) on {', '.join(disagreeing)}: {advice}")
+            disagreement = f"independent runs disagree (R-hat) on {disagreeing}"
+            notes.append(f"{disagreement}: the estimates average them; {correction}")
         if self.effective < 20.0:
             shortage = f"only {format_count(round(self.effective), 'candidate')} represent a typical population"
-            notes.append(f"{shortage}: double the candidates, or narrow the bounds")
+            notes.append(f"{shortage}: {correction}")
         return tuple(notes)
 
     def __str__(self) -> str:
-        search = (
-            f"{format_count(self.candidates, 'candidate')}, {self.effective:.0f} effective for a typical population; "
-            f"{RUN_COUNT} independent runs, R-hat at most {max(self.agreement.values()):.2f}"
-        )
-        return "\n".join([search, *(f"note: {sentence}" for sentence in self.notes)])
+        candidates = format_count(self.candidates, "candidate")
+        effective = f"{self.effective:.0f} effective for a typical population"
+        runs = f"{RUN_COUNT} independent runs, R-hat at most {max(self.agreement.values()):.2f}"
+        return "\n".join([f"{candidates}, {effective}; {runs}", *(f"note: {sentence}" for sentence in self.notes)])
 
 
 def diagnose(search: SearchResult, populations: Floats) -> Diagnostics:
     """Compute the diagnostics of a search from the draws of its posterior."""
-    space = search.evidence.candidates.space
-    return Diagnostics(
-        len(search.evidence.candidates.points),
-        float(np.median(search.evidence.count_effective(populations))),
-        search.agreement,
-        find_bounds_reached(space, unpack(populations)[0]),
-    )
+    candidates, effective = search.evidence.candidates, float(np.median(search.evidence.count_effective(populations)))
+    bounds_reached = list_bounds_reached(candidates.space, unpack(populations)[0])
+    return Diagnostics(len(candidates.points), effective, search.agreement, bounds_reached)
 
 
-def find_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
+def list_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
     """Return estimates whose interval ends at a bound, from draws of the population's centre."""
     reached = []
     for name, values in space.parameters_by_name(centres).items():
         parameter = name.partition("_")[0]
         if parameter not in space.unknown:
             continue
-        k = space.unknown.index(parameter)
+        k, logs, max_value = space.unknown.index(parameter), np.log(values), MAX_VALUES[parameter]
         low, high = float(space.lower[k]), float(space.upper[k])
         edge = _EDGE_SHARE * (high - low)
-        wider = min(2.0 * math.exp(high), MAX_VALUES[parameter])
-        ends = [
-            ("lower", low, 0.5 * math.exp(low), np.log(values) < low + edge),
-            ("upper", high, wider, np.log(values) > high - edge),
-        ]
-        for end, bound, suggested, is_near in ends:
+        ends = ("lower", low, 0.5, logs < low + edge), ("upper", high, 2.0, logs > high - edge)
+        for end, bound, factor, is_near in ends:
             share = float(is_near.mean())
             # Bounds at the largest possible value cannot be widened.
-            if share > 0.05 and bound < math.log(MAX_VALUES[parameter]) - 1e-9:
-                reached.append(BoundReached(name, end, math.exp(bound), suggested, share))
+            if share > 0.05 and bound < math.log(max_value) - 1e-9:
+                wider = min(factor * math.exp(bound), max_value)
+                reached.append(BoundReached(name, end, math.exp(bound), wider, share))
     return tuple(reached)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from itertools import compress
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -134,16 +135,10 @@ class HistoryCalibration(Result):
         return math.sqrt(float(np.mean(self.residuals**2)))
 
     def summary(self) -> str:
-        rows = [
-            [
-                name,
-                fit.value,
-                float(f"{fit.deviation:.2g}"),
-                find_parameter_unit(name),
-                "at its bound" if fit.at_bound else "",
-            ]
-            for name, fit in self.estimates.items()
-        ]
+        rows = []
+        for name, fit in self.estimates.items():
+            remark = "at its bound" if fit.at_bound else ""
+            rows.append([name, fit.value, float(f"{fit.deviation:.2g}"), find_parameter_unit(name), remark])
         table = format_table(["parameter", "value", "std. error", "unit", ""], rows)
         return f"{table}\n\n{self._misfit_text()}"
 
@@ -174,11 +169,8 @@ class HistoryCalibration(Result):
         )
 
     def _estimates_text(self) -> str:
-        texts = (
-            f"{name.replace('_', ' ')} = {fit.value:.4g} {find_parameter_unit(name)}"
-            for name, fit in self.estimates.items()
-        )
-        return ", ".join(text.removesuffix(" 1") for text in texts)
+        numbers = ((name, f"{fit.value:.4g} {find_parameter_unit(name)}") for name, fit in self.estimates.items())
+        return ", ".join(f"{name.replace('_', ' ')} = {number.removesuffix(' 1')}" for name, number in numbers)
 
     def _headline(self) -> str:
         return f"{self._estimates_text()}; {self._misfit_text()}"
@@ -265,10 +257,8 @@ def calibrate_history(
     if not unknowns:
         raise InvalidOption(NO_UNKNOWNS)
     if len(sample_times) < 2 * len(unknowns):
-        raise InvalidOption(
-            f"{format_count(len(sample_times), 'sample')} cannot determine {format_count(len(unknowns), 'parameter')}: "
-            "provide more"
-        )
+        counts = format_count(len(sample_times), "sample"), format_count(len(unknowns), "parameter")
+        raise InvalidOption(f"{counts[0]} cannot determine {counts[1]}: provide more")
     problem = _Problem(sample_times, measured, motion, model, known, tuple(unknowns))
     rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
     return _create_calibration(problem, _fit(problem, rng))
@@ -276,14 +266,11 @@ def calibrate_history(
 
 def _check_history(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
     """Check the times and rotations of a history, and copy them."""
-    sample_times, measured = (
-        np.array(checks.numbers(values, name, InvalidOption))
-        for values, name in ((times, "times"), (rotation, "rotation"))
-    )
+    sample_times = np.array(checks.numbers(times, "times", InvalidOption))
+    measured = np.array(checks.numbers(rotation, "rotation", InvalidOption))
     if sample_times.ndim != 1 or sample_times.shape != measured.shape:
-        raise InvalidOption(
-            f"times and rotations must have the same shape; got {sample_times.shape} and {measured.shape}"
-        )
+        shapes = f"{sample_times.shape} and {measured.shape}"
+        raise InvalidOption(f"times and rotations must have the same shape; got {shapes}")
     if not (np.all(np.isfinite(sample_times)) and np.all(np.isfinite(measured))):
         raise InvalidOption("{} and {} must be finite; remove missing samples", "times", "rotation")
     if not len(sample_times) or sample_times[0] < 0.0 or not np.all(np.diff(sample_times) > 0.0):
@@ -379,8 +366,7 @@ def _bound_initial_rotation(rotation: Floats) -> _Unknown:
     """Return the unknown initial rotation with bounds around the first sample."""
     first = float(rotation[0])
     if abs(first) < 0.05 * np.abs(rotation).max():
-        text = "a release test must start at the rotation of the release; set {}"
-        raise InvalidOption(text, "initial_rotation")
+        raise InvalidOption("a release test must start at the rotation of the release; set {}", "initial_rotation")
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
 
@@ -419,10 +405,8 @@ def _search_nearby(problem: _Problem, optimum: Floats, width: float, rng: np.ran
     """Search within `width` standard errors of an optimum, because a forced response can be rugged on that scale."""
     sample_count = len(problem.times)
     covariance = _compute_covariance(problem, optimum, problem.residuals(optimum, sample_count))
-    cloud = optimum + width * rng.multivariate_normal(
-        np.zeros(len(optimum)), covariance, _CLOUD_SIZE, method="cholesky"
-    )
-    cloud = np.clip(cloud, *problem.bounds)
+    offsets = rng.multivariate_normal(np.zeros(len(optimum)), covariance, _CLOUD_SIZE, method="cholesky")
+    cloud = np.clip(optimum + width * offsets, *problem.bounds)
     best = min(cloud, key=lambda logs: problem.error(logs, sample_count))
     return min(optimum, _descend(problem, best, sample_count), key=lambda logs: problem.error(logs, sample_count))
 
@@ -431,12 +415,9 @@ def _create_calibration(problem: _Problem, logs: Floats) -> HistoryCalibration:
     count = len(problem.times)
     residuals = problem.residuals(logs, count)
     covariance = _compute_covariance(problem, logs, residuals)
-    low, high = problem.bounds
-    estimates = {}
-    for unknown, log, variance, lowest, highest in zip(
-        problem.unknowns, logs, np.diag(covariance), low, high, strict=True
-    ):
-        at_bound = bool(min(log - lowest, highest - log) < 1e-6)
+    estimates, bounds = {}, np.transpose(problem.bounds)
+    for unknown, log, variance, ends in zip(problem.unknowns, logs, np.diag(covariance), bounds, strict=True):
+        at_bound = bool(np.abs(log - ends).min() < 1e-6)
         estimates[unknown.name] = Measured(unknown.sign * math.exp(log), math.exp(log) * math.sqrt(variance), at_bound)
     response = problem.response(logs, float(problem.times[-1]))
     return HistoryCalibration(problem.block(logs), estimates, covariance, problem.times, residuals, response)
@@ -447,19 +428,12 @@ def _compute_covariance(problem: _Problem, logs: Floats, residuals: Floats) -> F
     variance = float((residuals**2).sum()) / (len(residuals) - len(logs)) * _integrate_autocorrelation(residuals)
     slopes = _compute_slopes(problem, logs, math.sqrt(variance))
     norms = np.linalg.norm(slopes, axis=0)
-    undetermined = [
-        unknown.name
-        for unknown, norm in zip(problem.unknowns, norms, strict=True)
-        if norm <= _INSENSITIVE * norms.max()
-    ]
-    if undetermined:
-        raise InvalidOption(
-            f"the history does not determine {', '.join(undetermined)}: set a value, or use a longer history"
-        )
+    names = [unknown.name for unknown in problem.unknowns]
+    if undetermined := ", ".join(compress(names, norms <= _INSENSITIVE * norms.max())):
+        raise InvalidOption(f"the history does not determine {undetermined}: set a value, or use a longer history")
     _, singular_values, right_vectors = np.linalg.svd(slopes / norms, full_matrices=False)
     if singular_values[-1] <= _INSENSITIVE * singular_values[0]:
-        names = ", ".join(unknown.name for unknown in problem.unknowns)
-        raise InvalidOption(f"the history does not distinguish {names}: set the value of one")
+        raise InvalidOption(f"the history does not distinguish {', '.join(names)}: set the value of one")
     return np.asarray(variance * (right_vectors.T / singular_values**2) @ right_vectors / np.outer(norms, norms))
 
 

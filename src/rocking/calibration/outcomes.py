@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.analysis.fragility import Fragility, fragility
-from rocking.analysis.levels import note_missing, number_groups
+from rocking.analysis.levels import assign_groups, note_missing
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.block import Blocks
 from rocking.block.body import Bodies
@@ -245,15 +245,8 @@ class Calibration(Result):
 
     def summary(self) -> str:
         rows = [
-            [
-                name,
-                estimate.median,
-                estimate.lower,
-                estimate.upper,
-                f"{100 * estimate.dispersion:.0f} %",
-                find_parameter_unit(name),
-            ]
-            for name, estimate in self.estimates.items()
+            [name, fit.median, fit.lower, fit.upper, f"{100 * fit.dispersion:.0f} %", find_parameter_unit(name)]
+            for name, fit in self.estimates.items()
         ]
         size = 1.0 / float((self.weights**2).sum())
         table = format_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows)
@@ -261,25 +254,22 @@ class Calibration(Result):
         return f"{self._headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
 
     def to_dict(self) -> dict[str, Any]:
-        diagnostics = self.diagnostics
-        lists = {
-            "bounds_reached": [asdict(entry) for entry in diagnostics.bounds_reached],
-            "notes": [*diagnostics.notes],
-        }
+        bounds_reached = [asdict(entry) for entry in self.diagnostics.bounds_reached]
+        notes = {"bounds_reached": bounds_reached, "notes": [*self.diagnostics.notes]}
         return {
             "model": self.model,
             "motions": len(self.observed),
             "overturned": int(self.observed.sum()),
             "estimates": {name: asdict(entry) for name, entry in self.estimates.items()},
             "fitted": asdict(self.scores),
-            "diagnostics": asdict(diagnostics) | lists,
+            "diagnostics": asdict(self.diagnostics) | notes,
             "probabilities": self.probabilities,
         }
 
     def _columns(self, table: str) -> list[Column]:
         columns = [
-            Column(f"{name}_{side}", getattr(self.blocks, name)[:, k], unit)
-            for name, unit in (("p", "rad/s"), ("alpha", "rad"), ("restitution", "1"))
+            Column(f"{name}_{side}", values[:, k], unit)
+            for name, (values, unit) in self.blocks.parameters().items()
             for k, side in enumerate(("plus", "minus"))
         ]
         return [*columns, Column("weight", self.weights), Column("model", [self.model] * len(self.weights))]
@@ -323,14 +313,13 @@ def simulate_outcomes(blocks: Bodies, motions: Motions, model: Model) -> NDArray
 def compute_probabilities(share: Floats, effective: float, outlier_probability: float) -> Floats:
     """Compute probabilities of recorded outcomes from a share of effective blocks, certain for a known block."""
     expected = share if math.isinf(effective) else estimate_share(share, effective)
-    return np.clip(
-        with_outliers(expected, outlier_probability), 0.0, 1.0
-    )  # rounding can make a sum of weights exceed 1
+    # Rounding can make a sum of weights exceed 1.
+    return np.clip(with_outliers(expected, outlier_probability), 0.0, 1.0)
 
 
 def label_groups(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
     """Assign a group number, from 0, to each motion. By default each motion is a group."""
-    labels = number_groups(range(count) if groups is None else groups, "groups", count)
+    labels = assign_groups(range(count) if groups is None else groups, "groups", count)
     checks.integer(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
 
@@ -470,17 +459,13 @@ def check_outcomes(overturned: ArrayLike, count: int) -> Flags:
         raise InvalidOption("{} must not be masked; provide an outcome for each motion", "overturned", value=overturned)
     values = np.asarray(overturned)
     if values.shape != (count,):
-        raise InvalidOption(
-            f"{{}} must contain one outcome for each of the {count} motions; got shape {values.shape}",
-            "overturned",
-            value=overturned,
-        )
+        message = f"{{}} must contain one outcome for each of the {count} motions; got shape {values.shape}"
+        raise InvalidOption(message, "overturned", value=overturned)
     if not np.all(np.isin(values, (0, 1))):
         raise InvalidOption("{} must contain True or False (or 1 or 0) for each motion", "overturned")
     observed = values.astype(bool)
     if observed.all() or not observed.any():
-        raise InvalidOption(
-            "all outcomes are equal; a calibration requires motions that overturn the block and motions that do not"
-        )
+        requirement = "a calibration requires motions that overturn the block and motions that do not"
+        raise InvalidOption(f"all outcomes are equal; {requirement}")
     observed.flags.writeable = False
     return observed

@@ -12,10 +12,11 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.calibration.space import Space
@@ -45,7 +46,7 @@ def unpack(populations: Floats) -> tuple[Floats, Floats]:
     return populations[:, :k], np.exp(populations[:, k:])
 
 
-def draw_dispersions(space: Space, centres: Floats, rng: np.random.Generator) -> Floats:
+def draw_dispersions(space: Space, centres: Floats, rng: Generator) -> Floats:
     """Draw dispersions from the prior for each centre."""
     scores = rng.standard_normal(centres.shape)
     return np.hstack([centres, np.log(space.dispersions) + _DISPERSION_LOG_DEVIATION * scores])
@@ -58,7 +59,7 @@ def compute_log_prior(space: Space, populations: Floats) -> Floats:
     return np.asarray(-0.5 * (scores**2).sum(axis=1))
 
 
-def draw_points(populations: Floats, width: float, count: int, rng: np.random.Generator) -> Floats:
+def draw_points(populations: Floats, width: float, count: int, rng: Generator) -> Floats:
     """Draw points from populations in turn, with dispersions times `width`, shape (count, k)."""
     centre, dispersion = unpack(populations[np.arange(count) % len(populations)])
     return centre + width * dispersion * rng.standard_normal(centre.shape)
@@ -85,7 +86,7 @@ class Candidates:
     space: Space
     points: Floats
     overturned: NDArray[np.float32]
-    even_count: int
+    filling_count: int
     proposals: tuple[tuple[int, Floats], ...] = ()
 
     @classmethod
@@ -95,7 +96,7 @@ class Candidates:
             runs[0].space,
             np.concatenate([run.points for run in runs]),
             np.concatenate([run.overturned for run in runs]),
-            sum(run.even_count for run in runs),
+            sum(run.filling_count for run in runs),
             tuple(proposal for run in runs for proposal in run.proposals),
         )
 
@@ -110,10 +111,9 @@ class Candidates:
 
     def log_density(self, points: Floats) -> Floats:
         """Compute the log-density of candidates per volume at points in the space, shape (c,)."""
-        parts = [np.full(len(points), np.log(self.even_count / self.space.volume))]
-        parts += [
-            np.log(count) + compute_log_density(proposal, PROPOSAL_WIDTH, points) for count, proposal in self.proposals
-        ]
+        parts = [np.full(len(points), np.log(self.filling_count / self.space.volume))]
+        for count, proposal in self.proposals:
+            parts.append(np.log(count) + compute_log_density(proposal, PROPOSAL_WIDTH, points))
         return np.asarray(np.logaddexp.reduce(parts))
 
 
@@ -218,8 +218,8 @@ _EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
 _MAX_EXTENSIONS: Final = 2
 
 #: Draws from a posterior, and rounds of moves after each tempering step, for the search and the comparison.
-_PROPOSAL: Final = (256, 2)
-_COMPARISON: Final = (256, 4)
+_PROPOSAL_SIZES: Final = (256, 2)
+_COMPARISON_SIZES: Final = (256, 4)
 
 #: Largest R-hat of agreeing runs: their means differ by less than two thirds of a standard deviation.
 MAX_R_HAT: Final = 1.1
@@ -238,14 +238,14 @@ class Problem:
         """Combine candidates with the observed outcomes."""
         return Evidence(candidates, self.observed, self.outlier_probability)
 
-    def fill_space(self, count: int, rng: np.random.Generator) -> Candidates:
+    def fill_space(self, count: int, rng: Generator) -> Candidates:
         """Simulate blocks that fill the space evenly."""
         points = self.space.quasi_random(count, rng)
         return Candidates(self.space, points, self.simulate(points), count)
 
-    def propose(self, candidates: Candidates, exponent: float, count: int, rng: np.random.Generator) -> Candidates:
+    def propose(self, candidates: Candidates, exponent: float, count: int, rng: Generator) -> Candidates:
         """Also simulate blocks near fitted populations, wider for a lower exponent of the likelihood."""
-        populations = sample_posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent)
+        populations = sample_posterior(self.evidence(candidates), *_PROPOSAL_SIZES, rng, exponent=exponent)
         points = draw_points(populations, PROPOSAL_WIDTH, count, rng)
         points = points[self.space.contains(points)]
         proposed = Candidates(self.space, points, self.simulate(points), 0, ((count, populations),))
@@ -268,13 +268,12 @@ class SearchResult:
     @property
     def agreement(self) -> dict[str, float]:
         """R-hat between the runs of each parameter's centre, by name."""
-        centres = [
-            self.evidence.candidates.space.parameters_by_name(unpack(populations)[0]) for populations in self.posteriors
-        ]
-        return {name: r_hat(np.array([populations[name] for populations in centres])) for name in centres[0]}
+        space = self.evidence.candidates.space
+        centres = [space.parameters_by_name(unpack(populations)[0]) for populations in self.posteriors]
+        return {name: compute_r_hat(np.array([populations[name] for populations in centres])) for name in centres[0]}
 
 
-def search(problem: Problem, candidates: int, rng: np.random.Generator) -> SearchResult:
+def search(problem: Problem, candidates: int, rng: Generator) -> SearchResult:
     """Simulate about this many candidates, up to twice as many while runs disagree or few represent the posterior."""
     part_size = max(candidates // (RUN_COUNT * (_FILLING_PARTS + len(_EXPONENTS))), 1)
     streams = rng.spawn(RUN_COUNT)
@@ -296,7 +295,7 @@ def _extend_runs(
     runs: Sequence[Candidates],
     exponents: Sequence[float],
     part_size: int,
-    streams: Sequence[np.random.Generator],
+    streams: Sequence[Generator],
 ) -> SearchResult:
     """Extend every run by blocks near its fits, and compare the runs."""
     extended, posteriors = [], []
@@ -304,11 +303,11 @@ def _extend_runs(
         for exponent in exponents:
             run = problem.propose(run, exponent, part_size, rng)
         extended.append(run)
-        posteriors.append(sample_posterior(problem.evidence(run), *_COMPARISON, rng))
+        posteriors.append(sample_posterior(problem.evidence(run), *_COMPARISON_SIZES, rng))
     return SearchResult(problem.evidence(Candidates.concatenate(extended)), tuple(extended), tuple(posteriors))
 
 
-def r_hat(runs: Floats) -> float:
+def compute_r_hat(runs: Floats) -> float:
     """Compute R-hat of the ranks, or distances from the middle, of draws (runs, draws)."""
     from scipy.special import ndtri
     from scipy.stats import rankdata
@@ -321,9 +320,7 @@ def r_hat(runs: Floats) -> float:
     return max(compute_from_ranks(values) for values in (runs, np.abs(runs - np.median(runs))))
 
 
-def sample_posterior(
-    evidence: Evidence, count: int, rounds: int, rng: np.random.Generator, *, exponent: float = 1.0
-) -> Floats:
+def sample_posterior(evidence: Evidence, count: int, rounds: int, rng: Generator, *, exponent: float = 1.0) -> Floats:
     """Draw populations from the posterior, shape (count, 2 k), or from a tempered one if an exponent is set.
 
     Sequential Monte Carlo (Del Moral, Doucet and Jasra 2006): the centres of the particles start at candidates. Each
@@ -333,61 +330,56 @@ def sample_posterior(
     space, points = evidence.candidates.space, evidence.candidates.points
     centres = points[rng.choice(len(points), min(4 * count, len(points)), replace=False)]
     particles = draw_dispersions(space, centres, rng)
-    start, end = _compute_log_densities(evidence, exponent, particles)
+    compute = partial(_compute_log_densities, evidence, exponent)
+    log_densities = compute(particles)
     with Progress("fitting", 100) as bar:
-        temperature = 0.0
-        while temperature < 1.0:
-            increase = _find_step(end - start, 1.0 - temperature)
-            bar.advance(round(100 * (temperature + increase)) - round(100 * temperature))
-            temperature += increase
-            indices = resample(_temper_weights(end - start, increase), count, rng)
-            particles, start, end = particles[indices], start[indices], end[indices]
+        progress = 0.0  # exponent of the ratio of the posterior to the initial distribution
+        while progress < 1.0:
+            log_ratio = log_densities[1] - log_densities[0]
+            increase = _find_step(log_ratio, 1.0 - progress)
+            bar.advance(round(100 * (progress + increase)) - round(100 * progress))
+            progress += increase
+            indices = resample(_temper_weights(log_ratio, increase), count, rng)
+            particles, log_densities = particles[indices], log_densities[:, indices]
             for _ in range(rounds):
-                _move_particles(evidence, exponent, temperature, particles, start, end, rng)
+                _move_particles(compute, progress, particles, log_densities, rng)
     return particles
 
 
-def _compute_log_densities(evidence: Evidence, exponent: float, populations: Floats) -> tuple[Floats, Floats]:
-    """Compute log-densities of the initial distribution of the particles and of the posterior."""
+def _compute_log_densities(evidence: Evidence, exponent: float, populations: Floats) -> Floats:
+    """Compute log-densities of the initial distribution of the particles and of the posterior, shape (2, n)."""
     candidates, centres = evidence.candidates, populations[:, : populations.shape[1] // 2]
-    inside = candidates.space.contains(centres)
-    end = compute_log_prior(candidates.space, populations)
-    start = end + np.where(inside, 0.0, -np.inf)
-    start[inside] += candidates.log_density(centres[inside])
-    end[inside] += exponent * evidence.log_likelihoods(populations[inside])
-    end[~inside] = -np.inf
-    return start, end
+    is_inside = candidates.space.contains(centres)
+    prior = compute_log_prior(candidates.space, populations)
+    log_densities = np.tile(np.where(is_inside, prior, -np.inf), (2, 1))
+    log_densities[0, is_inside] += candidates.log_density(centres[is_inside])
+    log_densities[1, is_inside] += exponent * evidence.log_likelihoods(populations[is_inside])
+    return log_densities
 
 
 def _move_particles(
-    evidence: Evidence,
-    exponent: float,
-    temperature: float,
-    particles: Floats,
-    start: Floats,
-    end: Floats,
-    rng: np.random.Generator,
+    compute: Callable[[Floats], Floats], exponent: float, particles: Floats, log_densities: Floats, rng: Generator
 ) -> None:
     """Move one half of the particles by differences within the other half, then vice versa."""
     shuffled = rng.permutation(len(particles))
     half = len(particles) // 2
     for movers, guides in ((shuffled[:half], shuffled[half:]), (shuffled[half:], shuffled[:half])):
         new = particles[movers] + _draw_differences(particles[guides], len(movers), rng)
-        new_start, new_end = _compute_log_densities(evidence, exponent, new)
+        new_densities = compute(new)
         with np.errstate(invalid="ignore"):
-            gain = (1.0 - temperature) * (new_start - start[movers]) + temperature * (new_end - end[movers])
+            changes = new_densities - log_densities[:, movers]
+            gain = (1.0 - exponent) * changes[0] + exponent * changes[1]
         accepted = np.log(rng.random(len(movers))) < gain
-        indices = movers[accepted]
-        particles[indices], start[indices], end[indices] = new[accepted], new_start[accepted], new_end[accepted]
+        particles[movers[accepted]], log_densities[:, movers[accepted]] = new[accepted], new_densities[:, accepted]
 
 
-def resample(weights: Floats, count: int, rng: np.random.Generator) -> Integers:
+def resample(weights: Floats, count: int, rng: Generator) -> Integers:
     """Draw indices in proportion to weights with sum 1, as evenly as possible (systematic resampling)."""
     steps = np.cumsum(weights)
     return np.searchsorted(steps / steps[-1], (np.arange(count) + rng.random()) / count).astype(np.int64)
 
 
-def _draw_differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats:
+def _draw_differences(guides: Floats, count: int, rng: Generator) -> Floats:
     first, second = (rng.integers(len(guides), size=count) for _ in range(2))
     size = guides.shape[1]
     # 2.38/sqrt(2 d) suits a normal posterior (ter Braak 2006). Whole differences jump between optima.
@@ -396,15 +388,15 @@ def _draw_differences(guides: Floats, count: int, rng: np.random.Generator) -> F
     return scale[:, None] * (guides[first] - guides[second]) + 1e-3 * rng.standard_normal((count, size))
 
 
-def _temper_weights(likelihood: Floats, step: float) -> Floats:
-    weights = np.exp(step * (likelihood - likelihood.max()))
+def _temper_weights(log_ratio: Floats, step: float) -> Floats:
+    weights = np.exp(step * (log_ratio - log_ratio.max()))
     return np.asarray(weights / weights.sum())
 
 
-def _find_step(likelihood: Floats, max_step: float) -> float:
+def _find_step(log_ratio: Floats, max_step: float) -> float:
     """Find by bisection the increase of the exponent that keeps half of the particles effective."""
 
     def has_too_few(step: float) -> bool:
-        return 1.0 / float((_temper_weights(likelihood, step) ** 2).sum()) / len(likelihood) < 0.5
+        return 1.0 / float((_temper_weights(log_ratio, step) ** 2).sum()) / len(log_ratio) < 0.5
 
     return bisect(0.0, max_step, has_too_few, halvings=50)[1] if has_too_few(max_step) else max_step

@@ -60,7 +60,7 @@ class Space:
     known: Mapping[str, float]
     lower: Floats
     upper: Floats
-    ratio: float
+    max_log_ratio: float
 
     @classmethod
     def from_bounds(
@@ -81,20 +81,19 @@ class Space:
             raise InvalidOption(NO_UNKNOWNS)
         max_alpha = bounds.get("alpha", (0.0, known.get("alpha", 0.0)))[1]
         if "restitution" not in {*bounds, *known} and max_alpha >= _MAX_HOUSNER_ALPHA:
-            raise InvalidOption(
-                f"Housner's restitution is positive for {{}} below {_MAX_HOUSNER_ALPHA:.4f} rad only", "alpha"
-            )
+            message = f"Housner's restitution is positive for {{}} below {_MAX_HOUSNER_ALPHA:.4f} rad only"
+            raise InvalidOption(message, "alpha")
         lower, upper = np.log(list(bounds.values())).T
-        ratio = 0.0
+        max_log_ratio = 0.0
         if two_sided and SIDED_PARAMETER in bounds:
             # Narrow bounds limit the ratio. Otherwise their box would be almost empty.
-            ratio = min(math.log(3.0), math.log(bounds[SIDED_PARAMETER][1] / bounds[SIDED_PARAMETER][0]))
-        return cls(tuple(bounds), known, lower, upper, ratio)
+            max_log_ratio = min(math.log(3.0), math.log(bounds[SIDED_PARAMETER][1] / bounds[SIDED_PARAMETER][0]))
+        return cls(tuple(bounds), known, lower, upper, max_log_ratio)
 
     @property
     def two_sided(self) -> bool:
         """Whether the sides may differ."""
-        return self.ratio > 0.0
+        return self.max_log_ratio > 0.0
 
     @property
     def dispersions(self) -> Floats:
@@ -104,7 +103,7 @@ class Space:
     @property
     def box(self) -> tuple[Floats, Floats]:
         """Lower and upper ends of the coordinates, shape (k,) each."""
-        ratio = [self.ratio] if self.two_sided else []
+        ratio = [self.max_log_ratio] if self.two_sided else []
         return np.concatenate([self.lower, np.negative(ratio)]), np.concatenate([self.upper, ratio])
 
     def quasi_random(self, count: int, rng: np.random.Generator) -> Floats:
@@ -198,11 +197,7 @@ def parse_range(pair: Any, name: str, max_value: float) -> Range:
         raise InvalidOption(f"{{}} must be a pair (lowest, highest), not {pair!r}", name, value=pair) from None
     if not 0.0 < low < high <= max_value or math.isinf(high):
         limit = "" if math.isinf(max_value) else f" and at most {max_value:g}"
-        hint = checks.hint_at_degrees(high) if name == "alpha" else ""
-        raise InvalidOption(
-            f"{{}} must be a pair (lowest, highest) of positive, increasing numbers{limit}, "
-            f"not {low:g}, {high:g}{hint}",
-            name,
-            value=pair,
-        )
+        correction = checks.hint_at_degrees(high) if name == "alpha" else ""
+        message = f"{{}} must be a pair (lowest, highest) of positive, increasing numbers{limit}"
+        raise InvalidOption(f"{message}, not {low:g}, {high:g}{correction}", name, value=pair)
     return low, high

@@ -11,7 +11,7 @@ from typing import Any, Final, get_args
 import numpy as np
 
 from rocking.analysis.hazard import HEADINGS, normalise_heading
-from rocking.analysis.levels import number_families
+from rocking.analysis.levels import assign_families
 from rocking.block import Blocks
 from rocking.calibration.validate import ShakeTest
 from rocking.core import checks
@@ -96,17 +96,13 @@ def read_calibration(
 def read_ensemble(path: Path) -> Ensemble:
     """Read the ensemble that `Calibration.to_csv` writes."""
     table = read_table(path)
-    columns = [
-        [add_unit(f"{name}_{side}", unit) for side in ("plus", "minus")]
-        for name, unit in (("p", "rad/s"), ("alpha", "rad"), ("restitution", "1"))
-    ]
+    parameters = ("p", "rad/s"), ("alpha", "rad"), ("restitution", "1")
+    columns = [[add_unit(f"{name}_{side}", unit) for side in ("plus", "minus")] for name, unit in parameters]
     missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
     if missing:
         raise table.create_error(f"expected the ensemble.csv of a calibration, with columns {' and '.join(missing)}")
-    model_names: dict[str, Model] = {name: name for name in get_args(Model)}
-    models = {
-        table.convert(line, row["model"], model_names.__getitem__, "linear or nonlinear") for line, row in table.rows
-    }
+    parse = {name: name for name in get_args(Model)}.__getitem__
+    models = {table.convert(line, row["model"], parse, "linear or nonlinear") for line, row in table.rows}
     if len(models) > 1:
         raise table.create_error("an ensemble must have one model, not both; correct the column model", line=None)
     try:
@@ -119,7 +115,7 @@ def read_ensemble(path: Path) -> Ensemble:
 
 
 def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Table:
-    """Read a CSV table with distinct columns, whose header cells are converted by `name`."""
+    """Read a CSV table with distinct columns, whose header cells are converted."""
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
@@ -132,12 +128,12 @@ def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Tabl
     (_, header), *rows = cells
     columns = [convert_heading(cell) for cell in header]
     if duplicates := [column for column in dict.fromkeys(columns) if columns.count(column) > 1]:
-        text = f"column names must be distinct; got {' and '.join(duplicates)} more than once"
-        raise UnreadableRecord(text, path=str(path), line=1)
+        message = f"column names must be distinct; got {' and '.join(duplicates)} more than once"
+        raise UnreadableRecord(message, path=str(path), line=1)
     for line, row in rows:
         if len(row) != len(columns):
-            mismatch = f"this row has {format_count(len(row), 'cell')} for {format_count(len(columns), 'column')}"
-            raise UnreadableRecord(f"{mismatch}; correct it", path=str(path), line=line)
+            message = f"this row has {format_count(len(row), 'cell')} for {format_count(len(columns), 'column')}"
+            raise UnreadableRecord(f"{message}; correct it", path=str(path), line=line)
     return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
 
@@ -145,9 +141,8 @@ def _create_tests(table: _Table, **metadata: Any) -> list[ShakeTest]:
     """Create the tests of a table with these columns."""
     specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
     if len(specimens) > 1:
-        raise table.create_error(
-            f"the table contains tests of {format_count(len(specimens), 'specimen')}; use one table for each"
-        )
+        count = format_count(len(specimens), "specimen")
+        raise table.create_error(f"the table contains tests of {count}; use one table for each")
     overturned, motions = table.booleans("overturned"), _load_row_motions(table, **metadata)
     names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
     return [ShakeTest(*row) for row in zip(motions, overturned, names, groups, strict=True)]
@@ -155,30 +150,24 @@ def _create_tests(table: _Table, **metadata: Any) -> list[ShakeTest]:
 
 def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
     """Read each row's motion, scaled and with its vertical. The row's channel, dt_s and units take precedence."""
-    several = len({row["motion"] for _, row in table.rows}) > 1
+    has_several = len({row["motion"] for _, row in table.rows}) > 1
     loaded: dict[tuple[object, ...], Motion] = {}
     motions = []
     for line, row in table.rows:
         scale = table.convert(line, row.get("scale") or "1", _parse_finite, "a number")
-        step = row.get("dt_s") or ""
-        cells = row.get("channel"), table.convert(line, step, float, "a number") if step else None, row.get("units")
-        metadata = {
-            "channel": cells[0] or channel,
-            "dt": dt if cells[1] is None else cells[1],
-            "units": cells[2] or units,
-        }
+        step = table.convert(line, row["dt_s"], float, "a number") if row.get("dt_s") else None
+        cells = row.get("channel"), step, row.get("units")
+        options = {"channel": cells[0] or channel, "dt": dt if step is None else step, "units": cells[2] or units}
+        options["several"] = has_several and not any(cells)
         name, vertical = row["motion"], row.get("vertical") or ""
         try:
             if (key := (name, vertical, *cells)) not in loaded:
-                loaded[key] = _load_row_motion(
-                    table.path, name, vertical, several=several and not any(cells), **metadata
-                )
+                loaded[key] = _load_row_motion(table.path, name, vertical, **options)
             motions.append(loaded[key] if scale == 1.0 else loaded[key].scaled(scale))
         except RockingError as error:
             record_file = str(error).removesuffix(str(error.message))  # file of the record, before the table
-            raise table.create_error(
-                record_file + error.message.template, *error.message.arguments, line=line, value=error.value
-            ) from error
+            message, arguments = record_file + error.message.template, error.message.arguments
+            raise table.create_error(message, *arguments, line=line, value=error.value) from error
     return tuple(motions)
 
 
@@ -265,9 +254,8 @@ def read_observed(
     columns = table.columns
     intensities = [name for name in columns if name in HEADINGS]
     if "overturned" not in columns or len(intensities) + ("motion" in columns) != 1:
-        raise table.create_error(
-            f"the columns must be overturned and either motion or one of {', '.join(HEADINGS)}, not {','.join(columns)}"
-        )
+        expected = f"overturned and either motion or one of {', '.join(HEADINGS)}"
+        raise table.create_error(f"the columns must be {expected}, not {','.join(columns)}")
     has_trials = "trials" in columns
     observed: dict[str, Any] = {
         "exceeded": table.numbers("overturned") if has_trials else [*table.booleans("overturned")],
@@ -287,11 +275,8 @@ def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[
     if kind == "sa" and measure.period is None:
         raise InvalidOption("a spectral acceleration requires {}, in s", "period", path=str(table.path))
     if measure.name not in ("pga", kind):  # "pga" is the default
-        raise InvalidOption(
-            f"{{}} is {measure.name}, but the intensities of the outcomes are {kind}; omit it",
-            "measure",
-            path=str(table.path),
-        )
+        message = f"{{}} is {measure.name}, but the intensities of the outcomes are {kind}; omit it"
+        raise InvalidOption(message, "measure", path=str(table.path))
     return {"intensity": factor * table.numbers(heading), "measure": measure if kind == "sa" else Measure(kind)}
 
 
@@ -299,12 +284,9 @@ def _pair_with_motions(table: _Table, measure: Measure, **metadata: Any) -> dict
     if measure.has_block_units:
         raise InvalidOption(f"{measure.name} is in units of the block, which is unknown for observed outcomes; use pga")
     motions = _load_row_motions(table, **metadata)
-    motions_by_name = {
-        row["motion"]: motion for (_, row), motion in zip(table.rows, motions, strict=True) if motion.pga > 0.0
-    }
-    families = (
-        dict(zip(motions_by_name, number_families([*motions_by_name.values()]), strict=True)) if motions_by_name else {}
-    )
+    rows = zip(table.rows, motions, strict=True)
+    motions_by_name = {row["motion"]: motion for (_, row), motion in rows if motion.pga > 0.0}
+    families = dict(zip(motions_by_name, assign_families([*motions_by_name.values()]), strict=True))
     intensity = [measure.value(motion) for motion in motions]
     return {"intensity": intensity, "measure": measure, "clusters": _join_clusters(table, families)}
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis import levels
-from rocking.analysis.levels import describe_pool, normalise_weights
+from rocking.analysis.levels import assign_numbers, describe_pool, normalise_weights
 from rocking.block.body import Bodies, Body
 from rocking.calibration.diagnostics import Scores, compute_log_losses
 from rocking.calibration.outcomes import Calibration, Validation, compute_probabilities, simulate_outcomes
@@ -73,9 +72,8 @@ class ShakeTest:
         for label in ("name", "group"):
             checks.text(getattr(self, label), label, InvalidOption)
         if not isinstance(outcome, (bool, int, np.bool_, np.integer)) or outcome not in (0, 1):
-            raise InvalidOption(
-                f"{{}} must be True or False, not {checks.short_repr(outcome)}", "overturned", value=outcome
-            )
+            message = f"{{}} must be True or False, not {checks.short_repr(outcome)}"
+            raise InvalidOption(message, "overturned", value=outcome)
         object.__setattr__(self, "overturned", bool(outcome))
         object.__setattr__(self, "name", self.name or motion.name)
 
@@ -239,9 +237,8 @@ class ModelValidation(Result):
     @property
     def scores(self) -> Scores:
         """Accuracy, log loss and Brier score, as for a calibration."""
-        return Scores.from_predictions(
-            [test.probability for test in self.tests], [test.overturned for test in self.tests]
-        )
+        outcomes = [(test.probability, test.overturned) for test in self.tests]
+        return Scores.from_predictions(*zip(*outcomes, strict=True))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -249,17 +246,14 @@ class ModelValidation(Result):
         notes = []
         overturned_count = sum(test.overturned for test in self.tests)
         if overturned_count in (0, len(self.tests)):
-            all_or_none = "all tests" if overturned_count else "no test"
-            notes.append(
-                f"{all_or_none} overturned the specimen: the base rate is perfect, so that the skill is undefined"
-            )
+            tests = "all tests" if overturned_count else "no test"
+            notes.append(f"{tests} overturned the specimen: the base rate is perfect, so that the skill is undefined")
         if self.brier.clusters < 10:
             cluster_text = format_count(self.brier.clusters, "cluster")
             notes.append(f"the tests belong to {cluster_text} only: standard errors are rough")
         if math.isinf(self.log_loss.value):
-            notes.append(
-                "the log loss is infinite because a certain prediction failed: include the uncertainty of the specimen"
-            )
+            reason = "because a certain prediction failed"
+            notes.append(f"the log loss is infinite {reason}: include the uncertainty of the specimen")
         return tuple(notes)
 
     def _headline(self) -> str:
@@ -273,14 +267,10 @@ class ModelValidation(Result):
             for name, score in (("Brier", self.brier), ("log loss", self.log_loss))
         ]
         negation = "not " if self.reliability_chance < 0.05 else ""
-        parts = [
-            self._headline(),
-            "",
-            format_table(["score", "mean", "+-", "skill", "+-"], scores),
-            "",
-            f"reliability: {negation}as if the predictions were right (p = {self.reliability_chance:.2g})",
-        ]
-        return "\n".join([*parts, *(f"note: {sentence}" for sentence in self.notes)])
+        reliability = f"{negation}as if the predictions were right (p = {self.reliability_chance:.2g})"
+        table = format_table(["score", "mean", "+-", "skill", "+-"], scores)
+        notes = (f"note: {sentence}" for sentence in self.notes)
+        return "\n".join([self._headline(), "", table, "", f"reliability: {reliability}", *notes])
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self) | {"notes": [*self.notes]}
@@ -373,9 +363,8 @@ def validate(
         raise InvalidOption("{} must contain at least one test", "tests", value=tests)
     for test in items:
         if not isinstance(test, ShakeTest):
-            raise InvalidOption(
-                f"{{}} must contain ShakeTest(motion, overturned); got {checks.short_repr(test)}", "tests", value=test
-            )
+            message = f"{{}} must contain ShakeTest(motion, overturned); got {checks.short_repr(test)}"
+            raise InvalidOption(message, "tests", value=test)
     checks.integer(bins, "bins", InvalidOption, 1, 1000)
     checks.integer(simulations, "simulations", InvalidOption, 100)
     rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
@@ -383,9 +372,8 @@ def validate(
         checks.between(outlier_probability, "outlier_probability", InvalidOption, 0.0, 0.5)
     distinct, indices = find_distinct_motions([test.motion for test in items])
     observed = np.array([test.overturned for test in items], dtype=bool)
-    clusters = levels.number_labels(
-        [("group", test.group) if test.group else ("motion", k) for test, k in zip(items, indices, strict=True)]
-    )
+    labels = [test.group or k for test, k in zip(items, indices, strict=True)]
+    clusters = assign_numbers(labels)
     description, equation = "predictions of tests that were left out", ""
     if isinstance(blocks, Validation):
         probabilities = _average_left_out(blocks, len(items), weights, outlier_probability)
@@ -411,13 +399,18 @@ def validate(
     # Summation order changes the last digits.
     larger_count = np.count_nonzero(terms[1:] >= terms[0] - 1e-9 * abs(terms[0]))
     rows = zip(make_names_unique([test.name for test in items]), items, probabilities.tolist(), strict=True)
+    reliability = []
+    for k in np.unique(bin_indices).tolist():
+        in_bin = bin_indices == k
+        # At most 5 % of the simulated shares are beyond each end.
+        band = np.quantile(outcomes[:, in_bin].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
+        shares = float(probabilities[in_bin].mean()), float(observed[in_bin].mean())
+        reliability.append(ShareInBin(k / bins, (k + 1) / bins, int(in_bin.sum()), *shares, *band))
     return ModelValidation(
         tests=tuple(JudgedTest(name, test.motion.name, test.overturned, chance) for name, test, chance in rows),
         brier=compute_score((probabilities - observed) ** 2, observed, lambda share: share * (1.0 - share), clusters),
         log_loss=compute_score(compute_log_losses(probabilities, observed), observed, _compute_entropy, clusters),
-        reliability=tuple(
-            _summarise_bin(k, bins, bin_indices == k, probabilities, observed, outcomes) for k in np.unique(bin_indices)
-        ),
+        reliability=tuple(reliability),
         reliability_chance=float((1.0 + larger_count) / (simulations + 1.0)),
         description=description,
         model=equation,
@@ -431,12 +424,9 @@ def _average_left_out(source: Validation, count: int, weights: object, outlier_p
         raise InvalidOption("{} cannot be combined with predictions of left-out tests: omit it", name)
     predicted_count = source.probabilities.shape[1]
     if predicted_count != count:
-        raise InvalidOption(
-            f"the predictions are of {format_count(predicted_count, 'test')}; got {format_count(count, 'test')}: "
-            "{} must be those of the calibration, in their order",
-            "tests",
-            value=count,
-        )
+        counts = f"{format_count(predicted_count, 'test')}; got {format_count(count, 'test')}"
+        message = f"the predictions are of {counts}: {{}} must be those of the calibration, in their order"
+        raise InvalidOption(message, "tests", value=count)
     return np.asarray(source.probabilities.mean(axis=0))
 
 
@@ -477,20 +467,10 @@ def compute_miscalibration(probabilities: Floats, observed: Flags, bins: Integer
     return np.asarray((excess**2 / np.maximum(counts, 1)).sum(axis=1) / len(bins))
 
 
-def _summarise_bin(
-    k: int, bins: int, in_bin: Flags, probabilities: Floats, observed: Flags, simulated: Flags
-) -> ShareInBin:
-    """Compute the shares of bin k, and the band of simulated shares with at most 5 % beyond each end."""
-    band = np.quantile(simulated[:, in_bin].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
-    shares = float(probabilities[in_bin].mean()), float(observed[in_bin].mean())
-    return ShareInBin(k / bins, (k + 1) / bins, int(in_bin.sum()), *shares, *band)
-
-
 def _format_with_error(value: float, error: float) -> tuple[str, str]:
     """Format value and standard error to two digits of the error."""
     if not (math.isfinite(value) and math.isfinite(error)):
-        if math.isinf(value):
-            return ("infinite" if value > 0.0 else "-infinite"), "-"
-        return ("-" if math.isnan(value) else f"{value:.3g}"), "-"
+        text = f"{value:.3g}"
+        return {"inf": "infinite", "-inf": "-infinite", "nan": "-"}.get(text, text), "-"
     digits = 3 if error == 0.0 else max(0, 1 - math.floor(math.log10(error)))
     return f"{value:.{digits}f}", f"{error:.{digits}f}"

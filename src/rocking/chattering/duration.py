@@ -50,7 +50,7 @@ _ROUNDING: Final = 2.0**-51
 
 _MAX_CAPACITY: Final = 1 << 23
 
-IMPACT: Final = np.dtype(
+IMPACT_DTYPE: Final = np.dtype(
     [("time", float), ("side", np.int8), ("interval", float), ("speed_before", float), ("speed_after", float)]
 )
 
@@ -227,7 +227,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
         raise InvalidOption(f"{{}} must be finite and at least 1e-15; got {tolerance!r}", "tolerance", value=tolerance)
     if amplitude == 1.0:
-        return ChatteringSequence(np.zeros(0, IMPACT), True, 0.0, 0.0, 0.0)
+        return ChatteringSequence(np.zeros(0, IMPACT_DTYPE), True, 0.0, 0.0, 0.0)
     capacity, half_period = 512, math.pi / frequency
     while True:
         status, impacts, phases = _resolve_sequence(amplitude, frequency, restitution, tolerance, capacity)
@@ -236,9 +236,8 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
             break
         capacity *= 2
         if capacity > _MAX_CAPACITY:
-            raise InvalidOption(
-                f"the sequence has more than {_MAX_CAPACITY} impacts: reduce {{}} = {eta!r}", "eta", value=eta
-            )
+            message = f"the sequence has more than {_MAX_CAPACITY} impacts: reduce {{}} = {eta!r}"
+            raise InvalidOption(message, "eta", value=eta)
     # A sequence that lasts almost half a period may have the critical amplitude within rounding error.
     if status == SequenceStatus.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - 1e-6):
         # If rounding error decides, `chattering_time` determines the outcome.
@@ -283,8 +282,8 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     ratios = np.full(n, math.nan)
     intervals = _resolve_sequence(amplitude, frequency, restitution, -1.0, n + 2)[1]["interval"]
     intervals = intervals[intervals > 0.0]
-    n_known = max(0, intervals.size - 2)
-    ratios[:n_known] = intervals[2:] / intervals[:n_known]
+    known_count = max(0, intervals.size - 2)
+    ratios[:known_count] = intervals[2:] / intervals[:known_count]
     return ratios
 
 
@@ -301,7 +300,7 @@ def _resolve_sequence(
     table = np.zeros(capacity, RESOLVED_IMPACT)
     status, count, rest, lower, upper = resolve_impacts(a - 1.0, 1.0 / (omega * omega), eta, tolerance, table)
     table = table[:count]
-    impacts = np.zeros(count, IMPACT)
+    impacts = np.zeros(count, IMPACT_DTYPE)
     impacts["interval"] = table["interval"] / omega
     impacts["time"] = np.cumsum(table["interval"]) / omega
     impacts["side"] = np.where(np.arange(count) % 2 == 0, 1, -1)
@@ -458,11 +457,9 @@ def _bisect_critical_amplitude(omega: float, eta: float, alpha: float) -> float:
 
 def _comes_to_rest(block: Block, a: float, omega: float) -> bool:
     """Whether the block rests within half a period of its first uplift under a sine of amplitude a g tan(alpha)."""
-    amplitude = a * block.gravity * math.tan(block.sides[0].alpha)
-    two_pi = 2.0 * math.pi
-    motion = pulses.sine(
-        amplitude, omega / two_pi, cycles=(math.pi + _LEAD_PHASE) / two_pi, phase=math.asin(1.0 / a) - _LEAD_PHASE
-    )
+    amplitude, two_pi = a * block.gravity * math.tan(block.sides[0].alpha), 2.0 * math.pi
+    cycles, phase = (math.pi + _LEAD_PHASE) / two_pi, math.asin(1.0 / a) - _LEAD_PHASE
+    motion = pulses.sine(amplitude, omega / two_pi, cycles=cycles, phase=phase)
     response = simulate(block, motion, model="nonlinear", duration=motion.duration)
     require_finished(response.unfinished)
     return bool((response.events["kind"] == "rest").any())

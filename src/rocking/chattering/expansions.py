@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.core import checks
-from rocking.core.arrays import Flags, Floats
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels.sine.series import compute_phase_coefficients, sum_eq65, write_eq65_terms
 
@@ -27,19 +26,17 @@ MAX_ORDER: Final = 40
 #: Context in which very large amplitudes yield infinite results without warnings.
 _IGNORE_OVERFLOW: Final = np.errstate(over="ignore", invalid="ignore")
 
-CYCLE: Final = np.dtype(
+CYCLE_DTYPE: Final = np.dtype(
     [("n", np.int64), ("sign", np.int8), ("order", np.int8)]
     + [(name, float) for name in ("term", "interval", "time", "phase", "speed_before", "speed_after")]
 )
 
 
-def _check_values(
-    parameter: ArrayLike, name: str, meaning: str, allowed: Callable[[Floats], Flags], bounds: str
-) -> Floats:
+def _check_values(parameter: ArrayLike, name: str, meaning: str, bounds: str, is_allowed: Any) -> Floats:
     """Return the values of a parameter as an array; raise an error for the first invalid value."""
     values = checks.numbers(parameter, name, InvalidOption)
     is_finite = np.isfinite(values)
-    is_valid = is_finite & allowed(values)
+    is_valid = is_finite & is_allowed(values)
     if is_valid.all():
         return values
     index = tuple(map(int, np.argwhere(~(is_valid if is_finite.all() else is_finite))[0]))
@@ -50,41 +47,34 @@ def _check_values(
 
 def check_amplitude(a: ArrayLike) -> Floats:
     """Return amplitudes as an array of finite numbers."""
-    return _check_values(a, "a", "the acceleration amplitude divided by g alpha", np.isfinite, "")
+    return _check_values(a, "a", "the acceleration amplitude divided by g alpha", "", np.isfinite)
 
 
 def check_frequency(omega: ArrayLike) -> Floats:
     """Return frequencies as an array."""
-    bounds = f"between {MIN_FREQUENCY:g} and {MAX_FREQUENCY:g}"
-    return _check_values(
-        omega, "omega", "the forcing frequency divided by p",
-        lambda values: (values >= MIN_FREQUENCY) & (values <= MAX_FREQUENCY), bounds,
-    )  # fmt: skip
+    texts = "omega", "the forcing frequency divided by p", f"between {MIN_FREQUENCY:g} and {MAX_FREQUENCY:g}"
+    return _check_values(omega, *texts, lambda values: (values >= MIN_FREQUENCY) & (values <= MAX_FREQUENCY))
 
 
 def check_restitution(eta: ArrayLike) -> Floats:
     """Return coefficients of restitution as an array."""
-    bounds = f"above 0 and at most {MAX_RESTITUTION:g}, or exactly 1"
-    return _check_values(
-        eta, "eta", "the coefficient of restitution",
-        lambda values: (values > 0.0) & ((values <= MAX_RESTITUTION) | (values == 1.0)), bounds,
-    )  # fmt: skip
+    texts = "eta", "the coefficient of restitution", f"above 0 and at most {MAX_RESTITUTION:g}, or exactly 1"
+    return _check_values(eta, *texts, lambda e: (e > 0.0) & ((e <= MAX_RESTITUTION) | (e == 1.0)))
 
 
 def check_lossy_restitution(eta: ArrayLike) -> Floats:
     """Return coefficients of restitution below one as an array."""
     values = check_restitution(eta)
     if (values == 1.0).any():
-        raise InvalidOption(
-            "{} must be below 1, because without energy loss at impacts chattering never ends", "eta", value=eta
-        )
+        message = "{} must be below 1, because without energy loss at impacts chattering never ends"
+        raise InvalidOption(message, "eta", value=eta)
     return values
 
 
 def check_slenderness(alpha: ArrayLike) -> Floats:
     """Return slenderness angles as an array."""
     meaning = "the slenderness angle in rad"
-    return _check_values(alpha, "alpha", meaning, lambda a: (a > 0.0) & (a < 0.5 * np.pi), "between 0 and pi/2 rad")
+    return _check_values(alpha, "alpha", meaning, "between 0 and pi/2 rad", lambda a: (a > 0.0) & (a < 0.5 * np.pi))
 
 
 def require_scalar(values: Floats, name: str) -> float:
@@ -118,13 +108,9 @@ def compute_asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     """Compute Eq. 65 of the paper."""
     values, inverse = np.unique(eta, return_inverse=True)
     sums = np.array([sum_eq65(float(value)) for value in values])[inverse.reshape(eta.shape)]
-    shape, (amplitudes, frequencies, first, third) = broadcast_flat(a, omega, sums[..., 0], sums[..., 1])
-    excess = amplitudes - 1.0
-    times = np.full(excess.shape, math.nan)
-    times[excess == 0.0] = 0.0
-    lifted = excess > 0.0
-    times[lifted] = np.sqrt(excess[lifted]) * (first[lifted] + excess[lifted] * third[lifted]) / frequencies[lifted]
-    return times.reshape(shape)[()]
+    eps = _compute_excess(a, omega, eta)
+    times = np.sqrt(eps) * (sums[..., 0] + eps * sums[..., 1]) / omega
+    return np.where(eps == 0.0, 0.0, times)[()]
 
 
 @_IGNORE_OVERFLOW
@@ -167,7 +153,7 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     pairs = 64
     while (count := write_eq65_terms(restitution, *(terms := np.zeros((2, pairs))))) == pairs:
         pairs *= 2
-    table = np.zeros(2 * count, CYCLE)
+    table = np.zeros(2 * count, CYCLE_DTYPE)
     is_even = np.arange(2 * count) % 2 == 0
     table["n"] = np.arange(2 * count)
     table["sign"] = np.where(is_even, -1, 1)
@@ -178,9 +164,8 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     table["phase"] = frequency * table["time"] + math.asin(1.0 / (1.0 + excess))
     # In these units an arc of the second side lasts as long as its initial speed, which is conserved.
     initial_speeds = np.repeat(terms[1, :count], 2)
-    table["speed_before"] = (
-        np.where(is_even, initial_speeds / restitution, initial_speeds) * np.float64(excess) ** 1.5 / frequency
-    )
+    speeds = np.where(is_even, initial_speeds / restitution, initial_speeds)
+    table["speed_before"] = speeds * np.float64(excess) ** 1.5 / frequency
     table["speed_after"] = restitution * table["speed_before"]
     return table
 
@@ -248,22 +233,20 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
 
 def _compute_first_arc(a: ArrayLike, omega: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Compute eps (NaN below uplift), omega, and the expression in brackets of Eqs 32 and 34."""
-    shape, (amplitudes, frequencies) = broadcast_flat(check_amplitude(a), check_frequency(omega))
-    eps = np.where(amplitudes >= 1.0, amplitudes - 1.0, math.nan).reshape(shape)
-    frequency = frequencies.reshape(shape)
+    amplitude, frequency = check_amplitude(a), check_frequency(omega)
     omega2 = frequency**2
-    return eps, frequency, 1.0 - 32.0 / 15.0 * (omega2 - 1.0) / omega2
+    return _compute_excess(amplitude, frequency), frequency, 1.0 - 32.0 / 15.0 * (omega2 - 1.0) / omega2
 
 
 def compute_series_times(a: Floats, omega: Floats, eta: Floats, order: int) -> Floats:
     """Compute the chattering times by the first terms of the consistent expansion."""
     coefficients = _compute_coefficients(omega, eta, order)
-    return _sum_series(coefficients, _compute_excess(a, coefficients))[()]
+    return _sum_series(coefficients, _compute_excess(a, coefficients[..., 0]))[()]
 
 
-def _compute_excess(a: Floats, coefficients: Floats) -> Floats:
-    """Compute eps in the broadcast shape, NaN below uplift."""
-    shape, _ = broadcast_flat(a, coefficients[..., 0])
+def _compute_excess(a: Floats, *parameters: Floats) -> Floats:
+    """Compute eps in the broadcast shape of all parameters, NaN below uplift."""
+    shape, _ = broadcast_flat(a, *parameters)
     return np.broadcast_to(np.where(a >= 1.0, a - 1.0, math.nan), shape)
 
 

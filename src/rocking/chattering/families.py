@@ -71,7 +71,7 @@ def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Fa
     >>> round(case.motion.pga / (0.2 * block.gravity), 9)
     1.1
     """
-    scale = _find_threshold(block, model)
+    scale = _compute_threshold(block, model)
     return lambda a, omega: SimulationInput(
         block, pulses.sine(a * scale, _to_hertz(block, omega), cycles=cycles), model
     )
@@ -101,12 +101,12 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
     >>> round(case.motion.pga / min(block.uplift_thresholds()), 9)
     4.8
     """
-    scale = _find_threshold(block, model)
+    scale = _compute_threshold(block, model)
     frequency = _to_hertz(block, checks.positive(omega, "omega", InvalidOption))
-    n_lobes = checks.integer(count, "count", InvalidOption, minimum=1)
+    exponents = range(checks.integer(count, "count", InvalidOption, minimum=1))
 
     def create_input(a: float, ratio: float) -> SimulationInput:
-        return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in range(n_lobes)], frequency), model)
+        return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in exponents], frequency), model)
 
     return create_input
 
@@ -132,7 +132,7 @@ def ricker(
     >>> ricker(rocking.Block(width=0.2, height=0.8))(1.5, 2.0).motion.name
     'symmetric Ricker'
     """
-    scale = _find_threshold(block, model)
+    scale = _compute_threshold(block, model)
     return lambda a, omega: SimulationInput(block, pulses.ricker(a * scale, _to_hertz(block, omega), kind=kind), model)
 
 
@@ -157,7 +157,7 @@ def mavroeidis_papageorgiou(
     >>> mavroeidis_papageorgiou(rocking.Block(width=0.2, height=0.8), gamma=2.0)(1.5, 2.0).model
     'nonlinear'
     """
-    scale = _find_threshold(block, model)
+    scale = _compute_threshold(block, model)
 
     def create_input(a: float, omega: float) -> SimulationInput:
         pulse = pulses.mavroeidis_papageorgiou(1.0, _to_hertz(block, omega), phase=phase, gamma=gamma)
@@ -166,9 +166,7 @@ def mavroeidis_papageorgiou(
     return create_input
 
 
-def record(
-    motion: Motion, alpha: float, restitution: float | None = None, *, model: Model = "nonlinear"
-) -> Callable[[float, float], SimulationInput]:
+def record(motion: Motion, alpha: float, restitution: float | None = None, *, model: Model = "nonlinear") -> Family:
     """Create scaled copies of one motion, and blocks of one shape, with parameters (a, p), p in rad/s.
 
     By dimensional analysis a smaller p is equivalent to the same block under a faster motion.
@@ -197,12 +195,12 @@ def record(
 
     def create_input(a: float, p: float) -> SimulationInput:
         block = Block.from_parameters(p, alpha, restitution)
-        return SimulationInput(block, motion.scaled_to(a * _find_threshold(block, model)), model)
+        return SimulationInput(block, motion.scaled_to(a * _compute_threshold(block, model)), model)
 
     return create_input
 
 
-def _find_threshold(block: Block, model: Model) -> float:
+def _compute_threshold(block: Block, model: Model) -> float:
     """Compute the lowest uplift acceleration, m/s^2."""
     return min(require_block(block).uplift_thresholds(model))
 

@@ -7,8 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,7 +82,7 @@ class UpliftOutcome(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
-_EPISODE: Final = np.dtype(
+_EPISODE_DTYPE: Final = np.dtype(
     [(name, float) for name in ("uplift", "proven", "rest", "lower", "upper", "duration")]
     + [("impacts", np.int64), ("ground", float)]
 )
@@ -92,7 +91,7 @@ _EPISODE: Final = np.dtype(
 class _MapPoint(NamedTuple):
     """Results at one point of a map; missing times are NaN."""
 
-    outcome: int
+    outcome: int = UpliftOutcome.NO_UPLIFT
     uplift: float = math.nan
     rest: float = math.nan
     lower: float = math.nan
@@ -161,33 +160,26 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> Chatt
     if len(parameters) != 2:
         raise InvalidOption(f"{{}} must contain two parameters; got {len(parameters)}", "parameters", value=parameters)
     if not callable(family):
-        raise InvalidOption(
-            f"{{}} must be a function of two numbers, as rocking.chattering.families.sine(block); got {family!r}",
-            "family",
-            value=family,
-        )
+        expected = "a function of two numbers, as rocking.chattering.families.sine(block)"
+        raise InvalidOption(f"{{}} must be {expected}; got {family!r}", "family", value=family)
     (first, x), (second, y) = ((k, checks.axis(values, k, InvalidOption)) for k, values in parameters.items())
     is_swapped = _is_swapped(family, str(first), str(second))
     inputs = [family(*map(float, (b, a) if is_swapped else (a, b))) for a in x for b in y]
     for entry in inputs:
         if not (isinstance(entry, SimulationInput) and isinstance(entry.motion, Motion)):
-            raise InvalidOption(
-                "{} must return a SimulationInput of a block and a Motion for each pair", "family", value=entry
-            )
+            message = "{} must return a SimulationInput of a block and a Motion for each pair"
+            raise InvalidOption(message, "family", value=entry)
     points: list[_MapPoint] = []
     with Progress("mapping", len(inputs)) as bar:
         for point in map_in_threads(_simulate_point, inputs):
             points.append(point)
             bar.advance()
-    columns = zip(_MapPoint._fields, zip(*points, strict=True), strict=True)
-    dataset = xr.Dataset(
-        {
-            name: ((first, second), np.reshape(column, (x.size, y.size)), _VARIABLE_ATTRIBUTES.get(name, {}))
-            for name, column in columns
-        },
-        {first: x, second: y},
-        {"program": f"rocking {VERSION}", "case": _describe_common_properties(inputs[0], inputs[-1])},
-    )
+    variables = {
+        name: ((first, second), np.reshape(column, (x.size, y.size)), _VARIABLE_ATTRIBUTES.get(name, {}))
+        for name, column in zip(_MapPoint._fields, zip(*points, strict=True), strict=True)
+    }
+    attributes = {"program": f"rocking {VERSION}", "case": _describe_common_properties(inputs[0], inputs[-1])}
+    dataset = xr.Dataset(variables, {first: x, second: y}, attributes)
     return ChatteringMap(dataset.assign(complete=dataset.outcome == UpliftOutcome.COMPLETE))
 
 
@@ -226,9 +218,9 @@ class ChatteringMap(DatasetResult):
     [False, True, False]
     """
 
-    TABLES = MappingProxyType(
-        {"outcomes": ("outcome", "complete", "uplift", "rest", "lower", "upper", "rests", "overturned")}
-    )
+    TABLES: ClassVar = {
+        "outcomes": ("outcome", "complete", "uplift", "rest", "lower", "upper", "rests", "overturned"),
+    }
 
     def summary(self) -> str:
         values, counts = np.unique(self.data.outcome, return_counts=True)
@@ -239,10 +231,9 @@ class ChatteringMap(DatasetResult):
         first, second = self.data.outcome.dims
         headline = f"end of the first rocking, over {first} and {second}"
         overturned, later = (100.0 * float(mask.mean()) for mask in (self.data.overturned, self._overturns_later()))
-        overturning = f"overturns in the end: {overturned:.1f} %" + (
-            f", {later:.1f} % after a first rest" if later else ""
-        )
-        return f"{headline}\n\n{format_table(['outcome', 'share of the map'], rows)}\n\n{overturning}"
+        later_text = f", {later:.1f} % after a first rest" if later else ""
+        table = format_table(["outcome", "share of the map"], rows)
+        return f"{headline}\n\n{table}\n\noverturns in the end: {overturned:.1f} %{later_text}"
 
     def _overturns_later(self) -> NDArray[np.bool_]:
         """Whether a block overturns after its first rocking has ended with another outcome."""
@@ -302,13 +293,11 @@ def classify_uplifts(results: NDArray[np.void], last_exceedance: float | None) -
     """
     if last_exceedance is None:
         return np.full(len(results), UpliftOutcome.NO_UPLIFT, dtype=np.int64)
-    rested = results["rests"] > 0
-    outcomes = np.where(
-        results["first_rest"] <= last_exceedance, UpliftOutcome.RESTS_LATER, UpliftOutcome.RESTS_AT_LAST
-    )
+    never_rests, rests_early = results["rests"] == 0, results["first_rest"] <= last_exceedance
+    outcomes = np.where(rests_early, UpliftOutcome.RESTS_LATER, UpliftOutcome.RESTS_AT_LAST)
     outcomes[results["complete_chattering"]] = UpliftOutcome.COMPLETE
-    outcomes[~rested] = UpliftOutcome.OVERTURNS
-    outcomes[(results["rests_by_rounding"] > 0) | (results["unfinished"] & ~rested)] = UpliftOutcome.UNPROVEN
+    outcomes[never_rests] = UpliftOutcome.OVERTURNS
+    outcomes[(results["rests_by_rounding"] > 0) | (results["unfinished"] & never_rests)] = UpliftOutcome.UNPROVEN
     outcomes[results["uplifts"] == 0] = UpliftOutcome.NO_UPLIFT
     return outcomes.astype(np.int64)
 
@@ -328,31 +317,27 @@ def _describe_common_properties(first: SimulationInput, last: SimulationInput) -
 
 def _simulate_point(point: SimulationInput) -> _MapPoint:
     """Simulate one point; only a full response contains a bracket of the rest."""
-    response = simulate(point.block, point.motion, model=point.model)
-    last_exceedance = find_last_exceedance(
-        point.motion, point.block.uplift_thresholds(point.model), point.block.gravity
-    )
+    block, motion, model = point
+    response = simulate(block, motion, model=model)
+    last_exceedance = find_last_exceedance(motion, block.uplift_thresholds(model), block.gravity)
     if not len(response.events) or last_exceedance is None:
-        return _MapPoint(UpliftOutcome.NO_UPLIFT)
+        return _MapPoint()
     results = np.zeros(1, OUTCOME)
     uplift, rests = float(response.events["time"][0]), len(response.sequences)
     results["uplifts"], results["rests"], results["unfinished"] = 1, rests, response.unfinished
-    times: dict[str, float] = {}
+    rest = lower = upper = math.nan
     if rests:
-        first = response.sequences[0]
-        times = {"rest": float(first["end"]), "lower": float(first["lower"]), "upper": float(first["upper"])}
+        rest, lower, upper = (float(response.sequences[name][0]) for name in ("end", "lower", "upper"))
         # The motion must not exceed a threshold before the upper bound of the rest.
-        results["first_rest"], results["rests_by_rounding"] = times["upper"], math.isnan(times["upper"])
-        if not math.isnan(times["upper"]):
+        results["first_rest"], results["rests_by_rounding"] = upper, math.isnan(upper)
+        if not math.isnan(upper):
             states, trail = state.new_states(1, 0), response.solution.trail
-            states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, times["upper"]
-            results["complete_chattering"] = detect_complete_chattering(
-                join_grounds([trail.ground]), np.zeros(1, dtype=np.int64), np.array([trail.ground.factor]),
-                np.array([trail.block]), states,
-            )  # fmt: skip
-    return _MapPoint(
-        int(classify_uplifts(results, last_exceedance)[0]), uplift, **times, rests=rests, overturned=response.overturned
-    )
+            states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, upper
+            grounds, factors = join_grounds([trail.ground]), np.array([trail.ground.factor])
+            blocks, motion = np.array([trail.block]), np.zeros(1, dtype=np.int64)
+            results["complete_chattering"] = detect_complete_chattering(grounds, motion, factors, blocks, states)
+    outcome = int(classify_uplifts(results, last_exceedance)[0])
+    return _MapPoint(outcome, uplift, rest, lower, upper, rests, response.overturned)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -407,23 +392,14 @@ class ChatteringEpisodes(Result):
 
     def summary(self) -> str:
         header = ["uplift, s", "rest, s", "bracket, s", "duration, s", "impacts", "ground, m/s^2"]
-        rows = [
-            [
-                f"{row['uplift']:.6f}",
-                f"{row['rest']:.9f}",
-                f"{row['upper'] - row['lower']:.1e}",
-                f"{row['duration']:.6f}",
-                int(row["impacts"]),
-                f"{row['ground']:+.4f}",
-            ]
-            for row in self.episodes
-        ]
+        rows = []
+        for uplift, _, rest, lower, upper, duration, impacts, ground in self.episodes.tolist():
+            times = f"{uplift:.6f}", f"{rest:.9f}", f"{upper - lower:.1e}", f"{duration:.6f}"
+            rows.append([*times, impacts, f"{ground:+.4f}"])
         start, end = self.shaking
-        conclusion = (
-            "the motion never passes a threshold of the block before the simulation ends"
-            if math.isnan(start)
-            else f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"
-        )
+        conclusion = f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"
+        if math.isnan(start):
+            conclusion = "the motion never passes a threshold of the block before the simulation ends"
         return f"{format_table(header, rows)}\n{conclusion}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -470,15 +446,12 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     0.498
     """
     if not isinstance(response, Response):
-        raise InvalidOption(
-            f"{{}} must be a Response of simulate(block, motion); got {type(response).__name__}",
-            "response",
-            value=response,
-        )
+        message = f"{{}} must be a Response of simulate(block, motion); got {type(response).__name__}"
+        raise InvalidOption(message, "response", value=response)
     sequences = response.sequences[np.isfinite(response.sequences["upper"])]
     uplifts = response.events["time"][response.events["kind"] == "uplift"]
     impacts = response.impacts["time"]
-    episodes = np.zeros(len(sequences), _EPISODE)
+    episodes = np.zeros(len(sequences), _EPISODE_DTYPE)
     uplift_indices = np.searchsorted(uplifts, sequences["end"], side="left") - 1
     episodes["uplift"] = np.where(uplift_indices >= 0, np.append(uplifts, 0.0)[uplift_indices], 0.0)
     for name, field in (("proven", "start"), ("rest", "end"), ("lower", "lower"), ("upper", "upper")):

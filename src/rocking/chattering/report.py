@@ -6,6 +6,7 @@ import math
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -122,10 +123,8 @@ class ChatteringReport(Result):
     def _columns(self, table: str) -> list[Column]:
         rows = self.impacts if table == "impacts" else self.cycles
         if rows is None:
-            raise InvalidOption(
-                "{} must be below 1 for the iterative procedure, because without energy loss chattering never ends",
-                "eta",
-            )
+            reason = "because without energy loss chattering never ends"
+            raise InvalidOption(f"{{}} must be below 1 for the iterative procedure, {reason}", "eta")
         return [Column(name, rows[name]) for name in rows.dtype.names or ()]
 
     def _describe_completeness(self) -> str:
@@ -145,9 +144,9 @@ class ChatteringReport(Result):
         return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {format_count(bracket['impacts'], 'impact')}"
 
     def _format_pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
-        if math.isnan(values["exact"]):
-            return f"none within half a period; {values[equation]:.9g} by Eq. {equation[2:]}"
         approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
+        if math.isnan(values["exact"]):
+            return f"none within half a period; {approximate}"
         exact = self._format_time(values["exact"]) if time else f"{values['exact']:.9g}"
         return f"{exact} exact, {approximate}"
 
@@ -185,18 +184,15 @@ def chattering_report(
     if p is not None:
         p = checks.positive(p, "p", InvalidOption, "rad/s")
     chattering = sequence(a, omega, eta)
-    missing = 0.0 if chattering.complete else math.nan
-    interval, speed = (
-        chattering.impacts[["interval", "speed_before"]][0] if chattering.impacts.size else (missing, missing)
-    )
+    interval = speed = 0.0 if chattering.complete else math.nan
+    if chattering.impacts.size:
+        interval, speed = chattering.impacts[["interval", "speed_before"]][0]
     checks.integer(order, "order", InvalidOption, 1, MAX_ORDER)
     series = math.nan
     with suppress(InvalidOption):  # double precision does not resolve this many terms
         series = float(chattering_time(a, omega, eta, method="series", order=order))
-    times = {
-        method: float(chattering_time(a, omega, eta, method=method, resolved=resolved))
-        for method in ("exact", "asymptotic", "semianalytical")
-    }
+    compute = partial(chattering_time, a, omega, eta, resolved=resolved)
+    times = {method: float(compute(method=method)) for method in ("exact", "asymptotic", "semianalytical")}
     values: dict[str, Any] = {
         "a": a,
         "omega": omega,

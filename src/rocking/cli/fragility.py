@@ -113,8 +113,8 @@ def fragility(
     curve = _read_hazard(hazard, site, years, measure.period)
     states = parse_limit_states(limit_states)
     if output.out is not None:
-        check_nrml_names([taxonomy], "taxonomy")
-        check_nrml_names(states, "a limit state")
+        check_nrml_names("taxonomy", taxonomy)
+        check_nrml_names("a limit state", *states)
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
         standing_limit = _find_standing_limit([*states])

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from rocking.core.arrays import Flags, Floats, Integers, select_evenly
 from rocking.core.tables import format_count
-from rocking.core.threads import map_in_threads
-from rocking.dynamics.maps import StroboscopicMap, split_states
+from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import compute_moduli, compute_multipliers
 from rocking.errors import InvalidOption
-from rocking.kernels.periodic import TRAP, iterate
-from rocking.kernels.state import Records, new_scratch
+from rocking.kernels.periodic import TRAP
+from rocking.kernels.state import Records
 
 #: Longest period of an attractor, in periods of the motion.
 MAX_PERIOD: Final = 64
@@ -28,8 +27,8 @@ MAX_PERIOD: Final = 64
 RETURN_TOLERANCE: Final = 1e-6
 
 #: Number of rings and angles of the samples.
-_N_RINGS: Final = 4
-_N_ANGLES: Final = 24
+_RING_COUNT: Final = 4
+_ANGLE_COUNT: Final = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +72,11 @@ def find_attractor(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
         return None
     period = int(recurrences[0]) + 1
     try:
-        fixed_point = _find_fixed_point(strobe, orbit[-1], period, size)
+        point, derivative = _find_fixed_point(strobe, orbit[-1], period, size)
     except (np.linalg.LinAlgError, InvalidOption):  # a multiplier of exactly 1; a step that leads behind a stop
         return None
-    if fixed_point is None:
+    if np.isnan(point).any():
         return None
-    point, derivative = fixed_point
     for divisor in range(1, period):  # a slow approach may come close only twice in a period
         if period % divisor == 0 and np.abs((strobe(point, divisor) - point) / size).max() < 1e-3 * RETURN_TOLERANCE:
             return None
@@ -89,25 +87,23 @@ def find_attractor(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
     return Attractor(strobe.orbit(point, period)[:-1], multipliers, int(impacts), not derivative.any())
 
 
-def _find_fixed_point(
-    strobe: StroboscopicMap, point: Floats, period: int, size: Floats
-) -> tuple[Floats, Floats] | None:
-    """Find a fixed point near a state by Newton's method, and the derivative of the map at this point."""
+def _find_fixed_point(strobe: StroboscopicMap, point: Floats, period: int, size: Floats) -> tuple[Floats, Floats]:
+    """Find a fixed point near a state by Newton's method (NaN without), and the derivative of the map at this point."""
     start = point
     for _ in range(12):
         image, derivative = strobe.derivative(point, period)
-        if not np.isfinite(derivative).all():
-            return None
         residual = image - point
+        if not np.isfinite(derivative).all():
+            break
         if np.abs(residual / size).max() < 1e-11:
             return point, derivative
         point = point + np.linalg.solve(np.eye(2) - derivative, residual) if derivative.any() else image
         if np.abs((point - start) / size).max() > np.sqrt(RETURN_TOLERANCE):
-            return None
-    return None
+            break
+    return np.full(2, np.nan), np.full((2, 2), np.nan)
 
 
-def _build_trap(
+def _create_trap(
     strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats
 ) -> Floats | None:
     """Find an invariant neighbourhood of a point of an attractor, as a row for `kernels.periodic.iterate`."""
@@ -115,7 +111,7 @@ def _build_trap(
     if side < 0:  # at rest, whatever the previous state
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
     _, derivative = strobe.derivative(point, attractor.period)
-    norm_matrix, rate = _find_contracting_norm(derivative, size)
+    norm_matrix, rate = _compute_contracting_norm(derivative, size)
     if not np.isfinite(norm_matrix).all():
         return None
 
@@ -135,22 +131,22 @@ def _build_trap(
         norms = np.linalg.norm(norm_matrix @ derivatives @ np.linalg.inv(norm_matrix), ord=2, axis=(1, 2))
         return bool(np.all(impacts == attractor.impacts) and np.all(norms <= 0.5 * (1.0 + rate)))
 
-    angles = 2.0 * np.pi * np.arange(_N_ANGLES) / _N_ANGLES
-    rings = np.arange(1, _N_RINGS + 1)[:, None, None] / _N_RINGS
+    angles = 2.0 * np.pi * np.arange(_ANGLE_COUNT) / _ANGLE_COUNT
+    rings = np.arange(1, _RING_COUNT + 1)[:, None, None] / _RING_COUNT
     disc = (rings * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).reshape(-1, 2) @ np.linalg.inv(norm_matrix).T
     radius = 0.25  # relative to the size of the states
     while radius > 1e-7:
         # The checked neighbourhood is twice as large.
         offsets = 2.0 * radius * disc
         # A few angles of the outermost ring exclude most sizes quickly.
-        if is_trapping(offsets[-_N_ANGLES :: _N_ANGLES // 4]) and is_trapping(offsets):
+        if is_trapping(offsets[-_ANGLE_COUNT :: _ANGLE_COUNT // 4]) and is_trapping(offsets):
             form = norm_matrix.T @ norm_matrix / radius**2
             return np.array([side, u, v, form[0, 0], form[0, 1], form[1, 1]])
         radius *= 0.5
     return None
 
 
-def _find_contracting_norm(derivative: Floats, size: Floats) -> tuple[Floats, float]:
+def _compute_contracting_norm(derivative: Floats, size: Floats) -> tuple[Floats, float]:
     """Find a matrix L and a rate such that |L M x| <= rate |L x|, and |L x| is at least |x| relative to the sizes.
 
     L is NaN if rounding error hides the eigenvalues of the derivative.
@@ -191,14 +187,10 @@ class KnownAttractors:
         self.attractors: list[Attractor] = []
         self.traps, self.attractor_of_trap = np.empty((0, TRAP)), np.empty(0, dtype=np.int64)
 
-    def classify(self, states: Floats) -> Integers:
-        """Return the attractor of each state, -1 for a state outside all traps."""
-        return self._classify(self.strobe._to_records(states)[1])
-
     def classify_or_search(self, states: Floats) -> Integers:
         """Return the attractor of each state, -1 for a state outside all traps, and search for new attractors."""
         _, records = self.strobe._to_records(states)
-        indices = self._classify(records)
+        indices = self.classify(records)
         tries_left = self.MAX_TRIES
         while tries_left and (unsettled := np.flatnonzero(indices == -1)).size:
             first, new_index = unsettled[0], len(self.attractors)
@@ -214,19 +206,9 @@ class KnownAttractors:
 
     def advance_to_traps(self, records: Records, max_periods: int) -> tuple[Integers, Integers]:
         """Advance states until they reach a trap; return the trap (or -1) and the number of periods of each state."""
-        problem, traps, orbits = self.strobe._create_problem(), self.traps, np.empty((len(records), 0, 3))
-        reached, counts = np.empty(len(records), dtype=np.int64), np.empty(len(records), dtype=np.int64)
+        return self.strobe._iterate(records, max_periods, traps=self.traps)
 
-        def advance_part(part: slice) -> None:
-            iterate(
-                problem, new_scratch(), records[part], max_periods, orbits[part], traps, reached[part], counts[part]
-            )
-
-        for _ in map_in_threads(advance_part, split_states(len(records), max_periods)):
-            pass
-        return reached, counts
-
-    def _classify(self, records: Records) -> Integers:
+    def classify(self, records: Records) -> Integers:
         """Return the attractor of each state, -1 for a state outside all traps."""
         indices = np.full(len(records), -1)
         for trap, index in zip(self.traps, self.attractor_of_trap, strict=True):
@@ -247,7 +229,7 @@ class KnownAttractors:
         # Some points of a long orbit have a neighbourhood.
         points = attractor.states[select_evenly(attractor.period, 8)]
         pairs = zip(points, self.strobe._to_records(points)[1], strict=True)
-        traps = [row for pair in pairs if (row := _build_trap(self.strobe, attractor, *pair, self.size)) is not None]
+        traps = [row for pair in pairs if (row := _create_trap(self.strobe, attractor, *pair, self.size)) is not None]
         if not traps:
             return -1
         self.attractor_of_trap = np.append(self.attractor_of_trap, np.full(len(traps), len(self.attractors)))

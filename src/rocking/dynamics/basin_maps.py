@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from string import ascii_lowercase
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,69 +64,52 @@ class Basins(DatasetResult):
     ['period 1, rest', 'period 1, 1 impact']
     """
 
-    TABLES = MappingProxyType(
-        {
-            "attractors": ("share", "standard_error", "period", "impacts", "rests", "multiplier"),
-            "outcomes": ("outcome", "periods"),
-            "orbits": ("orbit_coordinate", "orbit_velocity"),
-        }
-    )
+    TABLES: ClassVar = {
+        "attractors": ("share", "standard_error", "period", "impacts", "rests", "multiplier"),
+        "outcomes": ("outcome", "periods"),
+        "orbits": ("orbit_coordinate", "orbit_velocity"),
+    }
     POOLED = ("velocity", "position", "angular_velocity", "rotation", "attractor", "phase")
 
     def summary(self) -> str:
         data = self.data
+        columns = (data[name].values for name in ("attractor", "share", "standard_error", "multiplier"))
         rows = [
-            [
-                str(data.attractor.values[k]),
-                f"{100.0 * data.share.values[k]:.2f} %",
-                f"{100.0 * data.standard_error.values[k]:.2f} %",
-                "-" if np.isnan(data.multiplier.values[k]) else f"{data.multiplier.values[k]:.4g}",
-            ]
-            for k in range(data.sizes["attractor"])
+            [name, f"{100.0 * share:.2f} %", f"{100.0 * error:.2f} %", f"{multiplier:.4g}".replace("nan", "-")]
+            for name, share, error, multiplier in zip(*columns, strict=True)
         ]
-        cells = data.outcome.size
-        headline = (
-            f"basins of {data.body} under {data.motion}: {cells} cells, {format_count(data.most_periods, 'period')}"
-        )
-        return f"{headline}\n\n{format_table(['attractor', 'share', 'standard error', 'multiplier'], rows)}"
+        numbers = f"{data.outcome.size} cells, {format_count(data.most_periods, 'period')}"
+        table = format_table(["attractor", "share", "standard error", "multiplier"], rows)
+        return f"basins of {data.body} under {data.motion}: {numbers}\n\n{table}"
 
     def to_dict(self) -> dict[str, Any]:
-        data = self.data
-        names = self.TABLES["attractors"]
+        data, attractors = self.data, []
+        orbits = np.stack([data.orbit_coordinate.values, data.orbit_velocity.values], axis=-1)
+        for k, (name, orbit) in enumerate(zip(data.attractor.values, orbits, strict=True)):
+            numbers = {key: data[key].values[k].item() for key in self.TABLES["attractors"]}
+            points = orbit[np.isfinite(orbit[:, 0])].tolist()
+            attractors.append({"attractor": str(name), **numbers, "orbit": points})
         return {
             "body": data.body,
             "motion": data.motion,
             "model": data.model,
             "periods": data.most_periods,
-            "attractors": [
-                {
-                    "attractor": str(data.attractor.values[k]),
-                    **{name: data[name].values[k].item() for name in names},
-                    "orbit": [
-                        [float(x), float(v)]
-                        for x, v in zip(data.orbit_coordinate.values[k], data.orbit_velocity.values[k], strict=True)
-                        if np.isfinite(x)
-                    ],
-                }
-                for k in range(data.sizes["attractor"])
-            ],
+            "attractors": attractors,
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.maps import draw_basins
 
         data = self.data
-        x, v = (data[name] for name in (str(data.outcome.dims[1]), str(data.outcome.dims[0])))
-        names = [str(name) for name in data.attractor.values]
+        v, x = (data[str(name)] for name in data.outcome.dims)
+        names, kinds = [str(name) for name in data.attractor.values], dict.fromkeys(_OUTCOME_NAMES, "overturns")
+        kinds[_OUTCOME_NAMES[_UNSETTLED]] = "unsettled"
         return draw_basins(
             x=x.values,
             y=v.values,
             outcome=data.outcome.values,
             names=names,
-            kinds=[
-                "overturns" if n in _OUTCOME_NAMES[:2] else "unsettled" if n == _OUTCOME_NAMES[2] else "orbit"
-                for n in names
-            ],
+            kinds=[kinds.get(name, "orbit") for name in names],
             orbits=np.stack([data.orbit_coordinate.values, data.orbit_velocity.values], axis=-1),
             x_label=f"{x.name} at the start of a period ({x.units})",
             y_label=f"{str(v.name).replace('_', ' ')} ({v.units})",
@@ -223,11 +206,11 @@ class _BasinGrid:
 
     def follow_all(self) -> None:
         """Follow all cells in random order."""
-        n_cells = len(self.outcome)
-        cells = np.random.default_rng(0).permutation(n_cells)
-        chunk_starts = range(_CELLS_BEFORE_SEARCH, n_cells, _CELLS_PER_SEARCH)
-        with Progress("basins", n_cells) as bar:
-            for first, last in zip((0, *chunk_starts), (*chunk_starts, n_cells), strict=True):
+        cell_count = len(self.outcome)
+        cells = np.random.default_rng(0).permutation(cell_count)
+        chunk_starts = range(_CELLS_BEFORE_SEARCH, cell_count, _CELLS_PER_SEARCH)
+        with Progress("basins", cell_count) as bar:
+            for first, last in zip((0, *chunk_starts), (*chunk_starts, cell_count), strict=True):
                 self._follow_cells(cells[first:last])
                 bar.advance(last - first)
 
@@ -236,9 +219,7 @@ class _BasinGrid:
         strobe = self.strobe
         _, records = strobe._to_records(self.states[cells])
         traps, period_counts = self.known_attractors.advance_to_traps(records, self.max_periods)
-        outcome = np.where(
-            traps >= 0, _FIRST_ATTRACTOR + np.append(self.known_attractors.attractor_of_trap, 0)[traps], _UNSETTLED
-        )
+        outcome = np.append(_FIRST_ATTRACTOR + self.known_attractors.attractor_of_trap, _UNSETTLED)[traps]
         overturned = records["ending"] == PeriodOutcome.OVERTURNED
         outcome[overturned] = np.where(records["side"][overturned] > 0, _OVERTURNS_MINUS, _OVERTURNS_PLUS)
         unsettled = np.flatnonzero((traps < 0) & ~overturned & (records["ending"] != PeriodOutcome.UNFINISHED))
@@ -254,54 +235,43 @@ class _BasinGrid:
 
         codes, counts = np.unique(self.outcome, return_counts=True)
         total = counts.sum()
-        order = sorted(
-            zip(codes.tolist(), counts.tolist(), strict=True), key=lambda item: (item[0] < _FIRST_ATTRACTOR, -item[1])
-        )
-        sorted_codes, share = [code for code, _ in order], np.array([count for _, count in order]) / total
-        orbits = [
-            self.known_attractors.attractors[code - _FIRST_ATTRACTOR] if code >= _FIRST_ATTRACTOR else None
-            for code in sorted_codes
-        ]
-        names = [
-            _OUTCOME_NAMES[code] if orbit is None else orbit.name
-            for code, orbit in zip(sorted_codes, orbits, strict=True)
-        ]
-        index_of_code = np.full(_FIRST_ATTRACTOR + len(self.known_attractors.attractors) + 1, -1, dtype=np.int16)
-        index_of_code[sorted_codes] = np.arange(len(sorted_codes))
-        points = np.full((len(orbits), max([1, *(item.period for item in orbits if item is not None)]), 2), np.nan)
-        properties: list[tuple[int, int, bool, float]] = []
-        for k, orbit in enumerate(orbits):
-            if orbit is None:
-                properties.append((0, -1, False, np.nan))
-                continue
-            points[k, : orbit.period] = orbit.states
-            properties.append((orbit.period, orbit.impacts, orbit.rests, float(np.abs(orbit.multipliers).max())))
-        period, impacts, rests, multiplier = map(list, zip(*properties, strict=True))
+        order = np.lexsort((-counts, codes < _FIRST_ATTRACTOR))
+        codes, share = codes[order], counts[order] / total
+        all_attractors = self.known_attractors.attractors
+        index_of_code = np.full(_FIRST_ATTRACTOR + len(all_attractors) + 1, -1, dtype=np.int16)
+        index_of_code[codes] = np.arange(len(codes))
+        reached = [all_attractors[code - _FIRST_ATTRACTOR] for code in codes if code >= _FIRST_ATTRACTOR]
+        others = codes[len(reached) :].tolist()
+        names = [*(known.name for known in reached), *(_OUTCOME_NAMES[code] for code in others)]
+        period = [known.period for known in reached] + [0] * len(others)
+        impacts = [known.impacts for known in reached] + [-1] * len(others)
+        rests = [known.rests for known in reached] + [False] * len(others)
+        multiplier = [float(np.abs(known.multipliers).max()) for known in reached] + [np.nan] * len(others)
+        points = np.full((len(codes), max(1, *period), 2), np.nan)
+        for k, known in enumerate(reached):
+            points[k, : known.period] = known.states
         error = np.sqrt(share * (1.0 - share) / total)
         coordinate = self.strobe.body.coordinate
-        coordinate_name, rate, unit = coordinate.name, coordinate.rate, coordinate.unit
-        dimensions, shape = (rate, coordinate_name), (len(self.v), len(self.x))
+        name, rate, unit = coordinate.name, coordinate.rate, coordinate.unit
+        dims, orbit_dims, shape = (rate, name), ("attractor", "phase"), (len(self.v), len(self.x))
+        outcome, period_counts = index_of_code[self.outcome].reshape(shape), self.period_counts.reshape(shape)
         return xr.Dataset(
             {
-                "outcome": variable(dimensions, index_of_code[self.outcome].reshape(shape), "number of the attractor"),
-                "periods": variable(
-                    dimensions, self.period_counts.reshape(shape), "periods until the outcome was known"
-                ),
+                "outcome": variable(dims, outcome, "number of the attractor"),
+                "periods": variable(dims, period_counts, "periods until the outcome was known"),
                 "share": variable("attractor", share, "share of the cells", "1"),
                 "standard_error": variable("attractor", error, "of the share, as of random states", "1"),
                 "period": variable("attractor", period, "periods of the motion"),
                 "impacts": variable("attractor", impacts, "impacts in a period of the orbit"),
                 "rests": variable("attractor", rests, "has a rest"),
                 "multiplier": variable("attractor", multiplier, "largest multiplier in size", "1"),
-                "orbit_coordinate": variable(
-                    ("attractor", "phase"), points[..., 0], f"{coordinate_name} on the orbit", unit
-                ),
-                "orbit_velocity": variable(("attractor", "phase"), points[..., 1], "rate on the orbit", f"{unit}/s"),
+                "orbit_coordinate": variable(orbit_dims, points[..., 0], f"{name} on the orbit", unit),
+                "orbit_velocity": variable(orbit_dims, points[..., 1], "rate on the orbit", f"{unit}/s"),
             },
             {
                 rate: variable(rate, self.v, "velocity at the start of a period", f"{unit}/s"),
-                coordinate_name: variable(coordinate_name, self.x, f"{coordinate_name} at the start of a period", unit),
-                "attractor": _make_distinct(names),
+                name: variable(name, self.x, f"{name} at the start of a period", unit),
+                "attractor": _distinguish_names(names),
             },
             {
                 "program": f"rocking {VERSION}",
@@ -314,13 +284,11 @@ class _BasinGrid:
         )
 
 
-def _make_distinct(names: list[str]) -> list[str]:
+def _distinguish_names(names: list[str]) -> list[str]:
     """Append a letter to names that are equal."""
-    counts: dict[str, int] = {}
     labels = []
-    for name in names:
-        count = counts[name] = counts.get(name, 0) + 1
-        labels.append(
-            f"{name} ({chr(ord('a') + count - 1) if count <= 26 else count})" if names.count(name) > 1 else name
-        )
+    for k, name in enumerate(names):
+        number = names[:k].count(name)
+        label = ascii_lowercase[number] if number < 26 else number + 1
+        labels.append(f"{name} ({label})" if names.count(name) > 1 else name)
     return labels

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,7 +78,7 @@ class BifurcationDiagram(DatasetResult):
     [1, 2]
     """
 
-    TABLES = MappingProxyType({"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")})
+    TABLES: ClassVar = {"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")}
 
     def changes(self, direction: str | None = None, start: int = 0) -> list[tuple[float, float, int, int]]:
         """List the changes of the period in the order of the computation.
@@ -89,9 +88,8 @@ class BifurcationDiagram(DatasetResult):
         ``data``. Raise `InvalidOption` if there is no such direction or start.
         """
         directions = self.data.direction.values.tolist()
-        index = directions.index(
-            checks.choice(directions[0] if direction is None else direction, "direction", InvalidOption, directions)
-        )
+        requested = directions[0] if direction is None else direction
+        index = directions.index(checks.choice(requested, "direction", InvalidOption, directions))
         number = checks.integer(start, "start", InvalidOption, minimum=0, maximum=self.data.sizes["start"] - 1)
         values, periods = self.data.value.values, self.data.period.values[index, :, number]
         if directions[index] == "down":
@@ -103,10 +101,8 @@ class BifurcationDiagram(DatasetResult):
 
     def summary(self) -> str:
         data = self.data
-        headline = (
-            f"bifurcation diagram over {data.parameter}: {format_count(data.sizes['value'], 'value')}, {data.cases}"
-        )
-        parts = [headline]
+        count = format_count(data.sizes["value"], "value")
+        parts = [f"bifurcation diagram over {data.parameter}: {count}, {data.cases}"]
         for direction in data.direction.values.tolist():
             for start in range(data.sizes["start"]):
                 rows = [
@@ -227,38 +223,34 @@ def bifurcation_diagram(
     if initial_states.ndim not in (1, 2) or initial_states.shape[-1] != 2 or initial_states.size == 0:
         raise InvalidOption("{} must be one pair (coordinate, velocity) or several", "starts")
     initial_states = initial_states.reshape(-1, 2)
-    n_transient = checks.integer(transient_periods, "transient_periods", InvalidOption, minimum=0)
-    n_recorded = checks.integer(recorded_periods, "recorded_periods", InvalidOption, minimum=2)
+    transient_count = checks.integer(transient_periods, "transient_periods", InvalidOption, minimum=0)
+    recorded_count = checks.integer(recorded_periods, "recorded_periods", InvalidOption, minimum=2)
     parameter_name = checks.text(parameter, "parameter", InvalidOption)
-    checks.grid_size({"values": parameters.size, "starts": len(initial_states), "recorded": n_recorded}, InvalidOption)
+    sizes = {"values": parameters.size, "starts": len(initial_states), "recorded": recorded_count}
+    checks.grid_size(sizes, InvalidOption)
 
     is_afresh, directions = selected == "afresh", ("up", "down") if selected == "both" else (selected,)
     indices = {d: range(parameters.size)[:: -1 if name == "down" else 1] for d, name in enumerate(directions)}
     shape = len(directions), parameters.size, len(initial_states)
-    states, periods, impacts = (
-        np.full((*shape, n_recorded, 2), np.nan),
-        np.full(shape, OVERTURNED),
-        np.full(shape, -1.0),
-    )
+    states = np.full((*shape, recorded_count, 2), np.nan)
+    periods, impacts = np.full(shape, OVERTURNED), np.full(shape, -1.0)
 
     def follow_values(chunk: tuple[int, Sequence[int]]) -> int:
         """Compute consecutive values of the parameter in one direction, and return their number."""
         d, value_indices = chunk
         for k in value_indices:
             strobe, previous = _create_map(case(float(parameters[k])), model, chattering), k - indices[d].step
-            start_states = (
-                initial_states if is_afresh or not 0 <= previous < parameters.size else states[d, previous, :, -1]
-            )
+            has_previous = not is_afresh and 0 <= previous < parameters.size
+            start_states = states[d, previous, :, -1] if has_previous else initial_states
             start_states = _move_before_stops(strobe, np.where(np.isnan(start_states), initial_states, start_states))
-            states[d, k], outcomes = record_states(strobe, start_states, n_transient, n_recorded)
+            states[d, k], outcomes = record_states(strobe, start_states, transient_count, recorded_count)
             final_states, scale = states[d, k, :, -1], compute_scale(strobe)
             periods[d, k, outcomes == PeriodOutcome.UNFINISHED] = NOT_FOLLOWED
             for s in np.flatnonzero(~np.isnan(final_states[:, 0])):
                 n = periods[d, k, s] = find_period(states[d, k, s], scale)
                 if n:
-                    impacts[d, k, s] = count_orbit_impacts(
-                        strobe, final_states[s], n, strobe.derivative(final_states[s], n)[1]
-                    )
+                    derivative = strobe.derivative(final_states[s], n)[1]
+                    impacts[d, k, s] = count_orbit_impacts(strobe, final_states[s], n, derivative)
         return len(value_indices)
 
     end_maps = [_create_map(case(float(value)), model, chattering) for value in parameters[[0, -1]]]
@@ -267,17 +259,15 @@ def bifurcation_diagram(
     with Progress("bifurcation diagram", len(directions) * parameters.size) as bar:
         for start in range(0, parameters.size, _CHUNK):
             chunks = [(d, order[start : start + _CHUNK]) for d, order in indices.items()]
-            for n_done in map_in_threads(follow_values, [(0, [k]) for k in chunks[0][1]] if is_afresh else chunks):
-                bar.advance(n_done)
+            for count in map_in_threads(follow_values, [(0, [k]) for k in chunks[0][1]] if is_afresh else chunks):
+                bar.advance(count)
 
     import xarray as xr
 
     coordinate = end_maps[0].body.coordinate
     orbit_dimensions, state_dimensions = ("direction", "value", "start"), ("direction", "value", "start", "iterate")
-    texts = (
-        _join_common_parts([describe_input(strobe.body) for strobe in end_maps]),
-        _join_common_parts([describe_input(strobe.motion) for strobe in end_maps]),
-    )
+    subjects = zip(*((strobe.body, strobe.motion) for strobe in end_maps), strict=True)
+    cases = " under ".join(_join_common_parts(*map(describe_input, pair)) for pair in subjects)
     meaning_of_period = "periods of the motion, 0: none found, -1: overturned, -2: not followed"
     meaning_of_impacts = "impacts in one period of the orbit, infinite: chattering, -1: not known"
     dataset = xr.Dataset(
@@ -293,9 +283,9 @@ def bifurcation_diagram(
         {
             "program": f"rocking {VERSION}",
             "parameter": parameter_name,
-            "cases": " under ".join(texts),
+            "cases": cases,
             "model": end_maps[0].model,
-            "transient_periods": n_transient,
+            "transient_periods": transient_count,
         },
     )
     return BifurcationDiagram(dataset)
@@ -321,11 +311,8 @@ def record_states(
     strobe: StroboscopicMap, starts: Floats, transient_periods: int, recorded_periods: int
 ) -> tuple[Floats, Integers]:
     """Compute states at the starts of periods after a transient, shape (n, recorded, 2), and each `PeriodOutcome`."""
-    states, current, outcomes = (
-        np.full((len(starts), recorded_periods, 2), np.nan),
-        starts,
-        np.full(len(starts), PeriodOutcome.MOVES.value),
-    )
+    states, current = np.full((len(starts), recorded_periods, 2), np.nan), starts
+    outcomes = np.full(len(starts), PeriodOutcome.MOVES.value)
     if transient_periods:
         current, outcomes, _ = strobe.advance(starts, transient_periods)
     moves = ~np.isnan(current[:, 0])
@@ -351,8 +338,7 @@ def find_period(states: Floats, scale: Scale | None = None) -> int:
         size = np.maximum(size, 1e-6 * np.array(scale))
 
     def compute_gaps(period: int) -> Floats:
-        distances: Floats = (np.abs(states[period:] - states[:-period]) / size).max(axis=1)
-        return distances
+        return np.asarray((np.abs(states[period:] - states[:-period]) / size).max(axis=1))
 
     for period in range(1, len(states) // 2 + 1):
         if compute_gaps(period).max() <= RETURN_TOLERANCE:
@@ -365,10 +351,9 @@ def find_period(states: Floats, scale: Scale | None = None) -> int:
     return 0
 
 
-def _join_common_parts(texts: Sequence[str]) -> str:
-    """Return the comma-separated parts that all texts share."""
-    first, last = (text.split(", ") for text in texts)
-    return ", ".join(part for part in first if part in last)
+def _join_common_parts(first: str, last: str) -> str:
+    """Join the comma-separated parts that two texts share."""
+    return ", ".join(part for part in first.split(", ") if part in last.split(", "))
 
 
 def _format_period(period: int) -> str:
@@ -376,7 +361,7 @@ def _format_period(period: int) -> str:
 
 
 #: Number of parts of an orbit whose means yield the standard error.
-_N_BATCHES: Final = 20
+_BATCH_COUNT: Final = 20
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -430,10 +415,8 @@ class LyapunovExponents(Result):
         if np.isnan(self.largest):
             return f"no Lyapunov exponents: the body overturns or cannot be followed {averaging}"
         if np.isneginf(self.largest):
-            return (
-                f"Lyapunov exponents: minus infinity; the body comes to rest in {100.0 * self.resting:.3g} % of the "
-                f"periods, {averaging}"
-            )
+            rests = f"the body comes to rest in {100.0 * self.resting:.3g} % of the periods"
+            return f"Lyapunov exponents: minus infinity; {rests}, {averaging}"
         exponents = f"{self.largest:.6g} and {self.smallest:.6g} per period (standard error {self.standard_error:.1g})"
         return f"Lyapunov exponents: {exponents}, {averaging}, {self.impacts:.4g} impacts in each"
 
@@ -509,23 +492,20 @@ def lyapunov_exponents(
     """
     strobe = stroboscopic_map(body, motion, model=model, chattering=chattering)
     initial_state = checks.numbers(state, "state", InvalidOption)
-    if initial_state.shape != (2,):
-        raise InvalidOption(
-            f"{{}} must be one pair (coordinate, velocity), not of shape {initial_state.shape}", "state"
-        )
+    if (shape := initial_state.shape) != (2,):
+        raise InvalidOption(f"{{}} must be one pair (coordinate, velocity), not of shape {shape}", "state")
     strobe._check_starts(initial_state, "state")
-    count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=_N_BATCHES)
-    n_transient = checks.integer(transient_periods, "transient_periods", InvalidOption, minimum=0)
+    count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=_BATCH_COUNT)
+    transient_count = checks.integer(transient_periods, "transient_periods", InvalidOption, minimum=0)
     record, arguments = strobe._to_records(initial_state[None])[1][0], strobe._create_derivative_arguments()
-    frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((n_transient + count, 2), np.nan), 0
-    for start, stop in pairwise(
-        sorted({*range(0, n_transient + count, STATES_PER_CALL), n_transient, n_transient + count})
-    ):
+    total = transient_count + count
+    frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((total, 2), np.nan), 0
+    for start, stop in pairwise(sorted({*range(0, total, STATES_PER_CALL), transient_count, total})):
         new_impacts = measure_stretches(*arguments, record, frame, logs[start:stop])
-        impacts += new_impacts if start >= n_transient else 0
+        impacts += new_impacts if start >= transient_count else 0
         if record["ending"] not in (PeriodOutcome.MOVES, PeriodOutcome.RESTS):
             break
-    outcome, logs = PeriodOutcome(int(record["ending"])), logs[n_transient:]
+    outcome, logs = PeriodOutcome(int(record["ending"])), logs[transient_count:]
     if outcome == PeriodOutcome.RESTS_FOR_EVER:
         logs[np.isnan(logs)] = -np.inf
     rests = np.isneginf(logs[:, 0])
@@ -540,8 +520,8 @@ def lyapunov_exponents(
     if known.all():  # otherwise the later periods are unknown, despite earlier rests
         mean[:] = [-np.inf if np.isneginf(column).any() else weights @ column for column in logs.T]
     if np.isfinite(logs[:, 0]).all():  # standard error of an unweighted mean, from consecutive parts
-        means = [batch.mean() for batch in np.array_split(logs[:, 0], _N_BATCHES)]
-        error = float(np.std(means, ddof=1) / np.sqrt(_N_BATCHES))
+        means = [batch.mean() for batch in np.array_split(logs[:, 0], _BATCH_COUNT)]
+        error = float(np.std(means, ddof=1) / np.sqrt(_BATCH_COUNT))
     return LyapunovExponents(
         largest=float(mean[0]),
         smallest=float(mean[1]),

@@ -79,8 +79,8 @@ class LinearBody(ABC):
     @property
     def sides(self) -> Sequence[object]:
         """Parameters as text."""
-        values = ((entry.name, getattr(self, entry.name)) for entry in fields(self))
-        texts = (f"{k.replace('_', ' ')} = {v:.5g} {self.units[k]}".rstrip() for k, v in values if v is not None)
+        known = {entry.name: value for entry in fields(self) if (value := getattr(self, entry.name)) is not None}
+        texts = (f"{k.replace('_', ' ')} = {v:.5g} {self.units.get(k, '')}".rstrip() for k, v in known.items())
         return (", ".join(texts),)
 
     @property
@@ -138,11 +138,7 @@ class LinearBodies:
 
     def __init__(self, members: Sequence[LinearBody]) -> None:
         bodies = tuple(members)
-        if (
-            not bodies
-            or any(type(body) is not type(bodies[0]) for body in bodies)
-            or not isinstance(bodies[0], LinearBody)
-        ):
+        if len({type(body) for body in bodies}) != 1 or not isinstance(bodies[0], LinearBody):
             raise InvalidBlock("members must be bodies of rocking.dynamics, all of the same kind")
         if len({body.gravity for body in bodies}) > 1:
             raise InvalidBlock("all bodies must have the same {}", "gravity")
@@ -187,7 +183,7 @@ class LinearBodies:
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         names = [entry.name for entry in fields(self.members[0]) if entry.name != "gravity"]
-        return {name: (self._repeat_for_stops(name), self.members[0].units[name] or "1") for name in names}
+        return {name: (self._repeat_for_stops(name), self.members[0].units.get(name, "1")) for name in names}
 
     def speed_thresholds(self, share: float) -> Floats:
         return np.full((len(self), 2), share)  # these bodies have no natural speed
@@ -216,10 +212,9 @@ class LinearBodies:
 
 def _require_linear_model(model: Model) -> None:
     if model != "linear":
-        advice = 'call rocking.dynamics.simulate, or set {} to "linear"'
-        raise InvalidOption(
-            f"bodies of rocking.dynamics have linear equations of motion: {advice}", "model", value=model
-        )
+        correction = 'call rocking.dynamics.simulate, or set {} to "linear"'
+        message = f"bodies of rocking.dynamics have linear equations of motion: {correction}"
+        raise InvalidOption(message, "model", value=model)
 
 
 @dataclass(frozen=True)
@@ -257,7 +252,7 @@ class BouncingBall(LinearBody):
     """
 
     kind: ClassVar[str] = "bouncing-ball"
-    units: ClassVar[Mapping[str, str]] = {"restitution": "", "gravity": "m/s^2"}
+    units: ClassVar[Mapping[str, str]] = {"gravity": "m/s^2"}
 
     restitution: float
     gravity: float = STANDARD_GRAVITY
@@ -312,9 +307,7 @@ class ImpactOscillator(LinearBody):
     """
 
     kind: ClassVar[str] = "impact-oscillator"
-    units: ClassVar[Mapping[str, str]] = {
-        "frequency": "Hz", "restitution": "", "damping_ratio": "", "stop": "m", "second_stop": "m",
-    }  # fmt: skip
+    units: ClassVar[Mapping[str, str]] = {"frequency": "Hz", "stop": "m", "second_stop": "m"}
 
     frequency: float
     restitution: float
@@ -328,11 +321,10 @@ class ImpactOscillator(LinearBody):
         if not 0.0 <= damping < 1.0:
             raise InvalidBlock(f"{{}} must be at least 0 and below 1, not {damping:g}", "damping_ratio", value=damping)
         stop = checks.finite(self.stop, "stop", InvalidBlock)
-        if self.second_stop is not None and not checks.finite(self.second_stop, "second_stop", InvalidBlock) > -stop:
-            raise InvalidBlock(
-                f"{{}} = {self.second_stop:g} m must be above -{{}} = {-stop:g} m, the position of the first stop",
-                "second_stop", "stop", value=self.second_stop,
-            )  # fmt: skip
+        second_stop = self.second_stop
+        if second_stop is not None and not checks.finite(second_stop, "second_stop", InvalidBlock) > -stop:
+            message = f"{{}} = {second_stop:g} m must be above -{{}} = {-stop:g} m, the position of the first stop"
+            raise InvalidBlock(message, "second_stop", "stop", value=second_stop)
 
     @property
     def law(self) -> Law:
@@ -376,7 +368,7 @@ class InvertedPendulum(LinearBody):
     """
 
     kind: ClassVar[str] = "inverted-pendulum"
-    units: ClassVar[Mapping[str, str]] = {"p": "rad/s", "gap": "m", "restitution": ""}
+    units: ClassVar[Mapping[str, str]] = {"p": "rad/s", "gap": "m"}
 
     p: float
     gap: float
@@ -507,9 +499,8 @@ def simulate(
     body, motion = _require_linear_body(body), check_motion(motion)
     end_time = _choose_duration(body, motion, duration)
     position = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
-    return convert_to_positions(
-        compute_response(body, motion, "linear", chattering, end_time, (position, initial_velocity))
-    )
+    start = position, initial_velocity
+    return convert_to_positions(compute_response(body, motion, "linear", chattering, end_time, start))
 
 
 def _require_linear_body(body: object) -> LinearBody:
@@ -536,8 +527,6 @@ def _choose_duration(body: LinearBody, motion: Motion | None, duration: float | 
             raise InvalidOption("this body is not pressed against a stop and may never rest; specify {}", "duration")
         return motion.end
     if never_rests(body.as_bodies()):
-        raise InvalidOption(
-            f"a body with {{}} 1, as this {body.description}, never comes to rest; specify {{}}",
-            *("restitution", "duration"),
-        )
+        message = f"a body with {{}} 1, as this {body.description}, never comes to rest; specify {{}}"
+        raise InvalidOption(message, "restitution", "duration")
     return None

@@ -37,10 +37,10 @@ UPLIFT: Final = "uplift"
 OVERTURNING: Final = "overturning"
 
 #: Ends of a branch without a bifurcation.
-LIMIT: Final = "limit of the parameter"
-CLOSED: Final = "where it began"
-TOO_MANY_POINTS: Final = "too many points"
-LOST: Final = "lost"
+END_AT_LIMIT: Final = "limit of the parameter"
+END_CLOSED: Final = "where it began"
+END_TOO_MANY_POINTS: Final = "too many points"
+END_LOST: Final = "lost"
 
 
 class Bifurcation(NamedTuple):
@@ -167,12 +167,9 @@ class Branch(Result):
     def summary(self) -> str:
         stable = self.is_stable
         lines = [self._headline(), f"{len(self)} points, {int(np.sum(stable))} of them stable"]
-        if self.bifurcations:
+        if points := self.bifurcations:
             header = ["bifurcation", add_unit(self.name, self.unit), "multipliers"]
-            rows = [
-                [point.kind, f"{point.value:.12g}", _format_multipliers(point.orbit.multipliers)]
-                for point in self.bifurcations
-            ]
+            rows = [[kind, f"{x:.12g}", _format_multipliers(orbit.multipliers)] for kind, x, _, orbit in points]
             lines += ["", format_table(header, rows)]
         return "\n".join([*lines, "", f"ends: {self.ends[0]}; {self.ends[1]}"])
 
@@ -188,22 +185,17 @@ class Branch(Result):
             "stable": self.is_stable,
             "peaks": self.peaks,
             "bifurcations": [
-                {"kind": point.kind, "value": point.value, "bracket": [*point.bracket]} for point in self.bifurcations
+                {"kind": kind, "value": value, "bracket": [*bracket]} for kind, value, bracket, _ in self.bifurcations
             ],
             "ends": [*self.ends],
         }
 
     def _columns(self, table: str) -> list[Column]:
         if table == "bifurcations":
-            parameter, bifurcations = add_unit(self.name, self.unit), self.bifurcations
-            return [
-                Column("kind", [point.kind for point in bifurcations]),
-                Column(parameter, [point.value for point in bifurcations]),
-                *(
-                    Column(f"{parameter}_{bound}", [point.bracket[k] for point in bifurcations])
-                    for k, bound in enumerate(("lower", "upper"))
-                ),
-            ]
+            rows = [(kind, value, *bracket) for kind, value, bracket, _ in self.bifurcations]
+            parameter = add_unit(self.name, self.unit)
+            names = "kind", parameter, f"{parameter}_lower", f"{parameter}_upper"
+            return [Column(name, [row[k] for row in rows]) for k, name in enumerate(names)]
         coordinate = self.family(float(self.values[0]))[0].coordinate
         return [
             Column(self.name, self.values, self.unit),
@@ -241,20 +233,16 @@ class Branch(Result):
         quantity = f"{coordinate.name} at the start of a period" if has_constant_peak else f"largest {coordinate.name}"
         periods = ", ".join(str(period) for period in sorted({branch.period for branch in branches}))
         headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
+        heights = [branch.states[:, 0] if has_constant_peak else branch.peaks for branch in branches]
+        marks = []
+        for kind, value, _, orbit in bifurcations:
+            height = float(orbit.state[0]) if has_constant_peak else compute_peak(orbit.response)
+            marks.append((kind, value, height))
         return draw_branches(
             values=_join_with_gaps([branch.values for branch in branches]),
-            heights=_join_with_gaps(
-                [branch.states[:, 0] if has_constant_peak else branch.peaks for branch in branches]
-            ),
+            heights=_join_with_gaps(heights),
             stable=_join_with_gaps([branch.is_stable for branch in branches]) == 1.0,
-            marks=[
-                (
-                    point.kind,
-                    point.value,
-                    float(point.orbit.state[0]) if has_constant_peak else compute_peak(point.orbit.response),
-                )
-                for point in bifurcations
-            ],
+            marks=marks,
             labels=(f"{self.name}{unit}", f"{quantity} ({coordinate.unit})"),
             title=title or escape_dollars(f"{body.description}, {headline.replace('^2', '²')}"),
             ax=ax,

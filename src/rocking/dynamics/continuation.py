@@ -127,15 +127,15 @@ def continue_orbit(
     low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
     start = checks.between(value, "value", InvalidOption, low, high)
     max_step = checks.positive(step, "step", InvalidOption)
-    n_points = checks.integer(max_points, "max_points", InvalidOption, minimum=1)
+    point_count = checks.integer(max_points, "max_points", InvalidOption, minimum=1)
     equations = OrbitEquations.from_orbit(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
     backward, forward = (_BranchWalk(equations, z, direction, max_step) for direction in (-1.0, 1.0))
-    backward.follow(n_points)
-    if backward.end == branches.CLOSED:  # a closed branch is complete
-        forward.end = branches.CLOSED
+    backward.follow(point_count)
+    if backward.end == branches.END_CLOSED:  # a closed branch is complete
+        forward.end = branches.END_CLOSED
     else:
-        forward.follow(n_points)
+        forward.follow(point_count)
     points = [*reversed(backward.points), *forward.points[1:]]
     values, states, multipliers, peaks = (np.array(column) for column in zip(*points, strict=True))
     return Branch(
@@ -153,7 +153,7 @@ class _BranchWalk:
         self.response = equations.simulate_period(z)
         self.points = [equations.evaluate_point(z, self.response)]
         self.bifurcations: list[Bifurcation] = []
-        self.end = branches.TOO_MANY_POINTS
+        self.end = branches.END_TOO_MANY_POINTS
         #: Length of the last failed step, less later steps, and number of later successful steps.
         self.distance_to_end, self.successes = math.inf, 0
         #: Whether the last step failed only because of a bend of the branch.
@@ -164,11 +164,11 @@ class _BranchWalk:
     def follow(self, max_points: int) -> None:
         """Follow the branch over a number of points, or to its end."""
         if self.points[0][0] == self.equations.bounds[0 if self.direction < 0.0 else 1]:
-            self.end = branches.LIMIT
+            self.end = branches.END_AT_LIMIT
             return
         solution = self.equations.solve(self.z, PARAMETER_AXIS)
         if solution is None:
-            self.end = branches.LOST
+            self.end = branches.END_LOST
             return
         self.move_to(solution, self.direction * PARAMETER_AXIS)
         self.last_recorded = self.z
@@ -191,11 +191,10 @@ class _BranchWalk:
         """Take a step along the branch or shorten it, and return the reason if the branch ends."""
         equations = self.equations
         if self.distance_to_end < _MIN_STEP:
-            reason = self.find_reason_of_end()
+            reason = self.find_end_reason()
             values = [(self.z + step * self.tangent)[2] for step in (0.0, self.distance_to_end)]
-            self.bifurcations += (
-                [] if reason == branches.LOST else [equations.create_bifurcation(reason, self.z, values)]
-            )
+            ending = [] if reason == branches.END_LOST else [equations.create_bifurcation(reason, self.z, values)]
+            self.bifurcations += ending
             return reason
         result = self.try_step()
         if result is None:
@@ -218,12 +217,12 @@ class _BranchWalk:
         self.successes += 1
         self.distance_to_end = math.inf if self.successes > 5 else self.distance_to_end - self.step
         if at_limit:
-            return branches.LIMIT
+            return branches.END_AT_LIMIT
         if grazing := self.extrapolate_grazing():
             self.bifurcations.append(grazing)
             return branches.GRAZING
         if len(self.points) > 12 and self.has_returned():
-            return branches.CLOSED
+            return branches.END_CLOSED
         self.shift_start()
         if self.distance_to_end < math.inf:
             self.step = 0.5 * self.distance_to_end
@@ -258,20 +257,16 @@ class _BranchWalk:
             return None
         new_tangent = compute_tangent(point.jacobian, tangent)
         # A point far from the prediction belongs to another branch.
-        self.is_bent = bool(
-            np.linalg.norm(point.z - guess) > _MAX_OFFSET * self.step or new_tangent @ tangent < _MIN_COSINE
-        )
+        offset = np.linalg.norm(point.z - guess)
+        self.is_bent = bool(offset > _MAX_OFFSET * self.step or new_tangent @ tangent < _MIN_COSINE)
         if self.is_bent:
             return None
         tests, new_tests = self.tests, point.compute_tests(new_tangent)
-        if (
-            tests.multiplier_one * new_tests.multiplier_one < 0.0
-            and tests.multiplier_minus_one * new_tests.multiplier_minus_one < 0.0
-        ):
+        if all(old * new < 0.0 for old, new in zip(tests[:2], new_tests[:2], strict=True)):
             return None  # A multiplier passes 1 and -1, or changes sign through infinity at a grazing impact.
         if self.turns_without_fold(new_tests) and max(abs(tests.multiplier_one), abs(new_tests.multiplier_one)) > 0.05:
             return None  # The turn is too far away, or a difference of the parameter extends past an end.
-        return (point, at_limit) if equations.find_kind(point.z) == equations.kind else None
+        return (point, at_limit) if equations.determine_kind(point.z) == equations.kind else None
 
     def turns_without_fold(self, tests: TestFunctions) -> bool:
         """Whether the parameter turns before a point although no multiplier passes 1.
@@ -293,19 +288,13 @@ class _BranchWalk:
     def locate_junction(self, z: Floats) -> Bifurcation:
         """Locate the point at which the branch meets orbits of half the period, or symmetric orbits."""
         equations, middle = self.equations, 0.5 * (self.z + z)
-        is_even = equations.period % 2 == 0
-        parent = replace(
-            equations, period=equations.period // 2 if is_even else equations.period, uses_half_map=not is_even
-        )
-        kind = branches.FLIP if is_even else branches.SYMMETRY_BREAKING
-        for fraction in (
-            _SEARCH_FRACTIONS
-            if is_even or has_mirror_symmetry(equations.create_map(equations.to_physical(middle)[1]))
-            else ()
-        ):
-            if bifurcation := parent.locate_bifurcation(
-                kind, middle - fraction * PARAMETER_AXIS, PARAMETER_AXIS, 2.0 * fraction, 1
-            ):
+        period, is_odd = equations.period, equations.period % 2 == 1
+        kind = branches.SYMMETRY_BREAKING if is_odd else branches.FLIP
+        parent = replace(equations, period=period if is_odd else period // 2, uses_half_map=is_odd)
+        has_parent = not is_odd or has_mirror_symmetry(equations.create_map(equations.to_physical(middle)[1]))
+        for fraction in _SEARCH_FRACTIONS if has_parent else ():
+            start = middle - fraction * PARAMETER_AXIS
+            if bifurcation := parent.locate_bifurcation(kind, start, PARAMETER_AXIS, 2.0 * fraction, 1):
                 return bifurcation
         return equations.create_bifurcation(branches.BRANCH_POINT, middle, [self.z[2], z[2]])
 
@@ -324,9 +313,7 @@ class _BranchWalk:
         if len(fitted) < 4:
             return None
         speeds, values = zip(*fitted, strict=True)
-        estimates = [
-            interpolate_at_zero(speeds[:count], values[:count]) for count in range(len(fitted) - 2, len(fitted) + 1)
-        ]
+        estimates = [interpolate_at_zero(speeds[:n], values[:n]) for n in range(len(fitted) - 2, len(fitted) + 1)]
         if abs(estimates[-1] - estimates[-2]) > 1e-6:
             return None
         bifurcation = equations.create_bifurcation(branches.GRAZING, self.z, estimates)
@@ -334,9 +321,8 @@ class _BranchWalk:
 
     def has_returned(self) -> bool:
         """Whether the branch has returned to its first point in its initial direction."""
-        first, second, before, last = (
-            np.append(self.points[k][1], self.points[k][0]) / self.equations.sizes for k in (0, 1, -2, -1)
-        )
+        points = (self.points[k] for k in (0, 1, -2, -1))
+        first, second, before, last = (np.append(state, value) / self.equations.sizes for value, state, *_ in points)
         near = np.linalg.norm(last - first) < np.linalg.norm(last - before)
         return bool(near and (last - before) @ (second - first) > 0.0)
 
@@ -365,17 +351,17 @@ class _BranchWalk:
             self.equations = shifted
             self.move_to(solution, tangent)
 
-    def find_reason_of_end(self) -> str:
+    def find_end_reason(self) -> str:
         """Return the reason why the branch ends just beyond its last point."""
         kind, beyond = self.equations.kind, self.z + 8.0 * _MIN_STEP * self.tangent
         rests_differently = False
         for step in _STEPS_BEYOND_END:
             try:
-                kind_beyond = self.equations.find_kind(beyond + step * self.tangent)
+                kind_beyond = self.equations.determine_kind(beyond + step * self.tangent)
             except RockingError:
                 continue
             if kind_beyond.unknown:
-                return branches.LOST
+                return branches.END_LOST
             if kind_beyond.overturns:
                 return branches.OVERTURNING
             if kind_beyond.rests_forever != kind.rests_forever:
@@ -386,4 +372,4 @@ class _BranchWalk:
                 return branches.GRAZING
             rests_differently = kind.rests and not kind.rests_forever
         # A body that uplifts and rests as before has touched or missed a stop in between.
-        return branches.GRAZING if rests_differently else branches.LOST
+        return branches.GRAZING if rests_differently else branches.END_LOST

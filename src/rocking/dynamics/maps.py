@@ -34,6 +34,9 @@ _LIFTING_ACCELERATION: Final = 1e12
 #: Number of states per call of a kernel, small so that a computation can be interrupted quickly.
 STATES_PER_CALL: Final = 256
 
+#: Traps of a map of single states.
+_NO_TRAPS: Final = np.empty((0, TRAP))
+
 #: Factor that equals one within rounding error.
 _BELOW_ONE: Final = 1.0 - 2.0**-40
 
@@ -42,35 +45,29 @@ class PeriodicForcing:
     """Body under periodic motion, in the form that kernels accept."""
 
     def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | ChatteringScheme) -> None:
-        one_period = check_motion(motion)
-        if one_period is None:
-            raise InvalidMotion(
-                "motion must be one period of a Motion, for example rocking.pulses.sine(a, f, cycles=1); got None"
-            )
+        if (one_period := check_motion(motion)) is None:
+            example = "rocking.pulses.sine(a, f, cycles=1)"
+            raise InvalidMotion(f"motion must be one period of a Motion, for example {example}; got None")
         if one_period.vertical is not None:
             raise InvalidMotion("motion must not have a vertical component for a stroboscopic map")
         self.body, self.motion = require_body(body), one_period
         self.bodies = self.body.as_bodies()
-        self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
-        if model is not None:
-            checks.choice(model, "model", InvalidOption, MODELS)
-            self.model = model
+        default: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
+        self.model: Model = default if model is None else model
+        checks.choice(self.model, "model", InvalidOption, MODELS)
         self.chattering = chattering_scheme(chattering)
         self.forcing_period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
         if not np.max(np.abs(self.motion.coefficients[:, 0])) < _LIFTING_ACCELERATION * self.body.gravity:
-            raise InvalidMotion(
-                f"the accelerations of the motion must be below {_LIFTING_ACCELERATION:g} g for a stroboscopic map"
-            )
-        self._ground = build_repeated_ground(self.motion, self.body.gravity)
-        run = Setup(self.bodies, self.model, self.chattering, self.forcing_period).prepare(
-            self.motion, ground=self._ground
-        )
+            limit = f"{_LIFTING_ACCELERATION:g} g"
+            raise InvalidMotion(f"the accelerations of the motion must be below {limit} for a stroboscopic map")
+        self._ground = create_repeated_ground(self.motion, self.body.gravity)
+        setup = Setup(self.bodies, self.model, self.chattering, self.forcing_period)
+        run = setup.prepare(self.motion, ground=self._ground)
         self._body_records, self._settings = run.records, run.settings
         self._settings["stop"], self._settings["no_end_time"] = np.inf, True
         if np.any(self._body_records["yielding"]):
-            raise InvalidBlock(
-                "yielding tendons have internal state, which stroboscopic maps do not support: remove the tendon"
-            )
+            reason = "which stroboscopic maps do not support"
+            raise InvalidBlock(f"yielding tendons have internal state, {reason}: remove the tendon")
         if np.any(self._body_records["variable_restitution"] & (self._body_records["seed"] >= 0)):
             raise InvalidOption(
                 "stroboscopic maps do not support restitution drawn at random at each impact: specify a number, or a "
@@ -83,19 +80,18 @@ class PeriodicForcing:
         inputs = f"{describe_input(self.body)} under {describe_input(self.motion)}"
         return f"<{type(self).__name__}: {inputs}; {self.model} model>"
 
-    def _copy_settings(self, *, record: bool) -> state.Record:
+    def _copy_settings(self, *, stores_nodes: bool) -> state.Record:
         settings = self._settings.copy()
-        settings["record"] = record
+        settings["record"] = stores_nodes
         return settings
 
     def _create_problem(self) -> PeriodicProblem:
-        return PeriodicProblem(
-            self._ground, self._body_records[0], self._copy_settings(record=False), state.new_table(0), self._steps
-        )
+        settings = self._copy_settings(stores_nodes=False)
+        return PeriodicProblem(self._ground, self._body_records[0], settings, state.new_table(0), self._steps)
 
     def _create_derivative_arguments(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
         """Create the problem and the workspace of the derivative kernels."""
-        trail = Trail(self._ground, self._body_records[0], self._copy_settings(record=True), NO_NODES)
+        trail = Trail(self._ground, self._body_records[0], self._copy_settings(stores_nodes=True), NO_NODES)
         return trail, state.new_scratch(), state.new_record(state.VARIATION), state.new_table(512)
 
     def _check_starts(self, starts: ArrayLike, name: str) -> Floats:
@@ -113,15 +109,13 @@ class PeriodicForcing:
         flat = pairs.reshape(-1, 2)
         (coordinate, velocity), record, (low, high) = flat.T, self._body_records[0], self.body.stops
         if record["next_side"][0] == 0:  # a stop, which the body cannot pass
-            leads_into_stop = (coordinate == low) & (velocity < 0.0) | (
-                bool(record["two_stops"]) & (coordinate == high) & (velocity > 0.0)
-            )
+            leads_into_second = bool(record["two_stops"]) & (coordinate == high) & (velocity > 0.0)
+            leads_into_stop = (coordinate == low) & (velocity < 0.0) | leads_into_second
             if np.any(leads_into_stop):
                 x, v = float(coordinate[leads_into_stop][0]), float(velocity[leads_into_stop][0])
-                raise InvalidOption(
-                    f"{{}} must not point into a stop; got {v:g} m/s at {x:g} m; change its sign, or begin in front "
-                    "of the stop", velocities or name, value=v,
-                )  # fmt: skip
+                message = f"{{}} must not point into a stop; got {v:g} m/s at {x:g} m"
+                correction = "change its sign, or begin in front of the stop"
+                raise InvalidOption(f"{message}; {correction}", velocities or name, value=v)
         records = state.new_states(len(flat), 0)
         set_start(records, self._body_records, self.bodies, coordinate, velocity, name)
         records["peak"] = self._initial_peak
@@ -137,9 +131,8 @@ class PeriodicForcing:
         """Return pairs of numbers as an array, shape (..., 2)."""
         pairs = checks.numbers(values, name, InvalidOption)
         if pairs.ndim == 0 or pairs.shape[-1] != 2:
-            raise InvalidOption(
-                f"{{}} must contain pairs ({coordinate}, velocity) along the last axis; got shape {pairs.shape}", name
-            )
+            expected = f"pairs ({coordinate}, velocity) along the last axis"
+            raise InvalidOption(f"{{}} must contain {expected}; got shape {pairs.shape}", name)
         return pairs
 
     def _to_coordinates(self, u: Floats, v: Floats, side: Integers) -> Floats:
@@ -197,7 +190,7 @@ def estimate_mean_acceleration(motion: Motion) -> float:
     return float(np.mean(np.abs(motion.acceleration(times))))
 
 
-def build_repeated_ground(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
+def create_repeated_ground(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
     """Create the ground of two periods of a motion, followed by an acceleration that lifts any body."""
     times = motion.breakpoints - motion.breakpoints[0]
     period, columns = times[-1], motion.coefficients.shape[1]
@@ -282,10 +275,8 @@ class StroboscopicMap(PeriodicForcing):
         count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)
         rows = np.full((len(records), count, 3), np.nan)
         self._iterate(records, count, rows)
-        known = ~np.isnan(rows[..., 0])
-        later_states = self._to_coordinates(
-            rows[..., 0], rows[..., 1], np.where(known, rows[..., 2], 0.0).astype(np.int64)
-        )
+        u, v, side = np.moveaxis(rows, -1, 0)
+        later_states = self._to_coordinates(u, v, np.where(np.isnan(u), 0.0, side).astype(np.int64))
         orbit = np.concatenate([pairs.reshape(-1, 1, 2), later_states], axis=1)
         return orbit.reshape(*pairs.shape[:-1], count + 1, 2)
 
@@ -339,19 +330,21 @@ class StroboscopicMap(PeriodicForcing):
         self._iterate(records)
         return self._from_records(records).reshape(pairs.shape)
 
-    def _iterate(self, records: state.Records, n_periods: int = 1, rows: Floats | None = None) -> None:
+    def _iterate(
+        self, records: state.Records, n_periods: int = 1, rows: Floats | None = None, traps: Floats = _NO_TRAPS
+    ) -> tuple[Integers, Integers]:
+        """Advance states, up to traps; write their orbits, and return the trap (or -1) and periods of each."""
         problem = self._create_problem()
         orbits = np.empty((len(records), 0, 3)) if rows is None else rows
-        traps, counts = np.empty((0, TRAP)), np.zeros((2, len(records)), dtype=np.int64)
+        reached, counts = np.empty((2, len(records)), dtype=np.int64)
 
         def advance_part(part: slice) -> None:
-            trap_rows, period_counts = counts[:, part]
-            iterate(
-                problem, state.new_scratch(), records[part], n_periods, orbits[part], traps, trap_rows, period_counts
-            )
+            outputs = reached[part], counts[part]
+            iterate(problem, state.new_scratch(), records[part], n_periods, orbits[part], traps, *outputs)
 
         for _ in map_in_threads(advance_part, split_states(len(records), n_periods)):
             pass
+        return reached, counts
 
 
 class HalfMap(StroboscopicMap):
@@ -363,7 +356,7 @@ class HalfMap(StroboscopicMap):
         middle = int(np.argmin(np.abs(motion.breakpoints - motion.breakpoints[0] - 0.5 * self.forcing_period)))
         half = Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
         self.forcing_period *= 0.5
-        self._ground = build_repeated_ground(half, self.body.gravity, -1.0)
+        self._ground = create_repeated_ground(half, self.body.gravity, -1.0)
         self._steps = np.ascontiguousarray(self._steps[:, :middle])  # as kernels require
 
     def map_to_mirror_image(self, state: Floats, n_halves: int) -> tuple[Floats, Floats]:

@@ -34,7 +34,7 @@ from rocking.motion.motion import Motion
 from rocking.response import Response
 
 #: Number of points that interpolate a crossing of branches.
-_N_CROSSING_POINTS: Final = 4
+_CROSSING_POINT_COUNT: Final = 4
 
 #: Residual of a point, relative to the scale and the size of the derivative, and its absolute maximum.
 _RESIDUAL: Final = 1e-12
@@ -116,18 +116,13 @@ class OrbitEquations:
         """Create the equations of an orbit at a value of the parameter."""
         pair = family(value) if callable(family) else None
         if not isinstance(pair, tuple) or len(pair) != 2:
-            raise InvalidOption(
-                "{} must be a function of the parameter that returns a body and one period of a motion", "family"
-            )
+            message = "{} must be a function of the parameter that returns a body and one period of a motion"
+            raise InvalidOption(message, "family")
         strobe = StroboscopicMap(*pair, orbit.model, orbit.chattering)
         scale = compute_scale(strobe)
         if not np.all(np.abs(strobe(orbit.state, orbit.period) - orbit.state) / scale < 1e-8):
-            raise InvalidOption(
-                f"the orbit is not periodic for {{}} at {{}} = {value:g}; use the body and motion of the orbit",
-                "family",
-                "value",
-                value=value,
-            )
+            message = f"the orbit is not periodic for {{}} at {{}} = {value:g}; use the body and motion of the orbit"
+            raise InvalidOption(message, "family", "value", value=value)
         sizes, kind = np.array([*scale, bounds[1] - bounds[0]]), determine_kind(strobe, orbit.state, orbit.period)
         equations = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, bounds)  # type: ignore[arg-type]
         equations.uses_half_map = orbit.symmetric and not orbit.rests and equations.is_mirrored_throughout(value)
@@ -144,9 +139,8 @@ class OrbitEquations:
     def _create_half_map(self, value: float) -> HalfMap:
         strobe = self.create_map(value)
         if not has_mirror_symmetry(strobe):
-            raise InvalidOption(
-                f"the body and motion have no mirror symmetry at {{}} = {value:g}", "value", value=value
-            )
+            message = f"the body and motion have no mirror symmetry at {{}} = {value:g}"
+            raise InvalidOption(message, "value", value=value)
         return HalfMap(strobe)
 
     def is_mirrored_throughout(self, value: float) -> bool:
@@ -187,7 +181,7 @@ class OrbitEquations:
     def solve(self, guess: Floats, normal: Floats) -> BranchPoint | None:
         """Find a point in the plane through a guess by Newton's method; None without convergence."""
         z = guess.copy()
-        for n_steps in range(10):
+        for step_count in range(10):
             residual, jacobian = self.compute_residual(z)
             if not np.all(np.isfinite(jacobian)):
                 return None
@@ -199,10 +193,10 @@ class OrbitEquations:
                 return None
             z = z + step
             if is_accurate:  # The derivative at the previous point may be from beyond a grazing impact.
-                return BranchPoint(z, jacobian, self.map_state(*self.to_physical(z))[1], n_steps)
+                return BranchPoint(z, jacobian, self.map_state(*self.to_physical(z))[1], step_count)
         return None
 
-    def find_kind(self, z: Floats) -> OrbitKind:
+    def determine_kind(self, z: Floats) -> OrbitKind:
         """Determine the kind of the orbit at a point."""
         state, value = self.to_physical(z)
         return determine_kind(self.create_map(value), state, self.period)
@@ -246,9 +240,8 @@ class OrbitEquations:
         bracket = sorted(float(scaled * self.sizes[2]) for scaled in values)
         value = self.to_physical(z)[1]
         strobe = StroboscopicMap(*self.family(value), self.model, self.chattering)
-        return Bifurcation(
-            kind, value, (bracket[0], bracket[-1]), create_orbit(strobe, self.compute_state(z), self.period)
-        )
+        orbit = create_orbit(strobe, self.compute_state(z), self.period)
+        return Bifurcation(kind, value, (bracket[0], bracket[-1]), orbit)
 
     def locate_bifurcation(
         self, kind: str, z: Floats, tangent: Floats, length: float, test_index: int
@@ -273,13 +266,12 @@ class OrbitEquations:
             if len({test > 0.0 for _, test in evaluated.values()}) < 2:
                 return None
             # The equations are singular where branches cross.
-            points = sorted(evaluated.values(), key=lambda pair: abs(pair[1]))[:_N_CROSSING_POINTS]
+            points = sorted(evaluated.values(), key=lambda pair: abs(pair[1]))[:_CROSSING_POINT_COUNT]
             value = interpolate_at_zero([test for _, test in points], [pair.z[2] for pair, _ in points])
             crossing = self.create_bifurcation(kind, points[0][0].z, [z[2], (z + length * tangent)[2]])
             return crossing._replace(value=float(value * self.sizes[2]))
-        first, second = (
-            evaluated[distance][0].z for distance in sorted(evaluated, key=lambda distance: abs(distance - root))[:2]
-        )
+        nearest = sorted(evaluated, key=lambda distance: abs(distance - root))[:2]
+        first, second = (evaluated[distance][0].z for distance in nearest)
         return self.create_bifurcation(kind, first, [first[2], second[2]])
 
 
@@ -302,14 +294,8 @@ def determine_kind(strobe: StroboscopicMap, state: Floats, period: int) -> Orbit
     _, outcome, impacts = strobe.advance(state, period)
     _, derivative = strobe.derivative(state, period)
     rests, rests_forever = not np.any(derivative), bool(outcome == PeriodOutcome.RESTS_FOR_EVER and not impacts)
-    n_impacts = 0 if rests else int(impacts)
-    return OrbitKind(
-        rests,
-        rests_forever,
-        n_impacts,
-        bool(outcome == PeriodOutcome.OVERTURNED),
-        bool(outcome == PeriodOutcome.UNFINISHED),
-    )
+    overturns, is_unknown = (bool(outcome == ending) for ending in (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))
+    return OrbitKind(rests, rests_forever, 0 if rests else int(impacts), overturns, is_unknown)
 
 
 def interpolate_at_zero(x: Sequence[float], y: Sequence[float]) -> float:

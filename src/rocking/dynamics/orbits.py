@@ -36,7 +36,7 @@ _NEUTRAL: Final = 1e-9
 _NEUTRAL_PAIR: Final = 1e-6
 
 #: Number of periods after which states of every `_LATER_STRIDE`-th start are further starts, close to attractors.
-_N_LATER_PERIODS, _LATER_STRIDE = 60, 8
+_LATER_PERIOD_COUNT, _LATER_STRIDE = 60, 8
 
 #: Smallest and largest initial speed relative to the impulse of a period, and largest of a block that may overturn.
 _MIN_GAIN, _MAX_GAIN, _MAX_BLOCK_SPEED = 0.5, 20.0, 2.0
@@ -123,18 +123,18 @@ class PeriodicOrbit(Result):
             events = "with complete chattering"
         else:
             events = f"with {format_count(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
-        return (
-            f"{stable}{' symmetric' if self.symmetric else ''} orbit of {format_count(self.period, 'period')} {events}"
-        )
+        symmetric = " symmetric" if self.symmetric else ""
+        return f"{stable}{symmetric} orbit of {format_count(self.period, 'period')} {events}"
 
     @property
     def _multipliers(self) -> str:
         """Format the multipliers with three digits."""
-        signs = ("-" if multiplier.imag < 0.0 else "+" for multiplier in self.multipliers)
-        return ", ".join(
-            f"{multiplier.real:.3g}" + (f" {sign} {abs(multiplier.imag):.3g}i" if multiplier.imag else "")
-            for multiplier, sign in zip(self.multipliers, signs, strict=True)
-        )
+        texts = []
+        for multiplier in self.multipliers:
+            sign = "-" if multiplier.imag < 0.0 else "+"
+            imaginary = f" {sign} {abs(multiplier.imag):.3g}i" if multiplier.imag else ""
+            texts.append(f"{multiplier.real:.3g}{imaginary}")
+        return ", ".join(texts)
 
     def _headline(self) -> str:
         return f"{self._description}, multipliers {self._multipliers}"
@@ -213,13 +213,10 @@ def simulate_periods(strobe: StroboscopicMap, state: Floats, periods: int) -> Re
     # The motion after the end determines how long a chattering sequence lasts.
     starts = strobe.forcing_period * np.arange(periods + 1)
     breakpoints = np.append((starts[:, None] + motion.breakpoints[:-1]).ravel(), strobe.forcing_period * (periods + 1))
-    repeated = Motion(
-        breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
-    )
-    start = float(state[0]), float(state[1])
-    response = compute_response(
-        strobe.body, repeated, strobe.model, strobe.chattering, duration, start, "initial_position"
-    )
+    coefficients = np.tile(motion.coefficients, (periods + 1, 1))
+    repeated = Motion(breakpoints, coefficients, motion.name, motion.description, error=motion.error)
+    start, name = (float(state[0]), float(state[1])), "initial_position"
+    response = compute_response(strobe.body, repeated, strobe.model, strobe.chattering, duration, start, name)
     return convert_to_positions(response) if isinstance(strobe.body, LinearBody) else response
 
 
@@ -335,12 +332,8 @@ def periodic_orbits(
     orbits: list[PeriodicOrbit] = []
     for orbit in map(search.create_least_orbit, distinct):
         shifts = [np.roll(orbit.states, k, axis=0) for k in range(orbit.period)]
-        candidates = (known for known in orbits if known.period == orbit.period)
-        if not any(
-            np.max(search.compute_sizes(shift - known.states)) < MAX_ORBIT_DISTANCE
-            for known in candidates
-            for shift in shifts
-        ):
+        differences = (shift - known.states for known in orbits if known.period == orbit.period for shift in shifts)
+        if not any(np.max(search.compute_sizes(difference)) < MAX_ORBIT_DISTANCE for difference in differences):
             orbits.append(orbit)
     return sorted(orbits, key=lambda orbit: (orbit.period, orbit.impacts, *orbit.state))
 
@@ -356,24 +349,24 @@ class _OrbitSearch:
         """Return the requested initial states, or create about the requested number."""
         if requested is not None and np.ndim(requested) > 0:
             return self.strobe._check_starts(requested, "starts")
-        n_starts = 1024 if requested is None else checks.integer(requested, "starts", InvalidOption, minimum=1)
+        start_count = 1024 if requested is None else checks.integer(requested, "starts", InvalidOption, minimum=1)
         strobe, (low, high) = self.strobe, self.strobe.body.stops
         is_two_sided = strobe._is_two_sided
         max_speed = self._estimate_max_speed()
-        n_points = max(2, round(math.sqrt(n_starts / (2 if is_two_sided else 1))))
-        phases = strobe.forcing_period * (np.arange(n_points) + 0.5) / n_points
-        speeds = max_speed * ((np.arange(n_points) + 0.5) / n_points) ** 1.5
+        point_count = max(2, round(math.sqrt(start_count / (2 if is_two_sided else 1))))
+        phases = strobe.forcing_period * (np.arange(point_count) + 0.5) / point_count
+        speeds = max_speed * ((np.arange(point_count) + 0.5) / point_count) ** 1.5
         impacts = np.stack(np.meshgrid(phases, speeds), axis=-1).reshape(-1, 2)
         if is_two_sided:
             impacts = np.concatenate([impacts, impacts * [1.0, -1.0]])
-        fractions = np.linspace(-0.9, 0.9, max(2, n_points // 4))
+        fractions = np.linspace(-0.9, 0.9, max(2, point_count // 4))
         width = high - low if strobe._body_records[0]["two_stops"] else self.scale.coordinate
         coordinates = 0.5 * (low + high) + 0.5 * width * fractions if is_two_sided else low + width * (1.0 + fractions)
         between = np.stack(np.meshgrid(coordinates, max_speed * fractions), axis=-1).reshape(-1, 2)
         rests = np.array([[stop, 0.0] for stop in {low, high}])
         states = np.concatenate([rests, between, strobe.from_impacts(impacts)])
         states = states[self._are_admissible(states)]
-        later = strobe(states[::_LATER_STRIDE], _N_LATER_PERIODS * self.n_periods)
+        later = strobe(states[::_LATER_STRIDE], _LATER_PERIOD_COUNT * self.n_periods)
         return np.concatenate([states, later[self._are_admissible(later)]])
 
     def _estimate_max_speed(self) -> float:
@@ -429,9 +422,8 @@ class _OrbitSearch:
             # A step that does not reduce the residual is halved.
             for halving in range(5):
                 remaining = np.flatnonzero(~better)
-                candidates = self.map_with_derivatives(
-                    rows[active[remaining], :2] + 0.5**halving * steps[remaining], n_periods
-                )
+                trials = rows[active[remaining], :2] + 0.5**halving * steps[remaining]
+                candidates = self.map_with_derivatives(trials, n_periods)
                 # A step that is already accurate to rounding need not reduce the residual.
                 better[remaining] = reduced = self.compute_residuals(candidates)[0] < residual[active[remaining]]
                 new[remaining[reduced]] = candidates[reduced]

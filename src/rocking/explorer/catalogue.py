@@ -11,7 +11,7 @@ from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from rocking import records
-from rocking.analysis.levels import number_labels
+from rocking.analysis.levels import assign_numbers
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer.parameters import PARAMETERS, Texts, field_label, list_names
 from rocking.explorer.uploads import UploadStore, compute_measures
@@ -111,7 +111,7 @@ def number_stations(entries: list[dict[str, str]], uploads: UploadStore) -> list
             label = (row.event, row.station) if row.station else (group[0].key, group[0].texts.get("channel"))
             station_labels[row.texts["motion"], row.texts.get("channel")] = label
     record_keys = [(entry["motion"], entry.get("channel")) for entry in entries]
-    return [*map(int, number_labels([station_labels.get(key, key) for key in record_keys]))]
+    return [*map(int, assign_numbers([station_labels.get(key, key) for key in record_keys]))]
 
 
 def find_title(texts: Texts, uploads: UploadStore) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.analysis.levels import compute_ratios
+from rocking.analysis.levels import RATIO_VARIABLES, compute_ratios
 from rocking.analysis.overturning import classify_modes
 from rocking.block import Blocks
 from rocking.block.sides import housner_restitution
@@ -148,9 +148,7 @@ def simulate_grid(grid: MapGrid) -> Generator[MapPart]:
         quantities = {
             "outcome": outcome,
             "rest": np.where(results["rests"] > 0, rest_duration, np.nan),
-            "peak": compute_ratios(
-                results["peak_rotation"], results["overturned"], results["unfinished"], alpha.min(axis=1)
-            ),
+            "peak": compute_ratios(alpha.min(axis=1), *(results[name] for name in RATIO_VARIABLES)),
             "mode": np.where(results["unfinished"], np.nan, classify_modes(results, grid.motion.duration)),
         }
         values = np.array([quantities[name] for name in QUANTITIES], np.float32)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import re
 import sys
 import textwrap
@@ -151,12 +150,6 @@ def _count_letters(width: float, dpi: float, letter_width: float = _LETTER_WIDTH
     return max(_MIN_LETTERS, int(width / (letter_width * dpi * float(STYLE["font.size"]) / 72.0)))
 
 
-def find_magnification(largest: float) -> tuple[float, str]:
-    """Find a power of a thousand that scales values up to `largest`, and its words for a label."""
-    power = 3 * max(0, math.ceil((-math.log10(largest) - 0.5) / 3.0)) if largest > 0.0 else 0
-    return 10.0**power, f"$10^{{{power}}}$ " if power else ""
-
-
 def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
     """Label both axes, with lines about as long as the axes."""
     max_lengths = _LABEL_LENGTHS[0] * axes.bbox.width, _LABEL_LENGTHS[1] * axes.bbox.height
@@ -186,7 +179,7 @@ def add_ticks(axes: Axes, positions: Floats, height: float, marker: str = "|", *
     axes.plot(positions, np.full(positions.size, height), marker, transform=axes.get_xaxis_transform(), **style)
 
 
-def find_cell_edges(x: Floats) -> Floats:
+def compute_cell_edges(x: Floats) -> Floats:
     """Compute the edges of the cells around positions: the midpoints, or a tenth away from a single position."""
     if x.size == 1:
         half_width = max(0.1 * abs(float(x[0])), 1e-9)

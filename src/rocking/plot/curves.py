@@ -59,9 +59,8 @@ def draw_fragility(
             axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
             axes.plot(line.intensity, line.probability, linewidth=1.5, label=escape_dollars(line.label), **style)
             # Every limit state has its own marker.
-            axes.plot(
-                line.group_intensity, line.observed, "os^D"[k % 4], color=style["color"], clip_on=False, **_GROUP_MARKER
-            )
+            dots = _GROUP_MARKER | {"color": style["color"], "clip_on": False}
+            axes.plot(line.group_intensity, line.observed, "os^D"[k % 4], **dots)
         is_bounded = any(np.any(line.lower < line.upper) for line in lines)
         axes.fill_between([], [], color=GROUND, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
         axes.plot([], [], "o", color=GROUND, label="dot: share of outcomes at about its intensity", **_GROUP_MARKER)
@@ -166,7 +165,7 @@ def draw_survival(
     return page.figure
 
 
-def _is_inside(intensity: Floats, bounds: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _is_inside(intensity: Floats, bounds: tuple[float, float]) -> Flags:
     return np.asarray((intensity >= bounds[0]) & (intensity <= bounds[1]))
 
 
@@ -296,13 +295,8 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
         for k, motion in enumerate(motions):
             style = CURVES[k] if has_few else {"color": GROUND, "linewidth": 0.6}
             peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
-            line_style: dict[str, Any] = {
-                "marker": ".",
-                "markersize": 5.0 if has_few else 3.0,
-                "markeredgewidth": 0.0,
-                **style,
-            }
-            curves.plot(peak, motion.levels, label=names[k] if has_few else "each motion", **line_style)
+            label, size = (names[k], 5.0) if has_few else ("each motion", 3.0)
+            curves.plot(peak, motion.levels, label=label, marker=".", markersize=size, markeredgewidth=0.0, **style)
             for panel in strips:
                 for band in motion.bands:
                     # Lines at the ends keep the thinnest strip visible.
@@ -311,12 +305,13 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
         if not has_few:
             all_peaks = np.concatenate([motion.peak for motion in motions])
             peaks = np.linspace(0.0, float(np.max(all_peaks[np.isfinite(all_peaks)], initial=0.0)), 200)[1:]
-            reached = np.sort([find_reaching_levels(motion, peaks) for motion in motions], axis=0)
+            reached = np.sort([compute_reaching_levels(motion, peaks) for motion in motions], axis=0)
             for share, linestyle in _FRACTILE_LINES.items():
                 # Lowest level that suffices for this fraction of the motions.
                 level = reached[int(np.ceil(share * len(motions))) - 1]
-                line_style = {"linestyle": linestyle, "label": f"level that suffices for {100 * share:g} % of them"}
-                curves.plot(peaks, np.where(np.isfinite(level), level, np.nan), color=ABOVE, **line_style)
+                label = f"level that suffices for {100 * share:g} % of them"
+                finite_level = np.where(np.isfinite(level), level, np.nan)
+                curves.plot(peaks, finite_level, color=ABOVE, linestyle=linestyle, label=label)
         curves.set(xlim=(0.0, None), ylim=(0.0, min(1.5 * float(standing_levels.max(initial=0.0)) or last, last)))
         curves.grid(True)
         add_labels(curves, "peak rotation / slenderness", level_label)
@@ -328,7 +323,7 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
     return page.figure
 
 
-def find_reaching_levels(motion: ScaledMotion, peaks: Floats) -> Floats:
+def compute_reaching_levels(motion: ScaledMotion, peaks: Floats) -> Floats:
     """Find the lowest level at which a motion reaches each peak rotation; infinite if never."""
     overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
     is_below = motion.levels < overturns
@@ -336,8 +331,7 @@ def find_reaching_levels(motion: ScaledMotion, peaks: Floats) -> Floats:
     if not level.size:
         return np.full(peaks.shape, overturns)
     first = np.searchsorted(np.maximum.accumulate(peak), peaks)
-    upper = np.minimum(first, level.size - 1)
-    lower = np.maximum(upper - 1, 0)
+    lower, upper = (np.clip(first - shift, 0, level.size - 1) for shift in (1, 0))
     rise = np.where(peak[upper] > peak[lower], peak[upper] - peak[lower], np.inf)
     interpolated = level[lower] + (peaks - peak[lower]) / rise * (level[upper] - level[lower])
     return np.where(first < level.size, interpolated, overturns)
@@ -378,11 +372,10 @@ def draw_outcomes(
         order = np.argsort(probabilities, kind="stable")
         number, is_overturned = np.arange(1, order.size + 1), overturned[order]
         tests.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
-        tests.plot(
-            number[is_overturned], np.ones(is_overturned.sum()), "v", color=ABOVE, label="overturned", **_TEST_MARKER
-        )
+        fallen, standing = number[is_overturned], number[~is_overturned]
+        tests.plot(fallen, np.ones(fallen.size), "v", color=ABOVE, label="overturned", **_TEST_MARKER)
         standing_style: Any = {"color": INK, "mfc": "white", "label": "did not overturn", **_TEST_MARKER}
-        tests.plot(number[~is_overturned], np.zeros((~is_overturned).sum()), "o", **standing_style)
+        tests.plot(standing, np.zeros(standing.size), "o", **standing_style)
         tests.set_ylim(0.0, 1.0)
         tests.grid(True)
         add_labels(tests, "test, by its probability", "probability of overturning")
@@ -424,13 +417,12 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
     edges = np.histogram_bin_edges(parameter.values, _BIN_COUNT)
     for bound in parameter.bounds:
         axes.axvline(bound, color=GROUND, linewidth=1.0, linestyle=(0, (3, 2)), label="bound")
+    transform = axes.get_xaxis_transform()
     for k, (name, style) in enumerate(styles.items()):
         shares = np.histogram(parameter.values[:, k], edges, weights=weights)[0]
         axes.stairs(shares, edges, linewidth=1.1, label=name, **style)
-        median, low, high = parameter.estimates[k]
-        transform = axes.get_xaxis_transform()
-        height = 0.97 - 0.07 * k
-        axes.plot([low, median, high], [height] * 3, "|-", color=style["color"], linewidth=1.0, transform=transform)
+        ends, height = np.sort(parameter.estimates[k]), 0.97 - 0.07 * k
+        axes.plot(ends, [height] * 3, "|-", color=style["color"], linewidth=1.0, transform=transform)
     axes.plot([], [], "|-", color=GROUND, linewidth=1.0, markersize=7.0, label="centre: median and 90 %")
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.set_yticks([])

@@ -20,7 +20,7 @@ from rocking.plot.canvas import (
     FigureOptions,
     add_labels,
     choose_styles,
-    find_cell_edges,
+    compute_cell_edges,
     open_page,
 )
 
@@ -42,13 +42,8 @@ _LATER_COLOUR: Final = "#b0390c"
 _STAY_STYLES: Final = (("#ffffff", ""), ("#5d7da6", ""), ("#dde7f0", ""))
 _AFTER_REST_STYLE: Final = ("#b0390c", "ooo")
 _UNFINISHED_STYLE: Final = ("#b5b5b5", "++")
-_OVERTURN_STYLES: Final = (
-    ("#7d2706", ""),
-    ("#d9692a", "////"),
-    ("#eda565", "\\\\\\\\"),
-    ("#f8cf9f", "xxxx"),
-    ("#fbe7cd", "...."),
-)
+_OVERTURN_COLOURS: Final = ("#7d2706", "#d9692a", "#eda565", "#f8cf9f", "#fbe7cd")
+_OVERTURN_HATCHES: Final = ("", "////", "\\\\\\\\", "xxxx", "....")
 
 #: Fraction of the frame below which a region is invisible, and of its height below which lines hide it.
 _MIN_VISIBLE_AREA: Final = 1e-3
@@ -86,7 +81,7 @@ def draw_outcome_map(
             for ink, width in (("#ffffff", 2.0), (_LATER_COLOUR, 0.9)):
                 style: dict[str, Any] = {"cmap": ListedColormap(["none"]), "edgecolor": ink, "linewidth": 0.0}
                 with rc_context({"hatch.linewidth": width}):
-                    axes.pcolor(find_cell_edges(x), find_cell_edges(y), cells, hatch="////", **style)
+                    axes.pcolor(compute_cell_edges(x), compute_cell_edges(y), cells, hatch="////", **style)
             page.handles.append(_create_patch(("#ffffff", "////"), "overturns later"))
         add_labels(axes, x_label, y_label)
     return page.figure
@@ -98,7 +93,7 @@ def _colour_cells(axes: Axes, x: Floats, y: Floats, numbers: NDArray[np.integer]
 
     norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
     style: dict[str, Any] = {"cmap": ListedColormap([*colours]), "norm": norm, "rasterized": True}
-    axes.pcolormesh(find_cell_edges(x), find_cell_edges(y), numbers, **style)
+    axes.pcolormesh(compute_cell_edges(x), compute_cell_edges(y), numbers, **style)
 
 
 def draw_regions(
@@ -131,15 +126,14 @@ def draw_regions(
     with open_page((5.6, 4.6), **options) as page:
         (axes,) = page.create_panels()
         for start, end in pairwise([*starts, len(x)]):
-            rows = [(x[k], edges[k]) for k in range(start, end)]
+            abscissae, rows = [*x[start:end]], [*edges[start:end]]
             if start > 0:
-                rows.insert(
-                    0, (np.mean(x[start - 1 : start + 1]), _interpolate(start, start - 1, edges, regions, farthest))
-                )
+                abscissae.insert(0, np.mean(x[start - 1 : start + 1]))
+                rows.insert(0, _interpolate(start, start - 1, edges, regions, farthest))
             if end < len(x):
-                rows.append((np.mean(x[end - 1 : end + 1]), _interpolate(end - 1, end, edges, regions, farthest)))
-            abscissae = np.array([abscissa for abscissa, _ in rows])
-            levels = np.array([[low, *row, high] for _, row in rows]).T
+                abscissae.append(np.mean(x[end - 1 : end + 1]))
+                rows.append(_interpolate(end - 1, end, edges, regions, farthest))
+            levels = np.array([[low, *row, high] for row in rows]).T
             is_visible = np.diff(levels, axis=0).max(axis=1) > _MIN_STRIP_HEIGHT * (high - low)
             for k, region in enumerate(regions[start]):
                 colour, hatch = _choose_style(region)
@@ -166,11 +160,9 @@ def _interpolate(
 ) -> Floats:
     """Interpolate a column's boundaries half way to its neighbour: to the nearest alike, closed, or unchanged."""
     ordinates, neighbour_ordinates = np.array(edges[k], dtype=float), np.array(edges[neighbour], dtype=float)
-    pairs = [*pairwise(regions[neighbour])]
-    is_alike = np.array(
-        [[pair == neighbour_pair for neighbour_pair in pairs] for pair in pairwise(regions[k])], dtype=bool
-    )
+    others = [*pairwise(regions[neighbour])]
     distance = np.abs(ordinates[:, None] - neighbour_ordinates)
+    is_alike = np.array([[pair == other for other in others] for pair in pairwise(regions[k])], dtype=bool)
     is_alike = is_alike.reshape(distance.shape) & (distance < max_distance)
     distance[~is_alike] = np.inf
     nearest = [distance.min(axis=axis, initial=np.inf, keepdims=True) for axis in (0, 1)]
@@ -187,7 +179,8 @@ def _choose_style(region: int) -> tuple[str, str]:
     """Choose colour and hatch of a region: -5 unfinished, -4 overturns after a rest, -3 to -1 stays, else impacts."""
     if region < 0:
         return (_UNFINISHED_STYLE, _AFTER_REST_STYLE, *_STAY_STYLES)[region + 5]
-    return _OVERTURN_STYLES[min(region, len(_OVERTURN_STYLES) - 1)]
+    k = min(region, len(_OVERTURN_COLOURS) - 1)
+    return _OVERTURN_COLOURS[k], _OVERTURN_HATCHES[k]
 
 
 def _create_patch(style: tuple[str, str], label: str) -> Patch:
@@ -222,12 +215,11 @@ def draw_blocks(
     with open_page((columns * _PANEL_SIZE[0] + 0.6, len(rows) * _PANEL_SIZE[1] + 0.4), **options) as page:
         for axes, (name, values) in zip(page.create_panels(rows), panels.items(), strict=True):
             is_finite, degrees = np.isfinite(values), np.degrees(alpha)
-            markers = axes.scatter(
-                p[is_finite], degrees[is_finite], c=values[is_finite], marker="s", linewidth=0.0, **size, **shades
-            )
+            style: dict[str, Any] = {"c": values[is_finite], "marker": "s", "linewidth": 0.0, **size, **shades}
+            markers = axes.scatter(p[is_finite], degrees[is_finite], **style)
             if not is_finite.all():
-                style: dict[str, Any] = {"color": ABOVE, "linewidth": 0.7, "label": missing_label}
-                axes.scatter(p[~is_finite], degrees[~is_finite], marker="x", **size, **style)
+                style = {"color": ABOVE, "marker": "x", "linewidth": 0.7, "label": missing_label, **size}
+                axes.scatter(p[~is_finite], degrees[~is_finite], **style)
             add_labels(axes, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
                 axes.set_title(escape_dollars(name), color=INK)
@@ -269,13 +261,9 @@ def draw_basins(
             handles.append(_create_patch((shade, ""), name))
             inside = points[(points >= [x[0], y[0]]).all(axis=1) & (points <= [x[-1], y[-1]]).all(axis=1)]
             if kind == "orbit" and len(inside):
-                style: dict[str, Any] = {
-                    "marker": _MARKERS[k % len(_MARKERS)],
-                    "markersize": 4.5,
-                    "markeredgewidth": 0.8,
-                }
-                style |= {"linestyle": "", "color": "white", "markeredgecolor": INK, "label": f"{name}: its points"}
-                handles += axes.plot(*inside.T, **style)
+                style: dict[str, Any] = {"linestyle": "", "marker": _MARKERS[k % len(_MARKERS)], "markersize": 4.5}
+                style |= {"color": "white", "markeredgecolor": INK, "markeredgewidth": 0.8}
+                handles += axes.plot(*inside.T, label=f"{name}: its points", **style)
         add_labels(axes, x_label, y_label)
         page.handles = handles
     return page.figure
@@ -304,11 +292,10 @@ def draw_rose(
         _set_plan_view(main, float(max(acceleration.max(), np.abs(support).max())))
         label = "support over height of centre of mass"
         main.add_patch(Polygon(support, facecolor=REST, edgecolor=GROUND, linewidth=1.0, label=label))
-        main.plot(
-            *_find_points(azimuth, acceleration), color=INK, linewidth=1.4, label="ground acceleration that lifts it"
-        )
+        label = "ground acceleration that lifts it"
+        main.plot(*_convert_to_points(azimuth, acceleration), color=INK, linewidth=1.4, label=label)
         label = f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg"
-        end = _find_points(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
+        end = _convert_to_points(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
         main.plot(*np.insert(end, 0, 0.0, axis=1), color=ABOVE, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
         add_labels(main, "towards west and east (g)", "towards south and north (g)")
     return page.figure
@@ -321,7 +308,7 @@ def draw_shares(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **opt
         _set_plan_view(axes, 1.0)
         for share, label, style in zip(shares, labels, choose_styles(len(labels)), strict=True):
             line_style = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": escape_dollars(label), **style}
-            axes.plot(*_find_points(azimuth, share), **line_style)
+            axes.plot(*_convert_to_points(azimuth, share), **line_style)
         add_labels(axes, "share towards west and east", "share towards south and north")
     return page.figure
 
@@ -331,7 +318,7 @@ def _close_circle(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
     return np.append(azimuth, azimuth[0] + 360.0), np.append(values, values[0])
 
 
-def _find_points(azimuth: Floats, values: Floats) -> Floats:
+def _convert_to_points(azimuth: Floats, values: Floats) -> Floats:
     """Convert azimuths and distances to the points of a closed line, shape (2, n)."""
     closed_azimuth, distances = _close_circle(azimuth, values)
     angle = np.deg2rad(closed_azimuth)

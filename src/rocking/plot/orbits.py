@@ -31,6 +31,7 @@ _MARKERS: Final = {
     "uplift": ">",
 }
 _OTHER_MARKER: Final = "P"
+_BIFURCATION_STYLE: Final[Any] = {"color": INK, "markersize": 4.5, "mfc": GROUND, "linestyle": "", "zorder": 4}
 
 
 def draw_orbit(
@@ -82,16 +83,9 @@ def draw_branches(
             mask = is_branch if name == "stable" else is_joined
             if np.any(is_branch & ~np.isnan(values)):
                 axes.plot(np.where(mask, values, np.nan), np.where(mask, heights, np.nan), label=name, **style)
-        markers: dict[str, Any] = {
-            "color": INK,
-            "markersize": 4.5,
-            "markerfacecolor": GROUND,
-            "linestyle": "",
-            "zorder": 4,
-        }
         for kind in dict.fromkeys(name for name, _, _ in marks):
             points = np.array([(value, height) for name, value, height in marks if name == kind])
-            axes.plot(points[:, 0], points[:, 1], marker=_MARKERS.get(kind, _OTHER_MARKER), label=kind, **markers)
+            axes.plot(*points.T, marker=_MARKERS.get(kind, _OTHER_MARKER), label=kind, **_BIFURCATION_STYLE)
         axes.margins(x=0.04, y=0.06)
         add_labels(axes, *labels)
     return page.figure

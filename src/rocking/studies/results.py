@@ -17,18 +17,18 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.analysis.curve import fit_curve
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.levels import (
+    assign_clusters,
     check_limit,
     check_limit_states,
+    compute_exceedances,
     compute_intensities,
     compute_ratios,
     compute_units,
     describe_polarities,
     describe_pool,
     describe_sample,
-    exceeds_limit,
     find_single_block,
     normalise_positive_weights,
-    number_clusters,
 )
 from rocking.analysis.spectrum import compute_fractiles, compute_overturned_share
 from rocking.block.body import Bodies
@@ -250,7 +250,7 @@ def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
                 "without a duration"
             )
         alpha = compute_slenderness(store.product.bodies.select(blocks))
-        yield blocks, compute_ratios(peak, overturned != 0.0, unfinished != 0.0, alpha)
+        yield blocks, compute_ratios(alpha, peak, overturned != 0.0, unfinished != 0.0)
 
 
 def _mark_repeated(bodies: Bodies, polarities: int) -> Flags:
@@ -437,9 +437,9 @@ def fit_pooled_fragility(
         trials += is_known.sum(axis=2, dtype=float) @ membership
         missing += int(np.count_nonzero(~is_known))
         for name, limit in limits.items():
-            counts[name] += exceeds_limit(ratios, limit, name).sum(axis=2) @ membership
+            counts[name] += compute_exceedances(ratios, limit, name).sum(axis=2) @ membership
     has_trials = trials > 0.0
-    labels = number_clusters(product.motions, clusters)
+    labels = assign_clusters(product.motions, clusters)
     x, groups = (
         _compute_intensities(product, measure)[:, :, None] / units,
         np.broadcast_to(labels[:, None, None], has_trials.shape),
@@ -499,7 +499,7 @@ def fit_block_fragilities(
     estimates = {name: np.full((len(limits), len(bodies)), np.nan) for name in _CURVE_VARIABLES}
     faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
     intensities, units = _compute_intensities(product, measure).ravel(), compute_units(bodies, measure, product.model)
-    labels = np.repeat(number_clusters(product.motions, clusters), scales)
+    labels = np.repeat(assign_clusters(product.motions, clusters), scales)
     fit = partial(fit_fragility, measure=measure, confidence=confidence)
     with Progress("fitting", len(bodies) * len(limits)) as bar:
         for blocks, ratios in _iterate_peak_ratios(store):
@@ -508,7 +508,7 @@ def fit_block_fragilities(
             distinct = np.where(repeated, np.nan, ratios)
             all_trials = np.count_nonzero(~np.isnan(distinct), axis=2).reshape(-1, distinct.shape[3])
             for i, (name, limit) in enumerate(limits.items()):
-                all_exceeded = exceeds_limit(distinct, limit, name).sum(axis=2).reshape(-1, distinct.shape[3])
+                all_exceeded = compute_exceedances(distinct, limit, name).sum(axis=2).reshape(-1, distinct.shape[3])
                 for j, trials, exceeded in zip(range(len(bodies))[blocks], all_trials.T, all_exceeded.T, strict=True):
                     has_trials = trials > 0
                     data = intensities[has_trials] / units[j], {name: exceeded[has_trials]}
