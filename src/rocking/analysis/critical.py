@@ -11,7 +11,7 @@ from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.bisection import bisect
 from rocking.core.constants import Model
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
 from rocking.response import Gradient, gradient
@@ -90,9 +90,9 @@ def critical_scale(
 
     Raises
     ------
-    InvalidMotion
+    MotionError
         If `motion` is not a `Motion`.
-    InvalidOption
+    OptionError
         If there is no motion, the block overturns at the lower scale or stands at the higher one, or the scales are not
         positive and increasing.
 
@@ -115,16 +115,16 @@ def critical_scale(
     '3.256134'
     """
     if check_motion(motion) is None:
-        raise InvalidOption("a critical scale requires a {}; got None", "motion")
-    low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
-    checks.positive(low, "bounds", InvalidOption)
+        raise OptionError("a critical scale requires a {}; got None", "motion")
+    low, high = checks.increasing_pair(bounds, "bounds", OptionError)
+    checks.positive(low, "bounds", OptionError)
 
     run = partial(simulate, block, model=model, initial_rotation=initial_rotation, initial_velocity=initial_velocity)
     for bound, expected in ((low, False), (high, True)):
         if run(motion * bound).overturned is not expected:
             behaviour, correction = ("does not overturn", "raise") if expected else ("overturns", "lower")
             message = f"the block {behaviour} at the scale {bound:g}: {correction} it in {{}}"
-            raise InvalidOption(message, "bounds", value=bounds)
+            raise OptionError(message, "bounds", value=bounds)
     _, scale = bisect(low, high, lambda scale: run(motion * scale).overturned)
     response = run(motion * scale)
     derivatives = response.sensitivity.events

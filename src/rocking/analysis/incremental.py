@@ -31,7 +31,7 @@ from rocking.core.tables import add_unit, escape_dollars, format_count, format_t
 from rocking.engine.problem import compute_slenderness, compute_thresholds, gather_bodies, never_rests
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, simulate_each
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, list_motions
@@ -82,9 +82,9 @@ def incremental_dynamic_analysis(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range.
-    InvalidMotion
+    MotionError
         If a motion is zero throughout.
 
     See Also
@@ -118,14 +118,14 @@ def incremental_dynamic_analysis(
     values = compute_intensities(motion_list, measure)
     if never_rests(bodies):
         reason = "because otherwise the block never comes to rest"
-        raise InvalidOption(f"{{}} must be below 1 for an incremental dynamic analysis, {reason}", "restitution")
-    relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
+        raise OptionError(f"{{}} must be below 1 for an incremental dynamic analysis, {reason}", "restitution")
+    relative_width = checks.between(rtol, "rtol", OptionError, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model}
     lowest_uplift = _compute_lowest_uplift(bodies, motion_list, values, measure, model)
     if levels is None:
         table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
     else:
-        level_values = checks.increasing_numbers(levels, "levels", InvalidOption)
+        level_values = checks.increasing_numbers(levels, "levels", OptionError)
         table = simulate_levels(bodies, motion_list, measure, level_values, **options)
     factors = compute_units(bodies, measure, model)[None, :] / values[:, None]
     # The scheme of the levels determines how often the restitution is drawn.
@@ -204,7 +204,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
     def _check_position(self, position: object, dimension: str) -> int:
-        return checks.integer(position, dimension, InvalidOption, 0, self.data.sizes[dimension] - 1)
+        return checks.integer(position, dimension, OptionError, 0, self.data.sizes[dimension] - 1)
 
     def summary(self) -> str:
         data, levels = self.data, _LevelDescription(self.data.level)
@@ -282,7 +282,7 @@ def _compute_lowest_uplift(
     lowest = float(np.min(np.array(factors) * values[:, None] / compute_units(blocks, measure, model)))
     if math.isinf(lowest):
         message = "no motion lifts a block at any level, because of direction or vertical component"
-        raise InvalidOption(f"{message}; use other motions")
+        raise OptionError(f"{message}; use other motions")
     return lowest
 
 

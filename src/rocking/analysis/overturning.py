@@ -22,7 +22,7 @@ from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import add_unit, columns_to_records, escape_dollars, format_cell, format_table
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import OUTCOME, Setup, simulate_each
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import MotionError, OptionError
 from rocking.inputs.pulses import find_family
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
@@ -126,10 +126,10 @@ def overturning_map(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range, the shape of the pulse depends on the frequency (for example because of a fixed
         `duration`) or the amplitude, or the block never comes to rest (restitution 1).
-    InvalidMotion
+    MotionError
         If a function does not return a motion.
 
     See Also
@@ -159,14 +159,14 @@ def overturning_map(
     >>> print(f"{float(result.data.overturning_amplitude[0]):.5f}")
     1.80072
     """
-    levels = checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption)
-    ratios = checks.increasing_numbers(frequencies, "frequencies", InvalidOption)
-    checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
-    relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
+    levels = checks.increasing_numbers(amplitudes, "amplitudes", OptionError)
+    ratios = checks.increasing_numbers(frequencies, "frequencies", OptionError)
+    checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, OptionError)
+    relative_width = checks.between(rtol, "rtol", OptionError, 1e-15, 0.5)
     require_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
         message = "{} must be below 1 for an overturning map, because otherwise the block never comes to rest"
-        raise InvalidOption(message, "restitution")
+        raise OptionError(message, "restitution")
     min_p = min(side.p for side in block.sides)
     create_pulse, frequency = _create_pulse_function(pulse, parameters), min_p / (2.0 * math.pi)
     unit = _call_pulse(create_pulse, 1.0, frequency)
@@ -175,7 +175,7 @@ def overturning_map(
         scaled_pulse = _call_pulse(create_pulse, amplitude, ratio * frequency)
         pairs = (unit, scaled_pulse), (unit.vertical, scaled_pulse.vertical)
         if not all(_is_alike(first, second, amplitude, ratio) for first, second in pairs):
-            raise InvalidOption(
+            raise OptionError(
                 "the {} must have the same shape at all frequencies: proportional to the amplitude, and half as long "
                 f"at twice the frequency; the shapes at {frequency:g} Hz and at {ratio * frequency:g} Hz differ",
                 "pulse",
@@ -366,12 +366,12 @@ def _create_pulse_function(
     if callable(pulse):
         if parameters:
             message = f"{{}} is a function, so that no parameters are accepted; got {', '.join(parameters)}"
-            raise InvalidOption(f"{message}; set them in it", "pulse", value=parameters)
+            raise OptionError(f"{message}; set them in it", "pulse", value=parameters)
         return pulse
     family = find_family(pulse)
     if family.name not in PULSES:
         message = f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}"
-        raise InvalidOption(message, "pulse", value=pulse)
+        raise OptionError(message, "pulse", value=pulse)
 
     def create_named_pulse(amplitude: float, frequency: float) -> Motion:
         motion = family.create_motion({"amplitude": 1.0, "frequency": frequency} | parameters)
@@ -383,7 +383,7 @@ def _create_pulse_function(
 def _call_pulse(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
     if (motion := check_motion(pulse(amplitude, frequency))) is None:
         arguments = f"amplitude {amplitude:g} and frequency {frequency:g}"
-        raise InvalidMotion(f"the pulse of {arguments} is None; return a Motion")
+        raise MotionError(f"the pulse of {arguments} is None; return a Motion")
     return motion
 
 

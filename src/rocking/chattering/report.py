@@ -17,7 +17,7 @@ from rocking.chattering.expansions import MAX_ORDER, asymptotic_table, first_imp
 from rocking.core import checks
 from rocking.core.result import Result, format_some_rows
 from rocking.core.tables import Column, format_count
-from rocking.errors import InvalidOption, OutsideFit
+from rocking.errors import OptionError, OutsideFitWarning
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,7 +93,7 @@ class ChatteringReport(Result):
     def table(self) -> str:
         """Return at most a dozen cycles of the iterative procedure of the paper, one per row.
 
-        Raise `InvalidOption` without energy loss at impacts.
+        Raise `OptionError` without energy loss at impacts.
         """
         header = ["n", "sign", "term", "interval, p t", "time, p t", "phase, rad", "speed before", "speed after"]
         rows = [
@@ -124,7 +124,7 @@ class ChatteringReport(Result):
         rows = self.impacts if table == "impacts" else self.cycles
         if rows is None:
             reason = "because without energy loss chattering never ends"
-            raise InvalidOption(f"{{}} must be below 1 for the iterative procedure, {reason}", "eta")
+            raise OptionError(f"{{}} must be below 1 for the iterative procedure, {reason}", "eta")
         return [Column(name, rows[name]) for name in rows.dtype.names or ()]
 
     def _describe_completeness(self) -> str:
@@ -182,14 +182,14 @@ def chattering_report(
     time of rest, exact           1.12594768 (0.562974 s)
     """
     if p is not None:
-        p = checks.positive(p, "p", InvalidOption, "rad/s")
+        p = checks.positive(p, "p", OptionError, "rad/s")
     chattering = sequence(a, omega, eta)
     interval = speed = 0.0 if chattering.complete else math.nan
     if chattering.impacts.size:
         interval, speed = chattering.impacts[["interval", "speed_before"]][0]
-    checks.integer(order, "order", InvalidOption, 1, MAX_ORDER)
+    checks.integer(order, "order", OptionError, 1, MAX_ORDER)
     series = math.nan
-    with suppress(InvalidOption):  # double precision does not resolve this many terms
+    with suppress(OptionError):  # double precision does not resolve this many terms
         series = float(chattering_time(a, omega, eta, method="series", order=order))
     compute = partial(chattering_time, a, omega, eta, resolved=resolved)
     times = {method: float(compute(method=method)) for method in ("exact", "asymptotic", "semianalytical")}
@@ -285,8 +285,8 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
     amplitudes: dict[str, float | None] = dict.fromkeys(_METHOD_LABELS)
     amplitudes["exact"] = float(critical_amplitude(omega, eta))
     with warnings.catch_warnings():
-        warnings.simplefilter("error", OutsideFit)
+        warnings.simplefilter("error", OutsideFitWarning)
         for method in [*_METHOD_LABELS][1:]:  # outside its range an approximation has no value
-            with suppress(InvalidOption, OutsideFit):
+            with suppress(OptionError, OutsideFitWarning):
                 amplitudes[method] = float(critical_amplitude(omega, eta, method=method))
     return CriticalReport(omega, eta, amplitudes)

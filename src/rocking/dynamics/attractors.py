@@ -16,7 +16,7 @@ from rocking.core.arrays import Flags, Floats, Integers, select_evenly
 from rocking.core.tables import format_count
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import compute_moduli, compute_multipliers
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels.periodic import TRAP
 from rocking.kernels.state import Records
 
@@ -73,7 +73,7 @@ def find_attractor(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
     period = int(recurrences[0]) + 1
     try:
         point, derivative = _find_fixed_point(strobe, orbit[-1], period, size)
-    except (np.linalg.LinAlgError, InvalidOption):  # a multiplier of exactly 1; a step that leads behind a stop
+    except (np.linalg.LinAlgError, OptionError):  # a multiplier of exactly 1; a step that leads behind a stop
         return None
     if np.isnan(point).any():
         return None

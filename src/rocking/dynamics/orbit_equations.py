@@ -29,7 +29,7 @@ from rocking.dynamics.orbits import (
     simulate_periods,
 )
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption, RockingError
+from rocking.errors import OptionError, RockingError
 from rocking.motion.motion import Motion
 from rocking.response import Response
 
@@ -117,12 +117,12 @@ class OrbitEquations:
         pair = family(value) if callable(family) else None
         if not isinstance(pair, tuple) or len(pair) != 2:
             message = "{} must be a function of the parameter that returns a body and one period of a motion"
-            raise InvalidOption(message, "family")
+            raise OptionError(message, "family")
         strobe = StroboscopicMap(*pair, orbit.model, orbit.chattering)
         scale = compute_scale(strobe)
         if not np.all(np.abs(strobe(orbit.state, orbit.period) - orbit.state) / scale < 1e-8):
             message = f"the orbit is not periodic for {{}} at {{}} = {value:g}; use the body and motion of the orbit"
-            raise InvalidOption(message, "family", "value", value=value)
+            raise OptionError(message, "family", "value", value=value)
         sizes, kind = np.array([*scale, bounds[1] - bounds[0]]), determine_kind(strobe, orbit.state, orbit.period)
         equations = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, bounds)  # type: ignore[arg-type]
         equations.uses_half_map = orbit.symmetric and not orbit.rests and equations.is_mirrored_throughout(value)
@@ -140,7 +140,7 @@ class OrbitEquations:
         strobe = self.create_map(value)
         if not has_mirror_symmetry(strobe):
             message = f"the body and motion have no mirror symmetry at {{}} = {value:g}"
-            raise InvalidOption(message, "value", value=value)
+            raise OptionError(message, "value", value=value)
         return HalfMap(strobe)
 
     def is_mirrored_throughout(self, value: float) -> bool:
