@@ -329,7 +329,7 @@ class Boundaries:
     @property
     def level(self) -> Floats:
         """Midpoint of every bracket."""
-        return bisection.find_middles(self.low, self.high)
+        return bisection.compute_midpoints(self.low, self.high)
 
 
 def find_boundaries(

@@ -15,7 +15,7 @@ from rocking.cli.output import (
     OUTPUT,
     PrintOptions,
     QuietOptions,
-    output_folder,
+    open_output_folder,
     print_result,
     skip_on_error,
     write_results,
@@ -107,8 +107,8 @@ def run(
     with set_options(threads=threads):
         report = opened.run(part=part)
     print(f"{report}\n{opened.folder}: {opened.status}")
-    for unit, reason in [*report.failed.items()][:_MAX_REPORTED]:
-        note(f"{unit} failed: {reason}")
+    for unit, message in [*report.failed.items()][:_MAX_REPORTED]:
+        note(f"{unit} failed: {message}")
     if report.failed:
         raise StudyError(f"{format_count(len(report.failed), 'unit')} failed; run the study again to repeat them")
     if report.stopped:
@@ -178,11 +178,8 @@ def export(
         Write the scales between which this outcome of a block changes instead.
     """
     if file.suffix not in WRITERS:
-        raise InvalidOption(
-            f"the name of an exported file must end with one of {', '.join(WRITERS)}; got {file.name}",
-            "file",
-            value=file,
-        )
+        message = f"the name of an exported file must end with one of {', '.join(WRITERS)}; got {file.name}"
+        raise InvalidOption(message, "file", value=file)
     WRITERS[file.suffix](Study(folder), file, critical=critical)
     print(f"written to {file}")
 
@@ -221,7 +218,7 @@ def report(
     checks.fraction(confidence, "confidence", InvalidOption)
     opened, results = Study(folder), dict[str, Result]()
     fit = opened.fragility if together else opened.block_fragilities
-    with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
+    with open_output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
         with skip_on_error("fragility", Unfitted):
             results["fragility"] = fit(measure=intensity_measure, limit_states=limits, confidence=confidence)
         results["spectrum"] = opened.spectrum(fractions.tolist())

@@ -238,11 +238,8 @@ class DatasetResult(Result):
             If a dimension or label does not exist, or the result contains numbers aggregated over that dimension.
         """
         for name in labels.keys() & {*self.POOLED}:
-            raise InvalidOption(
-                f"this result contains numbers aggregated over {name}; repeat the analysis for a part, or select from "
-                "`data`",
-                value=labels,
-            )
+            message = f"this result contains numbers aggregated over {name}; repeat the analysis for a part, or select"
+            raise InvalidOption(f"{message} from `data`", value=labels)
         selection = {name: np.atleast_1d(values) for name, values in labels.items()}
         data = self.data
         try:
@@ -252,9 +249,8 @@ class DatasetResult(Result):
                 data = data.sel({name: coordinate}, method="nearest" if numeric else None)
         except (KeyError, TypeError, ValueError, IndexError):
             names = ", ".join(map(str, data.sizes))
-            raise InvalidOption(
-                f"no values match {checks.short_repr(labels)}; the dimensions are {names}", value=labels
-            ) from None
+            message = f"no values match {checks.short_repr(labels)}; the dimensions are {names}"
+            raise InvalidOption(message, value=labels) from None
         return type(self)(self._restrict(data))
 
     @staticmethod

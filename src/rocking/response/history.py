@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.core.bisection import bisect, find_middles, halve
+from rocking.core.bisection import bisect, compute_midpoints, halve
 from rocking.core.tables import format_count
 from rocking.errors import InvalidOption
 from rocking.kernels import state
@@ -133,7 +133,7 @@ class TimeHistory:
         step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
         low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
         for _ in range(_BISECTIONS if len(step) else 0):
-            is_outward = sign * self.states_in(find_middles(low, high), rows)[:, 1] > 0.0
+            is_outward = sign * self.states_in(compute_midpoints(low, high), rows)[:, 1] > 0.0
             low, high = halve(low, high, is_outward, ~is_outward)
         np.maximum.at(peaks, step, np.abs(self.states_in(low, rows)[:, 0]))
         plus, minus = (float(np.max(peaks[side == k], initial=0.0)) for k in range(2))

@@ -87,10 +87,7 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
         placements = [(str(node), *graph[node]) for node in sorted(graph.nodes_geometry)]
         shapes = [(node, geometry[key], transform) for node, transform, key in placements]
     if max_faces is not None and (count := sum(len(getattr(shape, "faces", ())) for _, shape, _ in shapes)) > max_faces:
-        raise InvalidBlock(
-            f"contains {count} triangles; use a coarser mesh of at most {max_faces}",
-            path=path or name,
-        )
+        raise InvalidBlock(f"contains {count} triangles; use a coarser mesh of at most {max_faces}", path=path or name)
     parts = tuple(
         _place_part(node, shape, transform) for node, shape, transform in shapes if len(getattr(shape, "faces", ()))
     )

@@ -131,8 +131,7 @@ class Store:
         missing = len(self.grid) - len(self.find_done())
         if missing:
             raise StudyError(
-                f"{missing} of {len(self.grid)} units are missing; complete the study first",
-                path=str(self.folder),
+                f"{missing} of {len(self.grid)} units are missing; complete the study first", path=str(self.folder)
             )
 
     def read_outcomes(self, key: Key) -> Mapping[str, Floats] | None:

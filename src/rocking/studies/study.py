@@ -455,9 +455,7 @@ def _parse_part(part: str) -> tuple[int, int]:
     number, slash, count = str(part).partition("/")
     if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
         raise InvalidOption(
-            f"{{}} must be the number of a part and the number of parts, as 3/10; got {part}",
-            "part",
-            value=part,
+            f"{{}} must be the number of a part and the number of parts, as 3/10; got {part}", "part", value=part
         )
     return int(number), int(count)
 
