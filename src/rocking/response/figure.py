@@ -29,7 +29,7 @@ from rocking.plot.canvas import (
 )
 from rocking.plot.curves import draw_ground
 from rocking.response.simulated import Simulated
-from rocking.response.summary import format_time
+from rocking.response.summary import describe_subject, format_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,10 +50,9 @@ _MAX_RATIO: Final = 2.0
 _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 
 
-def make_title(response: Simulated) -> str:
+def create_title(response: Simulated) -> str:
     """Return the title of a figure: the body and its motion."""
-    motion_text = "no motion" if response.motion is None else response.motion.label
-    return escape_dollars(f"{response.block.description} under {motion_text}")
+    return escape_dollars(describe_subject(response))
 
 
 def find_active_span(response: Simulated) -> tuple[float, float]:
@@ -72,11 +71,8 @@ def resolve_window(response: Simulated, window: Sequence[float] | None) -> tuple
         return find_active_span(response)
     ends: Any = checks.numbers(window, "window", InvalidOption)
     if ends.shape != (2,) or not 0.0 <= ends[0] < ends[1] <= response.duration:
-        raise InvalidOption(
-            f"{{}} must be (start, end), in s, with 0 <= start < end <= {response.duration:.6g}, the duration",
-            "window",
-            value=window,
-        )
+        requirement = f"(start, end), in s, with 0 <= start < end <= {response.duration:.6g}, the duration"
+        raise InvalidOption(f"{{}} must be {requirement}", "window", value=window)
     return float(ends[0]), float(ends[1])
 
 
@@ -161,12 +157,10 @@ def _compute_ground_traces(response: Simulated, start: float, end: float) -> dic
     if motion is None:
         return {}
     times = motion.drawing_times(start, end)
-    components = {"ground acceleration (g)": motion, "vertical (g)": motion.vertical}
-    return {
-        name: (times, component.acceleration(times) / STANDARD_GRAVITY)
-        for name, component in components.items()
-        if component is not None
-    }
+    traces = {"ground acceleration (g)": (times, motion.acceleration(times) / STANDARD_GRAVITY)}
+    if motion.vertical is not None:
+        traces["vertical (g)"] = (times, motion.vertical.acceleration(times) / STANDARD_GRAVITY)
+    return traces
 
 
 def _find_longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
@@ -180,9 +174,8 @@ def _find_longest_sequence(response: Simulated, start: float, end: float) -> np.
 
 def _create_panels(page: Page, count: int, *, zoomed: bool) -> list[Axes]:
     """Return the panels of rotation and motion, above the panel of the chattering sequence."""
-    panels = page.create_panels(
-        ";".join("RGV"[:count] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:count]] + [1.0] * zoomed
-    )
+    heights = [*(1.3, 1.0, 0.7)[:count]] + [1.0] * zoomed
+    panels = page.create_panels(";".join("RGV"[:count] + "Z" * zoomed), height_ratios=heights)
     for axes in panels[1:count]:
         axes.sharex(panels[0])
     return panels[:count]
@@ -220,24 +213,21 @@ def _mark_overturning(axes: Axes, time: Floats, rotation: Floats, label: str) ->
     low, high = axes.get_ylim()
     inside = np.flatnonzero((rotation >= low) & (rotation <= high))
     end = inside[-1] if inside.size else -1
-    axes.plot(
-        time[end],
-        np.clip(rotation[end], low, high),
-        "X",
-        color=ABOVE,
-        markersize=7,
-        clip_on=False,
-        zorder=4,
-        label=label,
-    )
+    style: dict[str, Any] = {"color": ABOVE, "markersize": 7, "clip_on": False, "zorder": 4}
+    axes.plot(time[end], np.clip(rotation[end], low, high), "X", label=label, **style)
 
 
 def _label_sides(axes: Axes, factors: tuple[float, float]) -> None:
     """Label the sides, with the angle of 1 on each."""
-    for name, alignment, offset, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
+    for name, offset, factor in zip(("side +", "side −"), (2, -2), factors, strict=True):
         text = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
-        style = {"va": alignment, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
-        add_text(axes, text, (0.0, 0.0), (3, offset), **style)
+        _label_left_end(axes, text, 0.0, offset)
+
+
+def _label_left_end(axes: Axes, text: str, y: float, offset: float) -> None:
+    """Write a text at the left end of a horizontal line, above it for a positive offset, in points."""
+    alignment, transform = "bottom" if offset > 0.0 else "top", axes.get_yaxis_transform()
+    add_text(axes, text, (0.0, y), (3, offset), va=alignment, color=INK, fontsize="small", xycoords=transform)
 
 
 def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
@@ -254,9 +244,8 @@ def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration
             axes.fill_between(time, acceleration, threshold, where=is_beyond, label="beyond a threshold", **fill_style)
         axes.plot(time, threshold, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
         if pair[0] != pair[1]:
-            text, alignment = ("lifts to side +", "bottom") if sign < 0.0 else ("lifts to side −", "top")
-            text_style = {"va": alignment, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
-            add_text(axes, text, (0.0, threshold[0]), (3, -2.0 * sign), **text_style)
+            text = "lifts to side +" if sign < 0.0 else "lifts to side −"
+            _label_left_end(axes, text, threshold[0], -2.0 * sign)
 
 
 def _format_time_label(start: float, end: float, duration: float) -> str:
@@ -271,14 +260,8 @@ def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.voi
     low, high = ranges.T.max(axis=1, initial=0.0)
     first, last, transform = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
     main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=transform)
-    style: dict[str, Any] = {
-        "ha": "center",
-        "va": "bottom",
-        "color": ABOVE,
-        "fontweight": "bold",
-        "xycoords": transform,
-    }
-    add_text(main, "A", (0.5 * (first + last), 0.955), (0, 2), **style)
+    style: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold"}
+    add_text(main, "A", (0.5 * (first + last), 0.955), (0, 2), xycoords=transform, **style)
     rest, start, interval = 0.5 * (sequence["lower"] + sequence["upper"]), times[:-1], np.diff(times)
     # Logarithms are undefined for impacts closer than floating-point spacing.
     is_positive = (interval > 0.0) & (rest > start)
@@ -336,10 +319,8 @@ def compute_course(response: Simulated, start: float, end: float) -> Course:
 
     side_left, side_entered = energy.find_sides(impacts)
     side = insert(history.trail.nodes["side"][rows], side_left, side_entered).astype(np.int64)
-    v_before, v_after = (
-        (2.0 * side_left - 1.0) * impacts["speed_before"],
-        (1.0 - 2.0 * side_entered) * impacts["speed_after"],
-    )
+    v_before = (2.0 * side_left - 1.0) * impacts["speed_before"]
+    v_after = (1.0 - 2.0 * side_entered) * impacts["speed_after"]
     rotation, velocity = (insert(theta, 0.0 * impact_times, 0.0 * impact_times), insert(rate, v_before, v_after))
     side_index = np.maximum(side, 0)
     unit = energy.unit_of_rotation[side_index]

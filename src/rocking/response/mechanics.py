@@ -41,8 +41,10 @@ def check_friction(value: object) -> float:
     """Return a coefficient of friction, or raise `InvalidOption` if it is not in (0, 3]."""
     coefficient = checks.positive(value, "friction", InvalidOption)
     if coefficient > _MAX_FRICTION:
-        text = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}; use the tangent of an angle of friction"
-        raise InvalidOption(text, "friction", value=value)
+        message = (
+            f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}; use the tangent of an angle of friction"
+        )
+        raise InvalidOption(message, "friction", value=value)
     return coefficient
 
 
@@ -92,9 +94,8 @@ class Contact:
     def find_extremes(self) -> tuple[float, float]:
         """Return the largest friction required to stick, and the smallest normal force."""
         times, rows = self._sample_steps()
-        horizontal, vertical = (
-            force.reshape(times.shape) for force in self._compute_forces_in(times.ravel(), rows.ravel())
-        )
+        forces = self._compute_forces_in(times.ravel(), rows.ravel())
+        horizontal, vertical = (force.reshape(times.shape) for force in forces)
         friction, min_normal = float(compute_friction_demand(horizontal, vertical).max()), float(vertical.min())
 
         def refine_maximum(measure: ForceMeasure, beyond: Floats) -> float:
@@ -138,10 +139,8 @@ class Contact:
             values = self._evaluate(measure, times, rows)
             index = values.argmax(axis=1)[:, None]
             value, time_at_max = (np.take_along_axis(array, index, axis=1)[:, 0] for array in (values, times))
-            best_times, best_values = (
-                np.where(value > best_values, time_at_max, best_times),
-                np.maximum(value, best_values),
-            )
+            best_times = np.where(value > best_values, time_at_max, best_times)
+            best_values = np.maximum(value, best_values)
             low = np.take_along_axis(times, np.maximum(index - 1, 0), axis=1)
             high = np.take_along_axis(times, np.minimum(index + 1, times.shape[1] - 1), axis=1)
             times = low + (high - low) * np.linspace(0.0, 1.0, times.shape[1])
@@ -164,9 +163,8 @@ class Contact:
         current = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
         piece = np.where(at_rest, current, self.history.trail.nodes["piece"][rows])
         elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
-        push, *lift = (
-            piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in component_coefficients(ground, piece)
-        )
+        components = component_coefficients(ground, piece)
+        push, *lift = (piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in components)
         return push, lift[0] if lift else np.zeros_like(push)
 
     def _sample_steps(self) -> tuple[Floats, Integers]:
@@ -237,11 +235,8 @@ class Energy:
     @cached_property
     def balance_energy(self) -> Floats:
         """Potential energy at the balance of each side, divided by inertia, 1/s^2; infinite if there is none."""
-        energies = np.full(2, math.inf)
-        for k, balance in enumerate(self.balance):
-            if math.isfinite(balance):
-                energies[k] = float(self._potential(np.array([balance]), np.array([k]))[0])
-        return energies
+        is_finite = np.isfinite(self.balance)
+        return np.where(is_finite, self._potential(np.where(is_finite, self.balance, 0.0), np.arange(2)), math.inf)
 
     @cached_property
     def overturning_energy(self) -> Floats:
@@ -310,9 +305,8 @@ def find_linear_balance(body: Block | RestrainedBlock) -> Floats:
     elastic = _solve_linear_balance(record, record["added_weight"], record["added_push"], record["prestress"])
     if not record["yielding"]:
         return elastic
-    force = record["base_prestress"] + record["tendon_stiffness"] * (
-        record["yield_elongation"] - record["slack_elongation"]
-    )
+    stretch = record["yield_elongation"] - record["slack_elongation"]
+    force = record["base_prestress"] + record["tendon_stiffness"] * stretch
     return np.minimum(elastic, _solve_linear_balance(record, record["base_weight"], record["base_push"], force))
 
 

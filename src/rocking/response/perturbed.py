@@ -177,7 +177,7 @@ class Perturbed(Result):
         return f"{self.outcome} in {len(self.agreeing_repeats)} of {self.sample_text}"
 
     def describe_outcome(self) -> str:
-        """Return the outcome as text: `share`, or "undecided" and the number of overturnings if outcomes differ."""
+        """Return the outcome, or "undecided" and the number of overturnings if outcomes differ."""
         if self.is_decided:
             return self.describe_agreement()
         overturned = int(np.count_nonzero(self.overturned))
@@ -185,15 +185,11 @@ class Perturbed(Result):
         return f"undecided: {agreement}"
 
     def _columns(self, table: str) -> list[Column]:
-        (name, _, _, unit, _), columns = self.coordinate, list(zip(*self.repeats, strict=True))
-        return [
-            Column("factor", columns[0]),
-            Column("outcome", columns[1], label="outcome"),
-            Column(f"peak_{name}", columns[2], unit, f"peak, {unit}"),
-            Column("peak_time", columns[3], "s", "peak time, s"),
-            Column("overturn_time", columns[4], "s"),
-            Column("last_rest", columns[5], "s", "last rest, s"),
-        ]
+        (name, _, _, unit, _), values = self.coordinate, list(zip(*self.repeats, strict=True))
+        columns = [Column("factor", values[0]), Column("outcome", values[1], label="outcome")]
+        columns.append(Column(f"peak_{name}", values[2], unit, f"peak, {unit}"))
+        columns.append(Column("peak_time", values[3], "s", "peak time, s"))
+        return [*columns, Column("overturn_time", values[4], "s"), Column("last_rest", values[5], "s", "last rest, s")]
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the rows of `to_dataframe` as mappings, with units in the names."""
@@ -218,11 +214,11 @@ def check_factors(relative: float, count: int) -> list[float]:
     """Return the factors of `list_factors`, or raise `InvalidOption` if an argument is out of range."""
     step = checks.between(relative, "relative", InvalidOption, 1e-12, 0.1)
     if checks.integer(count, "count", InvalidOption, 3, 1001) % 2 == 0:
-        sentence = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
-        raise InvalidOption(sentence, "count", value=count)
+        message = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
+        raise InvalidOption(message, "count", value=count)
     if step * (count - 2) >= 1.0:
-        sentence = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
-        raise InvalidOption(sentence, "relative", value=step)
+        message = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
+        raise InvalidOption(message, "relative", value=step)
     return list_factors(step, count)
 
 

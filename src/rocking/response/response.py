@@ -126,18 +126,11 @@ class Response(Simulated):
             rows.append(Row("lift_off_time", self.lift_off_time, "s"))
         if friction is not None:
             rows += [Row("friction", friction), Row("sliding_time", self.sliding_time(friction), "s")]
+        rows += [Row("impacts_resolved", len(self.impacts)), Row("duration", self.duration, "s")]
         perturbed = [self.perturbed().to_dict(), self.perturbed(*choose_steps(precision)).to_dict()]
-        return [
-            *rows,
-            Row("impacts_resolved", len(self.impacts)),
-            Row("duration", self.duration, "s"),
-            Row("time_at_rest", self.time_at_rest, "s"),
-            Row("perturbed", perturbed),
-            Row("ambiguous", self.ambiguous),
-            Row("ambiguities", self.ambiguities),
-            Row("events", columns_to_records(self._convert_table("events"))),
-            Row("sequences", columns_to_records(self._convert_table("sequences"))),
-        ]
+        rows += [Row("time_at_rest", self.time_at_rest, "s"), Row("perturbed", perturbed)]
+        rows += [Row("ambiguous", self.ambiguous), Row("ambiguities", self.ambiguities)]
+        return [*rows, *(Row(name, columns_to_records(self._convert_table(name))) for name in ("events", "sequences"))]
 
     def _list_parameters(self) -> dict[str, Any]:
         parameters = self.block.as_bodies().parameters().items()
@@ -146,15 +139,11 @@ class Response(Simulated):
 
     def _build_outcome_rows(self) -> list[Row]:
         name, unit = self.block.coordinate.name, self.block.coordinate.unit
-        return [
-            Row("model", self.model),
-            Row("chattering", repr(self.chattering)),
-            *(Row(flag, getattr(self, flag)) for flag in ("overturned", "unfinished", "stopped", "leans")),
-            Row("overturn_time", self.overturn_time, "s"),
-            Row("tipping_time", self.tipping_time, "s"),
-            Row(f"peak_{name}", self.peak_rotation, unit),
-            Row(f"residual_{name}", self.residual_rotation, unit),
-        ]
+        rows = [Row("model", self.model), Row("chattering", repr(self.chattering))]
+        rows += [Row(flag, getattr(self, flag)) for flag in ("overturned", "unfinished", "stopped", "leans")]
+        rows += [Row(time, getattr(self, time), "s") for time in ("overturn_time", "tipping_time")]
+        rows.append(Row(f"peak_{name}", self.peak_rotation, unit))
+        return [*rows, Row(f"residual_{name}", self.residual_rotation, unit)]
 
     def summary(self, friction: float | None = None, *, precision: float = PRECISION) -> str:
         """Return a description of the response, line by line, as printed by ``rocking simulate``.
@@ -191,9 +180,7 @@ class Response(Simulated):
         import xarray as xr
 
         time, *histories = self._columns("histories", dt)
-        variables: dict[str, Any] = {
-            history.name: ("time", history.values, {"units": history.unit}) for history in histories
-        }
+        variables: dict[str, Any] = {name: ("time", values, {"units": unit}) for name, values, unit, _ in histories}
         for table, dimension in (("events", "event"), ("impacts", "impact"), ("sequences", "sequence")):
             for name, values, unit, _ in self._columns(table):
                 column = values.astype(object) if values.dtype.kind == "U" else values
@@ -207,11 +194,9 @@ class Response(Simulated):
             "motion": "none" if motion is None else motion.name,
             "vertical_motion": "none" if motion is None or motion.vertical is None else motion.vertical.name,
             "motion_history": "" if motion is None else "; ".join(motion.history),
-            **{
-                add_unit(row.name, row.unit): int(row.value) if isinstance(row.value, bool) else row.value
-                for row in rows
-            },
         }
+        for name, value, unit, _ in rows:
+            attributes[add_unit(name, unit)] = int(value) if isinstance(value, bool) else value
         return xr.Dataset(variables, {"time": ("time", time.values, {"units": "s"})}, attributes)
 
     @property
@@ -242,20 +227,19 @@ class Response(Simulated):
 
     def _build_histories(self, dt: float | None) -> list[Column]:
         motion, (name, rate, _, unit, _) = self.motion, self.block.coordinate
-        if dt is None:
-            dt = self._default_dt
-        step = checks.positive(dt, "dt", InvalidOption, "s")
+        step = checks.positive(self._default_dt if dt is None else dt, "dt", InvalidOption, "s")
         if self.duration > _MAX_POINTS * step:
-            problem = f"more than {_MAX_POINTS:,} points of {self.duration:g} s"
-            raise InvalidOption(f"{{}} = {step:g} s gives {problem}; use a longer step", "dt", value=dt)
+            message = (
+                f"{{}} = {step:g} s gives more than {_MAX_POINTS:,} points of {self.duration:g} s; use a longer step"
+            )
+            raise InvalidOption(message, "dt", value=dt)
         times = create_times(self.duration, step)
-        states = self.states(times)
+        states, ground = self.states(times), np.zeros_like(times) if motion is None else motion.acceleration(times)
         columns = [
             Column("time", times, "s"),
             Column(name, states[:, 0], unit),
             Column(rate, states[:, 1], f"{unit}/s"),
         ]
-        ground = np.zeros_like(times) if motion is None else motion.acceleration(times)
         columns.append(Column("ground_acceleration", ground, "m/s^2"))
         if motion is not None and motion.vertical is not None:
             columns.append(Column("vertical_ground_acceleration", motion.vertical.acceleration(times), "m/s^2"))
@@ -302,7 +286,7 @@ class Response(Simulated):
         longest_sequence : bool
             Whether to show the longest chattering sequence, impact by impact, in a separate panel.
         """
-        title = title or figure.make_title(self)
+        title = title or figure.create_title(self)
         return figure.draw_histories(
             self, rotation_units, window, longest_sequence=longest_sequence, title=title, ax=ax, figsize=figsize
         )
@@ -320,7 +304,7 @@ class Response(Simulated):
         Rotations are normalised by the slenderness of their side (or the balance of a restrained block), velocities by
         p times this value. Without a balance, rotations are in rad. Raises `InvalidOption` also as `kinetic_energy`.
         """
-        return figure.draw_phase_plane(self, window, title=title or figure.make_title(self), ax=ax, figsize=figsize)
+        return figure.draw_phase_plane(self, window, title=title or figure.create_title(self), ax=ax, figsize=figsize)
 
     def plot_energy(
         self,
@@ -331,4 +315,4 @@ class Response(Simulated):
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
         """Draw kinetic, potential and total energy against time; arguments and errors as of `plot_phase_plane`."""
-        return figure.draw_energies(self, window, title=title or figure.make_title(self), ax=ax, figsize=figsize)
+        return figure.draw_energies(self, window, title=title or figure.create_title(self), ax=ax, figsize=figsize)

@@ -63,8 +63,8 @@ class Simulated(Result):
         """Time history, including the impacts after the proof of a sequence."""
         trail, sequences = self.solution.trail, self.solution.sequences
         if int(trail.settings["rest_rule"]) == state.RestRule.CERTIFIED:
-            closed = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration)
-            trail = add_all_impacts(trail, cut=closed and self.moves_at_end)
+            is_open = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration) and self.moves_at_end
+            trail = add_all_impacts(trail, ends_in_sequence=is_open)
         return TimeHistory(trail, self.duration, self.block.stops)
 
     @cached_property
@@ -83,9 +83,8 @@ class Simulated(Result):
     def sequences(self) -> NDArray[np.void]:
         """Sequences of impacts that ended at rest: see `Response`."""
         sequences = self.solution.sequences.copy()
-        errors = bound_rest_errors(
-            self.solution.trail, np.isfinite(sequences["lower"]), max(map(abs, self.block.stops))
-        )
+        largest_stop = max(map(abs, self.block.stops))
+        errors = bound_rest_errors(self.solution.trail, np.isfinite(sequences["lower"]), largest_stop)
         sequences["lower"] -= errors
         sequences["upper"] += errors
         return sequences
@@ -357,9 +356,11 @@ class Simulated(Result):
         level = check_friction(friction)
         if not self.required_friction > level:
             return math.nan
-        return self._contact.find_first_time(
-            lambda push, normal: np.abs(push) - level * normal, lambda excess: excess > 0.0
-        )
+
+        def compute_excess(push: Floats, normal: Floats) -> Floats:
+            return np.abs(push) - level * normal
+
+        return self._contact.find_first_time(compute_excess, lambda excess: excess > 0.0)
 
     @cached_property
     def lift_off_time(self) -> float:
