@@ -49,7 +49,7 @@ __all__ = [
 _ROTATION_SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linspace(0.5, 0.999, 26))
 
 #: Ratio of damping to -ln e^2 (Makris and Konstantinidis 2003).
-_DAMPING: Final = 0.34
+_DAMPING_FACTOR: Final = 0.34
 
 #: Relative width of the bracket of the lowest level that overturns.
 _TOLERANCE: Final = 1e-4
@@ -324,12 +324,10 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Makris, N. and Konstantinidis, D. (2003). The rocking spectrum and the limitations of practical design
     methodologies. Earthquake Engineering and Structural Dynamics 32(2), 265-289.
     """
-    lowest = math.exp(-0.5 / _DAMPING)
-    if blocks.restitution.min() <= lowest:
-        raise InvalidBlock(
-            f"the rule priestley requires a restitution above {lowest:.2g}, where its damping is below critical; got "
-            f"{blocks.restitution.min():g}; omit this rule"
-        )
+    lowest, smallest = math.exp(-0.5 / _DAMPING_FACTOR), blocks.restitution.min()
+    if smallest <= lowest:
+        requirement = f"a restitution above {lowest:.2g}, where its damping is below critical"
+        raise InvalidBlock(f"the rule priestley requires {requirement}; got {smallest:g}; omit this rule")
     return _find_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 
 
@@ -395,7 +393,7 @@ def _create_free_rocking_oscillator(p: float, alpha: float, restitution: float, 
     """Create the oscillators of Priestley, Evison and Carr (1978) with the period of free rocking."""
     periods = 4.0 / p * np.arccosh(1.0 / (1.0 - _ROTATION_SHARES))
     displacements = 0.75 * gravity / p**2 * (math.sin(alpha) - np.sin(alpha * (1.0 - _ROTATION_SHARES)))
-    damping = -2.0 * _DAMPING * math.log(restitution)
+    damping = -2.0 * _DAMPING_FACTOR * math.log(restitution)
     return _Oscillator(periods, damping, displacements, (periods / (2.0 * np.pi)) ** 2)
 
 
@@ -466,10 +464,8 @@ def compare_rules(
     names = None if rules is None else checks.items(rules, "rules", InvalidOption)
     # Raise errors before the simulations.
     compute_intensities([*named_motions.values()], Measure("pga"))
-    ratios = [
-        {name: float(rating.ratio[0]) for name, rating in apply_rules(block, motion, names).items()}
-        for motion in named_motions.values()
-    ]
+    ratings = [apply_rules(block, motion, names) for motion in named_motions.values()]
+    ratios = [{name: float(rating.ratio[0]) for name, rating in ratings_by_rule.items()} for ratings_by_rule in ratings]
     responses, margins = [], []
     with Progress("checking", total=len(named_motions)) as bar:
         for motion in named_motions.values():

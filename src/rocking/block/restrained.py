@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -114,22 +114,31 @@ class RestrainedBlock(Rocking):
         if sum(isinstance(restraint, Tendon) and restraint.strength < math.inf for restraint in restraints) > 1:
             raise InvalidBlock("only one tendon of a block may yield; omit {} of the others", "strength")
         pivots = _build_pivots(standing_block, tilt, restraints)
-        terms = [
-            functools.reduce(
-                Terms.add, (restraint._compute_terms(pivot) for restraint in restraints), Terms()
-            )._replace(**(law._compute_terms(side) if law else {}))
-            for side, pivot in enumerate(pivots)
-        ]
+        terms = []
+        for side, pivot in enumerate(pivots):
+            total = functools.reduce(Terms.add, (restraint._compute_terms(pivot) for restraint in restraints), Terms())
+            terms.append(total._replace(**(law._compute_terms(side) if law else {})))
         description = ", ".join([free_block.description, *_describe_restraints(restraints), *details])
-        self.__dict__.update(
-            block=standing_block, _terms=tuple(terms), is_one_sided=is_one_sided, restraints=restraints, lean=tilt
-        )
-        self.__dict__.update(description=description)
+        self._fill(standing_block, terms, description, restraints, tilt, is_one_sided=is_one_sided)
         if (min_uplift := min(self.uplift_thresholds())) <= 0.0:
-            raise InvalidBlock(
-                f"this block does not stand: its uplift acceleration is {min_uplift:.3g} m/s^2; reduce the thrust, "
-                f"load or lean{'; forces are in N, masses in kg' * (min_uplift < -self.gravity)}"
-            )
+            hint = "; forces are in N, masses in kg" if min_uplift < -self.gravity else ""
+            message = f"this block does not stand: its uplift acceleration is {min_uplift:.3g} m/s^2"
+            raise InvalidBlock(f"{message}; reduce the thrust, load or lean{hint}")
+
+    def _fill(
+        self,
+        block: Block,
+        terms: Sequence[Terms],
+        description: str,
+        restraints: tuple[Restraint, ...] | None = None,
+        lean: float = 0.0,
+        *,
+        is_one_sided: bool,
+    ) -> RestrainedBlock:
+        """Set all attributes from valid values."""
+        values = {"block": block, "_terms": tuple(terms), "is_one_sided": is_one_sided, "description": description}
+        self.__dict__.update(values, restraints=restraints, lean=lean)
+        return self
 
     def _build_rows(self) -> list[tuple[float, ...]]:
         """Return parameters and, unless free, terms of both sides as stored in `Blocks`."""
@@ -213,9 +222,8 @@ def _check_restraints(restraints: Sequence[object], block: Block) -> None:
     """Reject invalid restraints, and restraints of a block without a mass."""
     for restraint in restraints:
         if not isinstance(restraint, Restraint):
-            raise InvalidBlock(
-                f"{checks.short_repr(restraint)} is not a restraint; give {_RESTRAINT_NAMES} as separate arguments"
-            )
+            message = f"{checks.short_repr(restraint)} is not a restraint"
+            raise InvalidBlock(f"{message}; give {_RESTRAINT_NAMES} as separate arguments")
     if restraints and block.mass is None:
         raise InvalidBlock("a block with restraints requires its {}, kg", "mass")
 
@@ -237,19 +245,11 @@ def _add_loads(block: Block, loads: Sequence[Load], restitution: float | Sequenc
     gyration = float(mass_shares[0] * gyration_squared + mass_shares @ ((offsets - x) ** 2 + (heights - z) ** 2))
     overhang = max(x - distance_plus, -x - distance_minus)
     if overhang >= 0.0:
-        raise InvalidBlock(
-            f"with its loads, the centre of mass of this block lies {overhang:.3g} m beyond its pivot; reduce "
-            "the mass of a load, or its {}",
-            "offset",
-        )
-    return Block.from_pivots(
-        (distance_plus - x, distance_minus + x),
-        z,
-        math.sqrt(gyration),
-        restitution=restitution,
-        mass=float(masses.sum()),
-        gravity=block.gravity,
-    )
+        message = f"with its loads, the centre of mass of this block lies {overhang:.3g} m beyond its pivot; reduce "
+        raise InvalidBlock(f"{message}the mass of a load, or its {{}}", "offset")
+    distances, mass = (distance_plus - x, distance_minus + x), float(masses.sum())
+    options: dict[str, Any] = {"restitution": restitution, "mass": mass, "gravity": block.gravity}
+    return Block.from_pivots(distances, z, math.sqrt(gyration), **options)
 
 
 def _tilt(block: Block, lean: float) -> Block:
@@ -258,14 +258,12 @@ def _tilt(block: Block, lean: float) -> Block:
         return block
     plus, minus = block.sides
     if not -minus.alpha < lean < plus.alpha:
-        raise InvalidBlock(
+        message = (
             f"{{}} must be between {-minus.alpha:.4g} and {plus.alpha:.4g} rad for the block to stand, not {lean:g}"
-            f"{f'; if it is in degrees, give math.radians({lean:g})' if 0.5 <= abs(lean) < 90.0 else ''}",
-            "lean",
-            value=lean,
         )
-    sides = replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)
-    return block._with_sides(sides)
+        hint = f"; if it is in degrees, give math.radians({lean:g})" if 0.5 <= abs(lean) < 90.0 else ""
+        raise InvalidBlock(message + hint, "lean", value=lean)
+    return block._with_sides((replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)))
 
 
 def _find_following_loads(restraints: Sequence[Restraint]) -> list[Load]:

@@ -173,22 +173,16 @@ class Tendon(Restraint):
             raise InvalidBlock("a tendon requires {} (N/m) or {} (N)", "stiffness", "prestress")
         object.__setattr__(self, "strength", checks.real(self.strength, "strength", InvalidBlock))
         if not self.strength > prestress:
-            raise InvalidBlock(
-                f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}",
-                "strength",
-                value=self.strength,
-            )
+            message = f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}"
+            raise InvalidBlock(message, "strength", value=self.strength)
         if stiffness == 0.0 and self.strength < math.inf:
             raise InvalidBlock("a yielding tendon requires a {}, N/m", "stiffness")
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
         x = self._find_lever(pivot)
         if self.strength < math.inf:
-            yields = (self.strength - self.prestress) / self.stiffness
-            return Terms(
-                opening=x, stiffness=self.stiffness * x / pivot.moment, yields=yields,
-                slack=-self.prestress / self.stiffness,
-            )  # fmt: skip
+            yields, slack = (self.strength - self.prestress) / self.stiffness, -self.prestress / self.stiffness
+            return Terms(opening=x, stiffness=self.stiffness * x / pivot.moment, yields=yields, slack=slack)
         factor = self.stiffness * x * x / pivot.moment
         return Terms(-factor * math.cos(pivot.alpha), factor * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
@@ -213,23 +207,18 @@ class Tendon(Restraint):
         return elongation, self.strength, (elastic - self.strength) / self.stiffness
 
     def __str__(self) -> str:
-        parts = [
-            _format_si(self.stiffness, "N/m") if self.stiffness else "constant force",
-            f"prestress {_format_si(self.prestress, 'N')}" if self.prestress else "no prestress",
-            f"yielding at {_format_si(self.strength, 'N')}" if self.strength < math.inf else "",
-        ]
-        return f"tendon of {', '.join(filter(None, parts))}{_describe_offset(self.offset) or ' at the centre of mass'}"
+        stiffness = _format_si(self.stiffness, "N/m") if self.stiffness else "constant force"
+        prestress = f"prestress {_format_si(self.prestress, 'N')}" if self.prestress else "no prestress"
+        strength = f", yielding at {_format_si(self.strength, 'N')}" if self.strength < math.inf else ""
+        position = _describe_offset(self.offset) or " at the centre of mass"
+        return f"tendon of {stiffness}, {prestress}{strength}{position}"
 
     def _find_lever(self, pivot: Pivot) -> float:
         """Return the distance of the duct from the pivot, m."""
         x = pivot.distance - pivot.sign * self.offset
         if x < -1e-12 * pivot.distance:
-            raise InvalidBlock(
-                f"a tendon at {{}} = {self.offset:g} m is beyond the pivot, which is {pivot.distance:g} m from the "
-                "centre of mass",
-                "offset",
-                value=self.offset,
-            )
+            place = f"beyond the pivot, which is {pivot.distance:g} m from the centre of mass"
+            raise InvalidBlock(f"a tendon at {{}} = {self.offset:g} m is {place}", "offset", value=self.offset)
         return max(x, 0.0)
 
 
@@ -342,9 +331,8 @@ class Thrust(Restraint):
         return self.force, 0.0
 
     def __str__(self) -> str:
-        return (
-            f"thrust of {_format_si(self.force, 'N')} at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
-        )
+        position = f"at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
+        return f"thrust of {_format_si(self.force, 'N')} {position}"
 
 
 @dataclass(frozen=True)
@@ -401,9 +389,8 @@ class Load(Restraint):
 
     def __str__(self) -> str:
         behaviour = "that follows" if self.follows else "that only presses"
-        return (
-            f"load of {self.mass:.5g} kg {behaviour} at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
-        )
+        position = f"at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
+        return f"load of {self.mass:.5g} kg {behaviour} {position}"
 
 
 @dataclass(frozen=True)
@@ -458,18 +445,15 @@ class Restitution:
             object.__setattr__(self, "slope", 0.0)
         slopes = check_pair(self.slope, "slope")
         if invalid := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
-            raise InvalidBlock(
-                f"{{}} must be finite and at least 0, in s/rad, not {invalid[0]:g}", "slope", value=self.slope
-            )
+            message = f"{{}} must be finite and at least 0, in s/rad, not {invalid[0]:g}"
+            raise InvalidBlock(message, "slope", value=self.slope)
         for low, high in zip(check_pair(self.minimum, "minimum"), check_pair(self.maximum, "maximum"), strict=True):
             if not 0.0 < high <= 1.0:
                 hint = checks.hint_at_percent(high)
                 raise InvalidBlock(f"{{}} must be in (0, 1], not {high:g}{hint}", "maximum", value=self.maximum)
             if not 0.0 < low <= high:
-                raise InvalidBlock(
-                    f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}", "minimum", "maximum",
-                    value=self.minimum,
-                )  # fmt: skip
+                message = f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}"
+                raise InvalidBlock(message, "minimum", "maximum", value=self.minimum)
         if self.seed is not None:
             checks.integer(self.seed, "seed", InvalidBlock, 0, _LARGEST_SEED)
             if max(slopes) > 0.0:

@@ -71,9 +71,8 @@ def check_pair(value: Any, name: str) -> tuple[float, float]:
         return value, value
     values = checks.numbers(value, name, InvalidBlock)
     if values.shape not in ((), (2,)):
-        raise InvalidBlock(
-            f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name, value=value
-        )
+        message = f"{{}} must be a number or a pair (side +, side -), not {values.size} values"
+        raise InvalidBlock(message, name, value=value)
     plus, minus = np.broadcast_to(values, 2).tolist()
     return plus, minus
 
@@ -174,10 +173,8 @@ def impact_restitution(
         arms = check_length(plus, "distances"), check_length(minus, "distances")
         h, k = check_length(height, "height"), check_length(radius_of_gyration, "radius_of_gyration")
     else:
-        raise InvalidBlock(
-            "give either {} for a rectangular block, or {}, {} and {} for another body",
-            "alpha", "distances", "height", "radius_of_gyration",
-        )  # fmt: skip
+        message = "give either {} for a rectangular block, or {}, {} and {} for another body"
+        raise InvalidBlock(message, "alpha", "distances", "height", "radius_of_gyration")
     kappa = checks.fraction(contact, "contact", InvalidBlock, below=math.nextafter(1.0, 2.0))
     count = checks.integer(points, "points", InvalidBlock, 2, _MAX_POINTS)
     if kappa < 1.0 and count > 2:
@@ -185,17 +182,14 @@ def impact_restitution(
     inertia = k * k + h * h
     factors = (_compute_factor(arms, inertia, kappa, count), _compute_factor(arms[::-1], inertia, kappa, count))
     if min(factors) <= 0.0:
-        raise InvalidBlock(
-            f"conservation of angular momentum gives this body a restitution of {min(factors):.3g}, because it is too "
-            "stocky; use a more slender one"
-        )
+        result = f"gives this body a restitution of {min(factors):.3g}, because it is too stocky"
+        raise InvalidBlock(f"conservation of angular momentum {result}; use a more slender one")
     short, long = sorted(arms)
     ratio = math.sqrt((inertia + long * long) / (inertia + short * short))  # ratio of the speeds without energy loss
     min_kappa = inertia * (ratio - 1.0) / (long * (long + ratio * short))
     if kappa < min_kappa:
-        raise InvalidBlock(
-            f"{{}} must be at least {min_kappa:.4g}, because this body would otherwise gain energy", "contact"
-        )
+        message = f"{{}} must be at least {min_kappa:.4g}, because this body would otherwise gain energy"
+        raise InvalidBlock(message, "contact")
     return factors
 
 
@@ -295,17 +289,13 @@ def choose_restitutions(restitution: object, conserved: Sequence[float]) -> tupl
     """Return the given restitutions, by default the ones that conserve angular momentum."""
     if restitution is None:
         if min(conserved) <= 0.0:
-            raise InvalidBlock(
-                f"conservation of angular momentum gives this block a restitution of {min(conserved):.3g}, because it "
-                "is too stocky; correct its sizes if they are swapped, or set {} to a value in (0, 1]",
-                "restitution",
-            )
+            result = f"gives this block a restitution of {min(conserved):.3g}, because it is too stocky"
+            hint = "correct its sizes if they are swapped, or set {} to a value in (0, 1]"
+            raise InvalidBlock(f"conservation of angular momentum {result}; {hint}", "restitution")
         return conserved[0], conserved[1]
     if hasattr(restitution, "maximum"):  # a Restitution, whose module imports this one
-        raise InvalidBlock(
-            "{} of a Block must be a number or a pair; for a law, use RestrainedBlock(block, restitution=...)",
-            "restitution",
-        )
+        message = "{} of a Block must be a number or a pair; for a law, use RestrainedBlock(block, restitution=...)"
+        raise InvalidBlock(message, "restitution")
     plus, minus = (check_parameter(value, "restitution") for value in check_pair(restitution, "restitution"))
     return plus, minus
 
@@ -344,9 +334,8 @@ def _compare_sides(p: Floats, cosine: Floats) -> tuple[Floats, Floats]:
 
 def describe_missing_body(p: Floats, alpha: Floats) -> str:
     """Return the message that no rigid body has the p and alpha of two sides."""
-    difference, bound = (
-        100.0 * math.expm1(float(values[0])) for values in _compare_sides(p[None], np.cos(alpha)[None])
-    )
+    comparison = _compare_sides(p[None], np.cos(alpha)[None])
+    difference, bound = (100.0 * math.expm1(float(values[0])) for values in comparison)
     return (
         f"no rigid body has p = {p[0]:g} and {p[1]:g} rad/s on sides of alpha = {alpha[0]:g} and {alpha[1]:g} rad; its "
         f"p must differ by less than {bound:.2g} %, not by {difference:.2g} %; give p and alpha with more digits, or "

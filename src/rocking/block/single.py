@@ -143,12 +143,9 @@ class Block(Rocking):
         description = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
         s = checks.finite(offset, "offset", InvalidBlock)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
-            raise InvalidBlock(
-                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}; for a larger one, give the "
-                "pivots and the radius of gyration",
-                "offset",
-                value=offset,
-            )
+            message = f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}"
+            hint = "for a larger one, give the pivots and the radius of gyration"
+            raise InvalidBlock(f"{message}; {hint}", "offset", value=offset)
         if s == 0.0:
             alpha = math.atan2(b, h)
             sides = build_even_sides(g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha))
@@ -247,11 +244,10 @@ class Block(Rocking):
             if depth > 0.0 and all(abs(e[i] - conserved[i]) <= _RESTITUTION_TOLERANCE for i in range(2)):
                 radii = [depth / math.cos(angle) for angle in angles]
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
-                description = (
-                    f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
-                )
-        sides = tuple(Side(rates[i], angles[i], e[i], radii[i]) for i in range(2))
-        return cls.__new__(cls)._fill((sides[0], sides[1]), g, description)
+                details = f"centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
+                description = f"body from its parameters, {details}"
+        plus, minus = map(Side, rates, angles, e, radii)
+        return cls.__new__(cls)._fill((plus, minus), g, description)
 
     @classmethod
     def from_pivots(
@@ -445,12 +441,9 @@ class Block(Rocking):
     def _get_common(self, name: str) -> float:
         plus, minus = (getattr(side, name) for side in self.sides)
         if plus != minus:
-            raise UnequalSides(
-                f"{name} is {plus:g} on side + and {minus:g} on side - of this block: use block.sides[0].{name} and "
-                f"block.sides[1].{name}"
-            )
-        value: float = plus
-        return value
+            remedy = f"use block.sides[0].{name} and block.sides[1].{name}"
+            raise UnequalSides(f"{name} is {plus:g} on side + and {minus:g} on side - of this block: {remedy}")
+        return float(plus)
 
     @property
     def coordinate(self) -> Coordinate:
@@ -509,7 +502,5 @@ def _resolve_half_sizes(
         return check_length(halves[0], "half_width"), check_length(halves[1], "half_height")
     if is_given == [False, False, True, True]:
         return 0.5 * check_length(full[0], "width"), 0.5 * check_length(full[1], "height")
-    raise InvalidBlock(
-        "a block requires either {} and {}, or {} and {} (the full sizes), all in m",
-        "half_width", "half_height", "width", "height",
-    )  # fmt: skip
+    message = "a block requires either {} and {}, or {} and {} (the full sizes), all in m"
+    raise InvalidBlock(message, "half_width", "half_height", "width", "height")

@@ -88,19 +88,18 @@ class Motion(Processable):
         checks.text(self.name, "name of a motion", InvalidMotion)
         if not isinstance(self.description, Description):
             type_name = type(self.description).__name__
-            sentence = f"the description of a motion must be a Description(family, parameters, text), not a {type_name}"
-            raise InvalidMotion(sentence, value=self.description)
+            message = f"the description of a motion must be a Description(family, parameters, text), not a {type_name}"
+            raise InvalidMotion(message, value=self.description)
         if isinstance(self.history, str) or not isinstance(self.history, Iterable):
-            sentence = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
-            raise InvalidMotion(sentence, value=self.history)
+            message = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
+            raise InvalidMotion(message, value=self.history)
         history = tuple(checks.text(entry, "sentence of a motion's history", InvalidMotion) for entry in self.history)
-        error = checks.between(
-            self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.MAX_ACCELERATION
-        )
+        error_name = "approximation error of a motion"
+        error = checks.between(self.error, error_name, InvalidMotion, 0.0, piecewise.MAX_ACCELERATION)
         if self.vertical is not None and not isinstance(self.vertical, Motion):
             type_name = type(self.vertical).__name__
-            sentence = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type_name}"
-            raise InvalidMotion(sentence, "vertical", value=self.vertical)
+            message = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type_name}"
+            raise InvalidMotion(message, "vertical", value=self.vertical)
         if self.vertical is not None and self.vertical.vertical is not None:
             raise InvalidMotion("{} must be a motion without a vertical component of its own", "vertical")
         checked_fields = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
@@ -241,15 +240,11 @@ class Motion(Processable):
         """
         from rocking.plot.curves import draw_motion
 
-        times = self.drawing_times(0.0, self.end)
-        return draw_motion(
-            time=times,
-            acceleration_g=self.acceleration(times) / STANDARD_GRAVITY,
-            vertical_g=None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY,
-            title=title or escape_dollars(self.label),
-            ax=ax,
-            figsize=figsize,
-        )
+        times, title = self.drawing_times(0.0, self.end), title or escape_dollars(self.label)
+        acceleration = self.acceleration(times) / STANDARD_GRAVITY
+        vertical = None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY
+        traces = {"acceleration_g": acceleration, "vertical_g": vertical}
+        return draw_motion(time=times, **traces, title=title, ax=ax, figsize=figsize)
 
     def drawing_times(self, start: float, end: float) -> Floats:
         """Return times (s) for drawing an interval: its ends, breakpoints, and additional points on curved pieces.
@@ -295,14 +290,9 @@ class Motion(Processable):
         vertical = self.vertical or other.vertical
         if self.vertical is not None and other.vertical is not None:
             vertical = self.vertical + other.vertical
-        return Motion(
-            breakpoints,
-            first + second,
-            name=f"{self.name} + {other.name}",
-            description=Description("sum", text=f"{self._describe_origin()}; plus {other._describe_origin()}"),
-            error=self.error + other.error,
-            vertical=vertical,
-        )
+        name, error = f"{self.name} + {other.name}", self.error + other.error
+        description = Description("sum", text=f"{self._describe_origin()}; plus {other._describe_origin()}")
+        return Motion(breakpoints, first + second, name, description, error=error, vertical=vertical)
 
     def _multiply(self, factor: float, history_entry: str) -> Motion:
         """Return both components times a factor, the vertical one times its absolute value."""
@@ -313,14 +303,9 @@ class Motion(Processable):
             coefficients = self.coefficients * factor
         if not np.all(np.abs(coefficients[:, 0]) <= piecewise.MAX_ACCELERATION) or not np.isfinite(coefficients).all():
             raise InvalidMotion(piecewise.TOO_STRONG)
-        return replace(
-            self,
-            coefficients=coefficients,
-            description=self.description.scaled(factor),
-            history=(*self.history, history_entry),
-            error=self.error * abs(factor),
-            vertical=vertical,
-        )
+        description, history = self.description.scaled(factor), (*self.history, history_entry)
+        fields: dict[str, Any] = {"description": description, "history": history, "error": self.error * abs(factor)}
+        return replace(self, coefficients=coefficients, vertical=vertical, **fields)
 
 
 def _describe_peak(motion: Motion) -> str:

@@ -161,10 +161,8 @@ def align_pieces(first: Piecewise, second: Piecewise) -> tuple[Floats, tuple[Flo
         breakpoints = first.breakpoints
     else:
         breakpoints = np.union1d(first.breakpoints, second.breakpoints)
-    first_rows, second_rows = (
-        refine_pieces(pieces.breakpoints, pieces.coefficients, breakpoints, columns) for pieces in (first, second)
-    )
-    return breakpoints, (first_rows, second_rows)
+    first_rows = refine_pieces(first.breakpoints, first.coefficients, breakpoints, columns)
+    return breakpoints, (first_rows, refine_pieces(second.breakpoints, second.coefficients, breakpoints, columns))
 
 
 def find_root_candidates(widths: Floats, coefficients: Floats) -> Floats:
@@ -263,33 +261,24 @@ def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Float
         if not np.all(np.isfinite(array)):
             raise InvalidMotion("the {} of a motion must be finite numbers", name)
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
-        raise InvalidMotion(
-            "a motion of n pieces requires n + 1 {} and {} of shape (n, degree + 1); got "
-            f"{ends.shape} and {rows.shape}",
-            "breakpoints",
-            "coefficients",
-            value=breakpoints,
-        )
+        message = "a motion of n pieces requires n + 1 {} and {} of shape (n, degree + 1); got "
+        shapes = f"{ends.shape} and {rows.shape}"
+        raise InvalidMotion(message + shapes, "breakpoints", "coefficients", value=breakpoints)
     widths = np.diff(ends)
     if ends[0] != 0.0 or not np.all(widths > 0.0):
         raise InvalidMotion("the {} of a motion must start at 0 and increase strictly", "breakpoints")
     if rows.shape[1] > HIGHEST_DEGREE + 1:
-        raise InvalidMotion(
-            f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}: "
-            "split them into shorter ones of a lower degree"
-        )
+        message = f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}"
+        raise InvalidMotion(f"{message}: split them into shorter ones of a lower degree")
     if not MIN_DURATION <= ends[-1] <= _MAX_DURATION:
-        raise InvalidMotion(
-            f"a motion must last from {MIN_DURATION:g} to {_MAX_DURATION:g} s, not {ends[-1]:g} s: check its units"
-        )
+        message = f"a motion must last from {MIN_DURATION:g} to {_MAX_DURATION:g} s, not {ends[-1]:g} s"
+        raise InvalidMotion(f"{message}: check its units")
     with np.errstate(over="ignore"):
         if not np.all(evaluate_pieces(np.abs(rows), widths) <= MAX_ACCELERATION):
             raise InvalidMotion(TOO_STRONG)
         if not np.all(evaluate_pieces(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
-            raise InvalidMotion(
-                f"a piece of a motion is too steep: it would exceed {MAX_ACCELERATION:g} m/s^2 within "
-                f"{MIN_DURATION:g} s; check units and times"
-            )
+            excess = f"it would exceed {MAX_ACCELERATION:g} m/s^2 within {MIN_DURATION:g} s"
+            raise InvalidMotion(f"a piece of a motion is too steep: {excess}; check units and times")
     for array in (ends, rows):
         array.setflags(write=False)
     return ends, rows
@@ -302,9 +291,8 @@ def check_samples(acceleration: ArrayLike) -> Floats:
         raise InvalidMotion(f"a motion requires at least two samples; got {len(values)}")
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad):
-        raise InvalidMotion(
-            f"every sample of a motion must be a finite number; got {values[bad[0]]} at sample {bad[0]}"
-        )
+        place = f"{values[bad[0]]} at sample {bad[0]}"
+        raise InvalidMotion(f"every sample of a motion must be a finite number; got {place}")
     return values
 
 
@@ -320,11 +308,8 @@ def check_times(times: ArrayLike, count: int) -> Floats:
     """Return the times of this many samples, s."""
     values = _convert_array(times, "times", 1)
     if len(values) != count:
-        raise InvalidMotion(
-            f"{{}} must contain one value for each of the {count} accelerations; got {len(values)}",
-            "times",
-            value=times,
-        )
+        message = f"{{}} must contain one value for each of the {count} accelerations; got {len(values)}"
+        raise InvalidMotion(message, "times", value=times)
     if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
         raise InvalidMotion("the {} of a motion must be finite and increase strictly", "times")
     return values
@@ -333,8 +318,8 @@ def check_times(times: ArrayLike, count: int) -> Floats:
 def _convert_array(values: ArrayLike, name: str, dimensions: int, hint: str = "") -> Floats:
     array = np.array(checks.numbers(values, f"{name} of a motion", InvalidMotion), order="C")
     if array.ndim != dimensions:
-        sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
-        raise InvalidMotion(sentence, name, value=values)
+        message = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
+        raise InvalidMotion(message, name, value=values)
     return array
 
 
