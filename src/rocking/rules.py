@@ -285,7 +285,7 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     ASCE (2005). Seismic Design Criteria for Structures, Systems, and Components in Nuclear Facilities. ASCE/SEI 43-05,
     Appendix A, section A.2.
     """
-    return _find_min_ratio(blocks, motion, _create_energy_oscillator)
+    return _compute_min_ratio(blocks, motion, _create_energy_oscillator)
 
 
 @_rule("m", "1.070")
@@ -328,7 +328,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     if smallest <= lowest:
         requirement = f"a restitution above {lowest:.2g}, where its damping is below critical"
         raise InvalidBlock(f"the rule priestley requires {requirement}; got {smallest:g}; omit this rule")
-    return _find_min_ratio(blocks, motion, _create_free_rocking_oscillator)
+    return _compute_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 
 
 def apply_rules(
@@ -397,7 +397,7 @@ def _create_free_rocking_oscillator(p: float, alpha: float, restitution: float, 
     return _Oscillator(periods, damping, displacements, (periods / (2.0 * np.pi)) ** 2)
 
 
-def _find_min_ratio(
+def _compute_min_ratio(
     blocks: Blocks, motion: Motion, create_oscillator: Callable[[float, float, float, float], _Oscillator]
 ) -> tuple[Floats, Floats]:
     """Find demand and capacity of the sides of blocks at the rotation with the smallest ratio."""

@@ -21,10 +21,10 @@ from rocking.engine.problem import gather_bodies
 from rocking.engine.tasks import Setup, Task, describe_missing, simulate_tasks
 from rocking.errors import InvalidOption, Message
 from rocking.inputs.notes import is_multiple
-from rocking.motion.description import Origin, compose_label
+from rocking.motion.description import Origin, create_label
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.response.perturbed import COUNT, RELATIVE, format_percent, list_factors
+from rocking.response.perturbed import FACTOR_COUNT, RELATIVE_STEP, format_percent, list_factors
 from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def compose_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
     histories = data.histories if with_history else [""] * len(names)
     return [
-        compose_label(str(name), history.split("; ") if history else [], str(vertical))
+        create_label(str(name), history.split("; ") if history else [], str(vertical))
         for name, history, vertical in zip(names, histories, verticals, strict=True)
     ]
 
@@ -304,7 +304,7 @@ def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLi
     indices = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
     _, motion, block, _ = np.unravel_index(indices, overturned.shape)
     factor, original = np.broadcast_to(factors, overturned.shape).ravel()[indices], overturned.ravel()[indices]
-    scales = list_factors(RELATIVE, COUNT)
+    scales = list_factors(RELATIVE_STEP, FACTOR_COUNT)
     tasks = (
         Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
         for k, (m, b) in enumerate(zip(motion, block, strict=True))

@@ -21,7 +21,7 @@ from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
 from rocking.response import Response
 from rocking.response.mechanics import check_friction
-from rocking.response.perturbed import PRECISION, choose_steps
+from rocking.response.perturbed import MOTION_PRECISION, choose_steps
 from rocking.response.summary import format_brief_outcome, format_ratio, round_ratio
 from rocking.simulation.ensemble import body_coordinates, collect_verticals
 from rocking.simulation.simulate import simulate
@@ -101,7 +101,7 @@ class Survey(BlockUnderRecords):
     """
 
     friction: float | None = None
-    precision: float = PRECISION
+    precision: float = MOTION_PRECISION
 
     def rows(self) -> list[dict[str, Any]]:
         friction, rows = self.friction, []
@@ -180,7 +180,7 @@ class RuleComparison(BlockUnderRecords):
                 "peak_over_slenderness": response.peak_over_slenderness,
                 "overturned": response.overturned,
                 "overturns_when_scaled_down": overturns_under_less,
-                "verdict": format_brief_outcome(response, PRECISION)
+                "verdict": format_brief_outcome(response, MOTION_PRECISION)
                 + (f"; overturns at x {_format_factor(1.0 / margin)}" if overturns_under_less else ""),
             }
             for label, response, ratios, margin, overturns_under_less in zip(
@@ -261,7 +261,7 @@ def _format_factor(factor: float) -> str:
 
 
 def survey(
-    block: Body, motions: Motions, *, friction: float | None = None, precision: float = PRECISION, **options: Any
+    block: Body, motions: Motions, *, friction: float | None = None, precision: float = MOTION_PRECISION, **options: Any
 ) -> Survey:
     """Simulate a block under many motions.
 

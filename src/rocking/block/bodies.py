@@ -10,10 +10,10 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.block.body import KINDS
+from rocking.block.body import BODIES_TYPES
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Terms
-from rocking.block.sides import check_gravity, check_sides, describe_missing_body, find_rigid_bodies
+from rocking.block.sides import check_gravity, check_sides, compute_rigid_bodies, describe_missing_body
 from rocking.block.single import Block, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -198,7 +198,7 @@ class Blocks:
         if len(gravities) != 1:
             message = "Blocks.from_bodies requires at least one block, and the same {} for all of them"
             raise InvalidBlock(message, "gravity")
-        rows = [body._build_rows() for body in bodies]
+        rows = [body._create_rows() for body in bodies]
         if max(len(sides[0]) for sides in rows) > len(_FIELDS):
             rows = [[(*side, *[*_TERMS.values()][len(side) - len(_FIELDS) :]) for side in sides] for sides in rows]
         table = np.array(rows).transpose(2, 0, 1)
@@ -367,7 +367,7 @@ def _compute_restitutions(p: Floats, alpha: Floats) -> Floats:
     """Compute the restitutions by angular momentum of rigid bodies with these p and alpha."""
     factors: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
     asymmetric = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
-    factors[asymmetric], _ = find_rigid_bodies(p[asymmetric], alpha[asymmetric])
+    factors[asymmetric], _ = compute_rigid_bodies(p[asymmetric], alpha[asymmetric])
     if (undetermined := np.isnan(factors).any(axis=1)).any():
         first = int(np.argmax(undetermined))
         raise InvalidBlock(f"{describe_missing_body(p[first], alpha[first])} (block {first})", "restitution")
@@ -379,4 +379,4 @@ def _compute_restitutions(p: Floats, alpha: Floats) -> Floats:
     return check_sides(factors, "restitution")
 
 
-KINDS["blocks"] = KINDS["restrained-blocks"] = Blocks
+BODIES_TYPES["blocks"] = BODIES_TYPES["restrained-blocks"] = Blocks

@@ -10,8 +10,8 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from rocking.block.body import SINGLE, ContactLaw, Coordinate
-from rocking.block.restraints import Load, Pivot, Restitution, Restraint, Tendon, Terms
+from rocking.block.body import SINGLE_BODY_TYPES, ContactLaw, Coordinate
+from rocking.block.restraints import Load, Pivot, Pivots, Restitution, Restraint, Tendon, Terms
 from rocking.block.sides import Side, check_pair, check_parameter, one_sided_restitution
 from rocking.block.single import Block, Rocking, require_block
 from rocking.core import checks
@@ -113,7 +113,7 @@ class RestrainedBlock(Rocking):
             standing_block = standing_block._with_sides((plus, minus))
         if sum(isinstance(restraint, Tendon) and restraint.strength < math.inf for restraint in restraints) > 1:
             raise InvalidBlock("only one tendon of a block may yield; omit {} of the others", "strength")
-        pivots = _build_pivots(standing_block, tilt, restraints)
+        pivots = _create_pivots(standing_block, tilt, restraints)
         terms = []
         for side, pivot in enumerate(pivots):
             total = functools.reduce(Terms.add, (restraint._compute_terms(pivot) for restraint in restraints), Terms())
@@ -140,9 +140,9 @@ class RestrainedBlock(Rocking):
         self.__dict__.update(values, restraints=restraints, lean=lean)
         return self
 
-    def _build_rows(self) -> list[tuple[float, ...]]:
+    def _create_rows(self) -> list[tuple[float, ...]]:
         """Return parameters and, unless free, terms of both sides as stored in `Blocks`."""
-        rows = self.block._build_rows()
+        rows = self.block._create_rows()
         if not self.is_one_sided and self._terms == (Terms(), Terms()):
             return rows
         rows = [(*row, *terms, float(self.is_one_sided)) for row, terms in zip(rows, self._terms, strict=True)]
@@ -161,7 +161,7 @@ class RestrainedBlock(Rocking):
     @property
     def balance(self) -> tuple[float, float]:
         """Rotation of the unstable balance on each side, rad; infinite if restraints hold it at any rotation."""
-        plus, minus = map(_find_balance, self.block.sides, self._terms)
+        plus, minus = map(_compute_balance, self.block.sides, self._terms)
         return plus, math.inf if self.is_one_sided else minus
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
@@ -186,26 +186,30 @@ class RestrainedBlock(Rocking):
         motion: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],
         side: Integers,
-        stretch: Floats,
+        elongation: Floats,
     ) -> tuple[Floats, Floats]:
-        horizontal, vertical = self.block.contact(motion, ground_over_g, side, stretch)
+        horizontal, vertical = self.block.contact(motion, ground_over_g, side, elongation)
         if self.restraints and self.block.mass is not None:
-            pivots, weight = _build_pivots(self.block, self.lean, self.restraints), self.block.mass * self.gravity
+            pivots, weight = _create_pivots(self.block, self.lean, self.restraints), self.block.mass * self.gravity
             for restraint in self.restraints:
-                force_x, force_z = restraint._compute_force(pivots, motion[0], side, stretch)
+                force_x, force_z = restraint._compute_force(pivots, motion[0], side, elongation)
                 horizontal, vertical = horizontal - force_x / weight, vertical - force_z / weight
         if self.is_one_sided:
             horizontal = np.where(side < 0, np.minimum(horizontal, 0.0), horizontal)
         return horizontal, vertical
 
-    def tendons_at(self, largest: tuple[float, float], model: Model = "nonlinear") -> list[tuple[float, float, float]]:
+    def compute_tendon_extremes(
+        self, largest_rotations: tuple[float, float], model: Model = "nonlinear"
+    ) -> list[tuple[float, float, float]]:
         """Return the largest elongation (m), largest force (N) and plastic elongation (m) of each tendon, in order.
 
-        `largest` is the largest rotation on each side, rad. The list is empty if the restraints are not
+        The largest rotations are on side + and side -, rad. The list is empty if the restraints are not
         available.
         """
-        plus, minus = largest if model == "linear" else (2.0 * math.sin(0.5 * u) for u in largest)
-        pivots = _build_pivots(self.block, self.lean, self.restraints or ())
+        plus, minus = largest_rotations
+        if model != "linear":
+            plus, minus = 2.0 * math.sin(0.5 * plus), 2.0 * math.sin(0.5 * minus)
+        pivots = _create_pivots(self.block, self.lean, self.restraints or ())
         tendons = [tendon for tendon in self.restraints or () if isinstance(tendon, Tendon)]
         return [tendon._compute_extremes(pivots, (plus, minus)) for tendon in tendons]
 
@@ -271,7 +275,7 @@ def _find_following_loads(restraints: Sequence[Restraint]) -> list[Load]:
     return [restraint for restraint in restraints if isinstance(restraint, Load) and restraint.follows]
 
 
-def _build_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) -> tuple[Pivot, Pivot]:
+def _create_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) -> Pivots:
     """Return both pivots of a leaning block with the loads that follow it."""
     mass = math.nan if block.mass is None else block.mass
     shift = sum(load.mass * load.offset for load in _find_following_loads(restraints)) / mass
@@ -285,7 +289,7 @@ def _build_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) ->
     return plus, minus
 
 
-def _find_balance(side: Side, terms: Terms) -> float:
+def _compute_balance(side: Side, terms: Terms) -> float:
     """Return the first rotation without restoring moment or ground motion, rad.
 
     For a yielding tendon, the first yield is considered.
@@ -295,8 +299,8 @@ def _find_balance(side: Side, terms: Terms) -> float:
 
     def moment(u: float) -> float:
         weight_moment = (1.0 + terms.sine) * math.sin(side.alpha - u) + terms.cosine * math.cos(side.alpha - u)
-        stretch = min(2.0 * terms.opening * math.sin(0.5 * u), terms.yields) - terms.slack
-        return weight_moment + (terms.prestress + terms.stiffness * stretch) * math.cos(0.5 * u) + terms.spring * u
+        elongation = min(2.0 * terms.opening * math.sin(0.5 * u), terms.yields) - terms.slack
+        return weight_moment + (terms.prestress + terms.stiffness * elongation) * math.cos(0.5 * u) + terms.spring * u
 
     rotations = np.linspace(0.0, 0.5 * math.pi, _N_SAMPLES)
     values = np.array([moment(u) for u in rotations.tolist()])
@@ -307,4 +311,4 @@ def _find_balance(side: Side, terms: Terms) -> float:
     return bisect(float(rotations[k]), float(rotations[k + 1]), lambda u: moment(u) <= 0.0)[1]
 
 
-SINGLE["restrained"] = RestrainedBlock
+SINGLE_BODY_TYPES["restrained"] = RestrainedBlock

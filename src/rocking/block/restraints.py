@@ -63,7 +63,7 @@ class Pivot(NamedTuple):
     moment: float  # weight times R, N m
     gravity: float  # m/s^2
 
-    def find_arms(self, height: float, offset: float) -> tuple[float, float]:
+    def compute_arms(self, height: float, offset: float) -> tuple[float, float]:
         """Return the inward distance from the pivot and the height above it, m, of a point of the standing block.
 
         The height is above the base, the offset from the centre of mass without loads to side +, both along the axes
@@ -77,6 +77,10 @@ class Pivot(NamedTuple):
         """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line to the centre of mass, m."""
         c, s = math.cos(self.alpha), math.sin(self.alpha)
         return inwards * c - upwards * s, upwards * c + inwards * s
+
+
+#: Pivots of both sides.
+Pivots = tuple[Pivot, Pivot]
 
 
 class Restraint(ABC):
@@ -100,10 +104,10 @@ class Restraint(ABC):
     def _compute_terms(self, pivot: Pivot) -> Terms:
         """Compute the terms while the block leans to one side."""
 
-    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         """Compute the force on the block to side + and up, N, which is zero for springs and dampers.
 
-        ``side`` is -1 at rest, ``stretch`` the elongation of a yielding tendon beyond its plastic elongation, m.
+        ``side`` is -1 at rest, ``elongation`` that of a yielding tendon beyond its plastic elongation, m.
         """
         return 0.0, 0.0
 
@@ -179,28 +183,28 @@ class Tendon(Restraint):
             raise InvalidBlock("a yielding tendon requires a {}, N/m", "stiffness")
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
-        x = self._find_lever(pivot)
+        x = self._compute_lever(pivot)
         if self.strength < math.inf:
             yields, slack = (self.strength - self.prestress) / self.stiffness, -self.prestress / self.stiffness
             return Terms(opening=x, stiffness=self.stiffness * x / pivot.moment, yields=yields, slack=slack)
         factor = self.stiffness * x * x / pivot.moment
         return Terms(-factor * math.cos(pivot.alpha), factor * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
-    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         """Compute the force of the tendon, along the chord between its ends."""
         if self.strength == math.inf:
-            x = np.where(side == 1, self._find_lever(pivots[1]), self._find_lever(pivots[0]))
-            stretch = 2.0 * x * np.sin(0.5 * np.abs(rotation))
-        tension = np.clip(self.prestress + self.stiffness * stretch, 0.0, self.strength)
+            x = np.where(side == 1, self._compute_lever(pivots[1]), self._compute_lever(pivots[0]))
+            elongation = 2.0 * x * np.sin(0.5 * np.abs(rotation))
+        tension = np.clip(self.prestress + self.stiffness * elongation, 0.0, self.strength)
         inclination = 0.5 * rotation + pivots[0].lean
         return -tension * np.sin(inclination), -tension * np.cos(inclination)
 
-    def _compute_extremes(self, pivots: tuple[Pivot, Pivot], ratios: tuple[float, float]) -> tuple[float, float, float]:
+    def _compute_extremes(self, pivots: Pivots, ratios: tuple[float, float]) -> tuple[float, float, float]:
         """Compute the largest elongation, m, the largest force, N, and the plastic elongation, m.
 
         ``ratios``: largest opening of the base on each side divided by the distance from the pivot.
         """
-        elongation = max(self._find_lever(pivot) * ratio for pivot, ratio in zip(pivots, ratios, strict=True))
+        elongation = max(self._compute_lever(pivot) * ratio for pivot, ratio in zip(pivots, ratios, strict=True))
         elastic = self.prestress + self.stiffness * elongation
         if elastic <= self.strength:
             return elongation, elastic, 0.0
@@ -213,7 +217,7 @@ class Tendon(Restraint):
         position = _describe_offset(self.offset) or " at the centre of mass"
         return f"tendon of {stiffness}, {prestress}{strength}{position}"
 
-    def _find_lever(self, pivot: Pivot) -> float:
+    def _compute_lever(self, pivot: Pivot) -> float:
         """Return the distance of the duct from the pivot, m."""
         x = pivot.distance - pivot.sign * self.offset
         if x < -1e-12 * pivot.distance:
@@ -323,11 +327,11 @@ class Thrust(Restraint):
         self._set_positive("height", "m")
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
-        rho_sin, rho_cos = pivot.rotate(*pivot.find_arms(self.height, self.offset))
+        rho_sin, rho_cos = pivot.rotate(*pivot.compute_arms(self.height, self.offset))
         force = pivot.sign * self.force / pivot.moment
         return Terms(force * rho_sin, -force * rho_cos)
 
-    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         return self.force, 0.0
 
     def __str__(self) -> str:
@@ -380,11 +384,11 @@ class Load(Restraint):
     def _compute_terms(self, pivot: Pivot) -> Terms:
         if self.follows:  # part of the block
             return Terms()
-        rho_sin, rho_cos = pivot.rotate(*pivot.find_arms(self.height, self.offset))
+        rho_sin, rho_cos = pivot.rotate(*pivot.compute_arms(self.height, self.offset))
         weight = self.mass * pivot.gravity / pivot.moment
         return Terms(weight * rho_cos, weight * rho_sin)
 
-    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         return 0.0, 0.0 if self.follows else -self.mass * pivots[0].gravity
 
     def __str__(self) -> str:

@@ -260,7 +260,7 @@ def format_sides(sides: Sequence[object]) -> str:
     return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
 
 
-def build_even_sides(
+def create_even_sides(
     gravity: float, radius: float, alpha: float, restitution: object, conserved: float, arm: float | None = None
 ) -> tuple[Side, Side]:
     """Return both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
@@ -269,7 +269,7 @@ def build_even_sides(
     return Side(p, alpha, plus, radius, arm), Side(p, alpha, minus, radius, arm)
 
 
-def build_sides(
+def create_sides(
     distances: tuple[float, float], height: float, gyration_sq: float, gravity: float, restitution: object
 ) -> tuple[Side, Side]:
     """Return the sides of a body, from its pivot distances, the height of its centre of mass, m, and k^2, m^2."""
@@ -304,7 +304,7 @@ def choose_restitutions(restitution: object, conserved: Sequence[float]) -> tupl
 _ROUNDING: Final = 1e-9
 
 
-def find_rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
+def compute_rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
     """Compute the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
 
     Returns the restitutions by angular momentum, NaN without such a body, and the height of the centre of mass divided

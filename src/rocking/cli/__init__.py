@@ -45,7 +45,7 @@ for _module, _commands in {
     for _command in _commands:
         app.command(f"rocking.cli.{_module}:{_command}", name=_command, help=_lines[_command])
 _study_help = "Run many simulations in a study, which can be interrupted and resumed."
-app.command("rocking.cli.study:study", name="study", help=_study_help)
+app.command("rocking.cli.study:app", name="study", help=_study_help)
 
 
 def _print_version(*, verbose: bool = False) -> None:

@@ -38,12 +38,13 @@ from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_result
 from rocking.core.result import DatasetResult
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.inputs.bodies import create_block, note_likely_mistakes
-from rocking.inputs.declared import SHAPES
+from rocking.inputs.declared import BLOCK_DESCRIPTIONS
 from rocking.inputs.quantities import read_angle, read_array, read_length, read_tilt
 
 #: Descriptions of a block for which the slenderness alone suffices.
-_SLENDER_SHAPES: Final = tuple(
-    shape._replace(needed=("alpha",), optional=("p",)) if "alpha" in shape.needed else shape for shape in SHAPES
+_SLENDER_DESCRIPTIONS: Final = tuple(
+    shape._replace(needed=("alpha",), optional=("p",)) if "alpha" in shape.needed else shape
+    for shape in BLOCK_DESCRIPTIONS
 )
 
 
@@ -250,7 +251,7 @@ def _create_slender_block(options: BlockOptions) -> Block:
     if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
         message = "the restitution of two different sides depends on {} and {} of both; also set {}"
         raise InvalidBlock(message, "p", "alpha", "p")
-    block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_SHAPES)
+    block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_DESCRIPTIONS)
     note_likely_mistakes([block])
     return block
 

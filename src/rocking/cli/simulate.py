@@ -50,7 +50,7 @@ from rocking.records.named import (
 )
 from rocking.response import Response
 from rocking.response.mechanics import check_friction
-from rocking.response.perturbed import PRECISION, choose_steps
+from rocking.response.perturbed import MOTION_PRECISION, choose_steps
 from rocking.rules import compare_rules
 from rocking.simulation.simulate import simulate as run_simulation
 
@@ -64,7 +64,7 @@ class _ResponseOptions(StartOptions):
     ] = None
     precision: Annotated[
         float, Parameter(help="Relative precision of the record; 11 motions within it are also simulated.")
-    ] = PRECISION
+    ] = MOTION_PRECISION
 
 
 def simulate(
@@ -184,17 +184,17 @@ def records(
     """
     files = expand_record_names(names)
     several = len(files) > 1
-    loaded, reasons = read_records(files, lambda name: _read_contents(name, file, several=several), keep_going=several)
+    loaded, messages = read_records(files, lambda name: _read_contents(name, file, several=several), keep_going=several)
     listings = [*loaded.values()] if files else [shipped()]
     if output.as_json:
         entries = [listing.to_dict() for listing in listings]
-        entries += [{"file": name, "error": message} for name, message in reasons.items()]
+        entries += [{"file": name, "error": message} for name, message in messages.items()]
         print(to_json(entries[0] if len(entries) == 1 else {"files": entries}))
     else:
-        print("\n\n".join([listing.summary() for listing in listings] + [*reasons.values()]))
-    if reasons:
-        unreadable = ", ".join([*reasons][:5]) + (f" and {len(reasons) - 5} more" if len(reasons) > 5 else "")
-        raise UnreadableRecord(f"{len(reasons)} of {len(files)} files cannot be read: {unreadable}")
+        print("\n\n".join([listing.summary() for listing in listings] + [*messages.values()]))
+    if messages:
+        unreadable = ", ".join([*messages][:5]) + (f" and {len(messages) - 5} more" if len(messages) > 5 else "")
+        raise UnreadableRecord(f"{len(messages)} of {len(files)} files cannot be read: {unreadable}")
 
 
 def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:

@@ -55,7 +55,7 @@ class Row(NamedTuple):
     See Also
     --------
     rocking.Response.summary_rows : Return the lines of a summary as rows.
-    rocking.Response.facts : Return the entries of a dictionary as rows.
+    rocking.Response.result_rows : Return the entries of a dictionary as rows.
 
     Examples
     --------

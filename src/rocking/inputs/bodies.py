@@ -13,7 +13,7 @@ from rocking.core import checks
 from rocking.core.progress import note
 from rocking.errors import InvalidBlock, InvalidOption, escape_braces, join_placeholders
 from rocking.inputs import texts
-from rocking.inputs.declared import BLOCK, INPUTS, READERS, SHAPES, Shape
+from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, INPUTS, READERS, BlockDescription
 from rocking.inputs.notes import block_notes, restraint_notes
 from rocking.inputs.quantities import Quantity
 
@@ -28,13 +28,15 @@ _FREQUENCY_PARAMETER: Final = (
 )
 
 
-def find_shape(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
+def find_description(
+    names: Iterable[str], descriptions: Sequence[BlockDescription] = BLOCK_DESCRIPTIONS
+) -> BlockDescription:
     """Return the description that contains the named inputs, or raise `InvalidBlock` if there is not exactly one."""
     provided = [name for name in BLOCK if name in {*names} and name != "restitution"]
-    for shape in shapes:
-        if {*shape.needed} <= {*provided} <= {*shape.needed, *shape.optional}:
-            return shape
-    candidates = {shape.needed: {*shape.needed, *shape.optional} for shape in shapes}
+    for description in descriptions:
+        if {*description.needed} <= {*provided} <= {*description.needed, *description.optional}:
+            return description
+    candidates = {description.needed: {*description.needed, *description.optional} for description in descriptions}
     candidates = {needed: allowed for needed, allowed in candidates.items() if allowed & {*provided}} or candidates
     partly_given = [needed for needed in candidates if {*needed} & {*provided}] or [*candidates]
     placeholders = join_placeholders(provided)
@@ -50,7 +52,7 @@ def find_shape(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
     raise InvalidBlock(message, *provided, *itertools.chain(*alternatives))
 
 
-def create_block(values: Mapping[str, Any], shapes: Sequence[Shape] = SHAPES) -> Block:
+def create_block(values: Mapping[str, Any], descriptions: Sequence[BlockDescription] = BLOCK_DESCRIPTIONS) -> Block:
     """Create the block that the values describe.
 
     Examples
@@ -59,12 +61,12 @@ def create_block(values: Mapping[str, Any], shapes: Sequence[Shape] = SHAPES) ->
     (0.12, 'Block.from_parameters(p=2.0, alpha=0.2)')
     """
     block_values = {name: value for name, value in values.items() if name in BLOCK or name == "gravity"}
-    return find_shape(block_values, shapes).make(**_convert_arguments(block_values))
+    return find_description(block_values, descriptions).make(**_convert_arguments(block_values))
 
 
 def write_block_call(values: Mapping[str, Any]) -> str:
     """Return the Python call that creates the block."""
-    return f"{find_shape(values).make.__qualname__}({texts.write_arguments(_convert_arguments(values))})"
+    return f"{find_description(values).make.__qualname__}({texts.write_arguments(_convert_arguments(values))})"
 
 
 def create_body(block: Block, values: Mapping[str, Any], restraints: Sequence[Restraint] = ()) -> Body:

@@ -217,7 +217,7 @@ INPUTS: Final = index_by_name(
 SCALINGS: Final = ("pga", "pgv", "sa", "scale")
 
 
-class Shape(NamedTuple):
+class BlockDescription(NamedTuple):
     """Description of a block: required and optional inputs, and the function of `rocking` that creates the block."""
 
     name: str
@@ -227,14 +227,17 @@ class Shape(NamedTuple):
 
 
 #: Each also accepts a restitution.
-SHAPES: Final = (
-    Shape("sizes", ("width", "height"), ("offset", "mass"), Block),
-    Shape("half sizes", ("half_width", "half_height"), ("offset", "mass"), Block),
-    Shape("parameters", ("p", "alpha"), (), Block.from_parameters),
-    Shape("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
+BLOCK_DESCRIPTIONS: Final = (
+    BlockDescription("sizes", ("width", "height"), ("offset", "mass"), Block),
+    BlockDescription("half sizes", ("half_width", "half_height"), ("offset", "mass"), Block),
+    BlockDescription("parameters", ("p", "alpha"), (), Block.from_parameters),
+    BlockDescription("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
 )
 
-BLOCK: Final = (*dict.fromkeys(name for shape in SHAPES for name in (*shape.needed, *shape.optional)), "restitution")
+BLOCK: Final = (
+    *dict.fromkeys(name for shape in BLOCK_DESCRIPTIONS for name in (*shape.needed, *shape.optional)),
+    "restitution",
+)
 
 #: Restraints by the names of their inputs. Couples are numbers, the others have parameters.
 COUPLES: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}

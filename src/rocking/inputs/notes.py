@@ -13,7 +13,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
 from rocking.motion.description import Origin, compute_start_delay
-from rocking.motion.measures import find_significant_span
+from rocking.motion.measures import compute_significant_span
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
@@ -221,7 +221,7 @@ def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
             "horizontal one, but both are taken to start together: cut what comes first"
         )
         return
-    (start, end), (first, last) = (find_significant_span(component) for component in (motion, vertical))
+    (start, end), (first, last) = (compute_significant_span(component) for component in (motion, vertical))
     if last < start or first > end:
         yield (
             f"the horizontal motion is strong from {start:.4g} s to {end:.4g} s, the vertical one from {first:.4g} s "

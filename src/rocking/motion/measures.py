@@ -86,23 +86,23 @@ class MotionMeasures:
     @property
     def extremes(self) -> tuple[float, float]:
         """Exact lowest and highest acceleration with their signs, m/s^2."""
-        widths, maximum = self._widths(), piecewise.find_maximum
+        widths, maximum = self._widths(), piecewise.compute_maximum
         return -maximum(widths, -self.coefficients), maximum(widths, self.coefficients)
 
     @property
     def pga(self) -> float:
         """Exact peak ground acceleration, m/s^2."""
-        return piecewise.find_peak_magnitude(self._widths(), self.coefficients)
+        return piecewise.compute_peak_magnitude(self._widths(), self.coefficients)
 
     @property
     def pgv(self) -> float:
         """Exact peak ground velocity from rest, m/s."""
-        return piecewise.find_peak_magnitude(self._widths(), self._compute_velocity())
+        return piecewise.compute_peak_magnitude(self._widths(), self._compute_velocity())
 
     @property
     def pgd(self) -> float:
         """Exact peak ground displacement until the end of the motion, m."""
-        return piecewise.find_peak_magnitude(self._widths(), self._compute_displacement())
+        return piecewise.compute_peak_magnitude(self._widths(), self._compute_displacement())
 
     @property
     def arias_intensity(self) -> float:
@@ -129,7 +129,7 @@ class MotionMeasures:
         if not 0.0 <= start < end <= 1.0:
             message = f"a significant duration requires 0 <= {{}} < {{}} <= 1; got {start:g} and {end:g}"
             raise InvalidMotion(message, "start", "end", value=(start, end))
-        start_time, end_time = find_significant_span(self, start, end)
+        start_time, end_time = compute_significant_span(self, start, end)
         return end_time - start_time
 
     def spectral_acceleration(self, period: ArrayLike, damping: float = DAMPING) -> Any:
@@ -194,12 +194,12 @@ def _unwrap_float(values: Floats) -> Any:
     return values if values.ndim else float(values)
 
 
-def find_significant_span(motion: MotionMeasures, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
+def compute_significant_span(motion: MotionMeasures, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
     """Return the times, s, at two fractions of the total Arias intensity, or NaN if zero."""
     energy = np.append(0.0, np.cumsum(_integrate_square(motion.coefficients, np.diff(motion.breakpoints))))
     if energy[-1] == 0.0:
         return math.nan, math.nan
-    return _find_time_at_energy(motion, energy, start), _find_time_at_energy(motion, energy, end)
+    return _compute_time_at_energy(motion, energy, start), _compute_time_at_energy(motion, energy, end)
 
 
 def _integrate_square(coefficients: Floats, widths: Floats) -> Floats:
@@ -210,7 +210,7 @@ def _integrate_square(coefficients: Floats, widths: Floats) -> Floats:
     return energy
 
 
-def _find_time_at_energy(motion: MotionMeasures, energy: Floats, fraction: float) -> float:
+def _compute_time_at_energy(motion: MotionMeasures, energy: Floats, fraction: float) -> float:
     """Find the first time at a fraction of the total of the cumulative energy, by bisection within a piece."""
     target = fraction * energy[-1]
     piece = max(int(np.searchsorted(energy, target, side="left")) - 1, 0)

@@ -15,8 +15,8 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.description import Description, compose_label
-from rocking.motion.processing import Processable
+from rocking.motion.description import Description, create_label
+from rocking.motion.processing import ProcessingMethods
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(Processable):
+class Motion(ProcessingMethods):
     """Piecewise polynomial ground acceleration, zero outside ``[0, duration]``.
 
     Pieces may jump. Records are exactly piecewise linear, and pulses are approximated to 1e-15 of their amplitude.
@@ -147,7 +147,7 @@ class Motion(Processable):
         (0.06, 2.0)
         """
         samples, step = piecewise.check_samples(acceleration), piecewise.check_step(dt)
-        times = piecewise.make_even_times(len(samples), step)
+        times = piecewise.create_even_times(len(samples), step)
         description = description or Description("samples", text="linear between even samples")
         return cls(times, piecewise.join_linearly(times, samples), name=name, description=description)
 
@@ -174,7 +174,7 @@ class Motion(Processable):
     @property
     def label(self) -> str:
         """Name with brief processing and vertical component, for titles."""
-        return compose_label(self.name, self.history, "" if self.vertical is None else self.vertical.name)
+        return create_label(self.name, self.history, "" if self.vertical is None else self.vertical.name)
 
     def scaled(self, factor: float) -> Motion:
         """Return the motion times a factor.
@@ -341,7 +341,7 @@ def compute_uplift_factors(
     weight_pairs = threshold_pairs if weight_thresholds is None else np.asarray(weight_thresholds, dtype=np.float64)
     if motion.vertical is None:
         widths = np.diff(motion.breakpoints)
-        peaks = np.array([[piecewise.find_maximum(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
+        peaks = np.array([[piecewise.compute_maximum(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
     else:
         breakpoints, (push, vertical) = piecewise.align_pieces(motion, motion.vertical)
         widths = np.diff(breakpoints)
@@ -349,7 +349,7 @@ def compute_uplift_factors(
         def find_peak(sign: float, threshold: float) -> float:
             if np.isinf(threshold):
                 return 0.0
-            return piecewise.find_maximum(widths, sign * push - threshold / gravity * vertical)
+            return piecewise.compute_maximum(widths, sign * push - threshold / gravity * vertical)
 
         peaks = np.array([[find_peak(-1.0, plus), find_peak(1.0, minus)] for plus, minus in weight_pairs])
     with np.errstate(divide="ignore"):

@@ -56,7 +56,7 @@ def find_even_step(pieces: Piecewise) -> float | None:
     if coefficients.shape[1] < 2 or np.any(coefficients[:, 2:]):
         return None
     step = float(breakpoints[1])
-    deviations = np.abs(breakpoints - make_even_times(len(breakpoints), step))
+    deviations = np.abs(breakpoints - create_even_times(len(breakpoints), step))
     return step if np.all(deviations <= _STEP_ROUNDING * breakpoints[-1]) else None
 
 
@@ -69,7 +69,7 @@ def find_jumps(pieces: Piecewise) -> Flags:
     """Return which pieces end in a jump, beyond rounding (the last one to zero)."""
     widths, coefficients = np.diff(pieces.breakpoints), pieces.coefficients
     gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - evaluate_pieces(coefficients, widths))
-    return gaps > _JUMP_TOLERANCE * find_peak_magnitude(widths, coefficients)
+    return gaps > _JUMP_TOLERANCE * compute_peak_magnitude(widths, coefficients)
 
 
 def sample_breakpoints(pieces: Piecewise) -> tuple[Floats, Floats]:
@@ -94,7 +94,7 @@ def evaluate_at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floa
     return evaluate_pieces(coefficients[piece], clipped - breakpoints[piece])
 
 
-def make_even_times(count: int, step: float) -> Floats:
+def create_even_times(count: int, step: float) -> Floats:
     """Return the times of even samples (infinite on overflow)."""
     with np.errstate(over="ignore"):
         return np.arange(count, dtype=np.float64) * step
@@ -192,13 +192,13 @@ def _find_numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
     control = _compute_control_points(widths, coefficients)
     rounding = 1e-14 * np.sum(np.abs(scaled), axis=1)
     may_vanish = (np.min(control, axis=1) <= rounding) & (np.max(control, axis=1) >= -rounding)
-    degrees = np.where(may_vanish, _find_significant_degrees(scaled), 0)
+    degrees = np.where(may_vanish, _compute_significant_degrees(scaled), 0)
     for k in np.flatnonzero(degrees):
         roots[k, : degrees[k]] = np.polynomial.polynomial.polyroots(scaled[k, : degrees[k] + 1]).real
     return roots * widths[:, np.newaxis]
 
 
-def _find_significant_degrees(pieces: Floats) -> Integers:
+def _compute_significant_degrees(pieces: Floats) -> Integers:
     """Return the degree of each piece without leading coefficients far below rounding, which distort the roots."""
     sizes = np.abs(pieces)
     significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
@@ -227,7 +227,7 @@ def bound_magnitudes(widths: Floats, coefficients: Floats) -> Floats:
     return result
 
 
-def find_maximum(widths: Floats, coefficients: Floats) -> float:
+def compute_maximum(widths: Floats, coefficients: Floats) -> float:
     """Return the highest value over all pieces."""
     maximum = max(float(np.max(coefficients[:, 0])), float(np.max(evaluate_pieces(coefficients, widths))))
     if coefficients.shape[1] <= 2:
@@ -240,9 +240,9 @@ def find_maximum(widths: Floats, coefficients: Floats) -> float:
     return max(maximum, float(np.max(evaluate_pieces(pieces[:, np.newaxis, :], extrema))))
 
 
-def find_peak_magnitude(widths: Floats, coefficients: Floats) -> float:
+def compute_peak_magnitude(widths: Floats, coefficients: Floats) -> float:
     """Return the largest absolute value over all pieces."""
-    return max(find_maximum(widths, coefficients), find_maximum(widths, -coefficients))
+    return max(compute_maximum(widths, coefficients), compute_maximum(widths, -coefficients))
 
 
 def sine_cosine_from_quarters(quarters: Floats, rest: Floats) -> tuple[Floats, Floats]:

@@ -39,7 +39,7 @@ class ProcessedPieces(NamedTuple):
 _ProcessingStep = Callable[[Piecewise], ProcessedPieces]
 
 
-class Processable(MotionMeasures):
+class ProcessingMethods(MotionMeasures):
     """Methods of `Motion` that derive other motions."""
 
     name: str
@@ -86,7 +86,7 @@ class Processable(MotionMeasures):
         -----
         a(phi) = (a_1 sin(phi_2 - phi) + a_2 sin(phi - phi_1))/sin(phi_2 - phi_1), exactly, piece by piece.
         """
-        if not isinstance(other, Processable):
+        if not isinstance(other, ProcessingMethods):
             message = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
             raise InvalidMotion(message, "other", value=other)
         azimuths = _resolve_azimuths(self, other, recorded)
@@ -268,7 +268,7 @@ def _trim(motion: Piecewise, start: float, end: float, fine_step: float | None =
             if first is not None and last is not None and subdivisions:
                 sample, subdivision = np.divmod(np.arange(first, last), subdivisions)
                 coefficients = piecewise.shift_origin(motion.coefficients[sample], subdivision * new_step)
-                return ProcessedPieces(piecewise.make_even_times(last - first + 1, new_step), coefficients, entry)
+                return ProcessedPieces(piecewise.create_even_times(last - first + 1, new_step), coefficients, entry)
     breakpoints, rows = motion.breakpoints, motion.coefficients
     inner_breakpoints = breakpoints[(breakpoints > start) & (breakpoints < end)]
     new_breakpoints = np.concatenate([[start], inner_breakpoints, [end]])
@@ -339,7 +339,7 @@ def _require_even_step(motion: Piecewise, argument: str) -> float:
 
 
 def _join_samples(samples: Floats, step: float, history_entry: str) -> ProcessedPieces:
-    times = piecewise.make_even_times(len(samples), step)
+    times = piecewise.create_even_times(len(samples), step)
     return ProcessedPieces(times, piecewise.join_linearly(times, samples), history_entry)
 
 
@@ -418,7 +418,9 @@ def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
     return sine + 0.0, cosine + 0.0  # avoids negative zeros
 
 
-def _resolve_azimuths(first_motion: Processable, second_motion: Processable, recorded: Any) -> tuple[float, float]:
+def _resolve_azimuths(
+    first_motion: ProcessingMethods, second_motion: ProcessingMethods, recorded: Any
+) -> tuple[float, float]:
     """Return the azimuths of two components, specified or from their records."""
     if recorded is None:
         recorded = [(motion.description.origin or Origin()).azimuth for motion in (first_motion, second_motion)]

@@ -28,7 +28,7 @@ from rocking.plot.canvas import (
     open_page,
 )
 from rocking.plot.curves import draw_ground
-from rocking.response.simulated import Simulated
+from rocking.response.simulated import ResponseData
 from rocking.response.summary import describe_subject, format_time
 
 if TYPE_CHECKING:
@@ -50,12 +50,12 @@ _MAX_RATIO: Final = 2.0
 _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 
 
-def create_title(response: Simulated) -> str:
+def create_title(response: ResponseData) -> str:
     """Return the title of a figure: the body and its motion."""
     return escape_dollars(describe_subject(response))
 
 
-def find_active_span(response: Simulated) -> tuple[float, float]:
+def compute_active_span(response: ResponseData) -> tuple[float, float]:
     """Return the interval of all events, with margins, s."""
     times = np.concatenate([response.events["time"], response.impacts["time"]])
     if len(times) == 0:
@@ -65,10 +65,10 @@ def find_active_span(response: Simulated) -> tuple[float, float]:
     return max(0.0, first - margin), min(response.duration, float(times.max()) + margin)
 
 
-def resolve_window(response: Simulated, window: Sequence[float] | None) -> tuple[float, float]:
+def resolve_window(response: ResponseData, window: Sequence[float] | None) -> tuple[float, float]:
     """Return a valid window of a response, s, or its active span."""
     if window is None:
-        return find_active_span(response)
+        return compute_active_span(response)
     ends: Any = checks.numbers(window, "window", InvalidOption)
     if ends.shape != (2,) or not 0.0 <= ends[0] < ends[1] <= response.duration:
         requirement = f"(start, end), in s, with 0 <= start < end <= {response.duration:.6g}, the duration"
@@ -76,7 +76,7 @@ def resolve_window(response: Simulated, window: Sequence[float] | None) -> tuple
     return float(ends[0]), float(ends[1])
 
 
-def choose_times(response: Simulated, start: float, end: float) -> Floats:
+def choose_times(response: ResponseData, start: float, end: float) -> Floats:
     """Return times for a smooth line: even ones and visible steps."""
     even = np.linspace(start, end, _EVEN_TIMES)
     steps = _crop(response._history.trail.nodes["time"], start, end)
@@ -89,7 +89,7 @@ def _crop(times: Floats, start: float, end: float) -> Floats:
 
 
 def draw_histories(
-    response: Simulated,
+    response: ResponseData,
     units: RotationUnits,
     window: Sequence[float] | None,
     *,
@@ -105,7 +105,7 @@ def draw_histories(
     span = resolve_window(response, window)
     time, coordinate = choose_times(response, *span), response.block.coordinate
     is_rotation = coordinate.unit == "rad"
-    plus, minus = balances = _find_balances(response)
+    plus, minus = balances = _choose_balances(response)
     if not is_rotation or (units == "slenderness" and any(map(math.isinf, balances))):
         units = "rad"
     factors = {"slenderness": (1.0 / plus, 1.0 / minus), "deg": (math.degrees(1.0),) * 2, "rad": (1.0, 1.0)}[units]
@@ -145,13 +145,13 @@ def draw_histories(
     return page.figure
 
 
-def _find_balances(response: Simulated) -> tuple[float, float]:
+def _choose_balances(response: ResponseData) -> tuple[float, float]:
     """Return the balance on each side, for a one-sided body the same value twice."""
     (pair,), _ = compute_thresholds(response.block.as_bodies(), response.model)
     return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
 
 
-def _compute_ground_traces(response: Simulated, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
+def _compute_ground_traces(response: ResponseData, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
     """Return times and ground accelerations, g, by label."""
     motion = response.motion
     if motion is None:
@@ -163,7 +163,7 @@ def _compute_ground_traces(response: Simulated, start: float, end: float) -> dic
     return traces
 
 
-def _find_longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
+def _find_longest_sequence(response: ResponseData, start: float, end: float) -> np.void | None:
     """Return the sequence with the most impacts in the interval, if its time of rest is bracketed."""
     inside = response.sequences[(response.sequences["start"] >= start) & (response.sequences["end"] <= end)]
     longest: np.void | None = max(inside, key=lambda row: row["impacts"], default=None)
@@ -200,7 +200,7 @@ def _draw_rotation(axes: Axes, time: Floats, rotation: Floats, tipping_angles: F
         axes.axhline(level, label=label, **_BOUNDARY)
 
 
-def _mark_events(axes: Axes, response: Simulated, start: float, end: float) -> None:
+def _mark_events(axes: Axes, response: ResponseData, start: float, end: float) -> None:
     impacts, uplifts = (_crop(response.impacts["time"], start, end), find_event_times(response, start, end)["uplift"])
     if impacts.size:
         add_ticks(axes, impacts, 0.055, label=f"resolved impacts ({impacts.size})")
@@ -230,7 +230,7 @@ def _label_left_end(axes: Axes, text: str, y: float, offset: float) -> None:
     add_text(axes, text, (0.0, y), (3, offset), va=alignment, color=INK, fontsize="small", xycoords=transform)
 
 
-def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
+def _draw_thresholds(axes: Axes, response: ResponseData, time: Floats, acceleration: Floats) -> None:
     """Draw the uplift thresholds, which vary with the weight, and the motion beyond them."""
     (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
     lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
@@ -253,7 +253,7 @@ def _format_time_label(start: float, end: float, duration: float) -> str:
     return "time (s)" if is_all else f"time (s); shown: {start:.4g}–{end:.4g} s of {duration:.4g} s"
 
 
-def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.void) -> None:
+def _draw_sequence(main: Axes, axes: Axes, response: ResponseData, sequence: np.void) -> None:
     """Draw a sequence impact by impact, and mark it in the histories."""
     times = _crop(response.impacts["time"], sequence["start"], sequence["end"])
     ranges = response.perturbed().event_ranges[response.events["time"] == sequence["end"]]
@@ -303,7 +303,7 @@ class Course(NamedTuple):
         return np.insert(values, self.impact_rows + 1, np.nan)
 
 
-def compute_course(response: Simulated, start: float, end: float) -> Course:
+def compute_course(response: ResponseData, start: float, end: float) -> Course:
     """Compute the course of a response between two times, s."""
     history, energy = response._history, response._energy
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]
@@ -334,7 +334,7 @@ def compute_course(response: Simulated, start: float, end: float) -> Course:
     )
 
 
-def compute_boundary(response: Simulated) -> tuple[Floats, Floats]:
+def compute_boundary(response: ResponseData) -> tuple[Floats, Floats]:
     """Return rotations and velocities, in units of a `Course`, with the energy of the balance."""
     energy, gap = response._energy, np.array([np.nan])
     x: list[Floats] = []
@@ -349,14 +349,16 @@ def compute_boundary(response: Simulated) -> tuple[Floats, Floats]:
     return np.concatenate(x), np.concatenate(y)
 
 
-def find_event_times(response: Simulated, start: float, end: float) -> dict[str, Floats]:
+def find_event_times(response: ResponseData, start: float, end: float) -> dict[str, Floats]:
     """Return the times of uplift and rest within an interval, s."""
     events = response.events
     inside = (events["time"] >= start) & (events["time"] <= end)
     return {kind: np.asarray(events["time"][inside & (events["kind"] == kind)], float) for kind in ("uplift", "rest")}
 
 
-def draw_phase_plane(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
+def draw_phase_plane(
+    response: ResponseData, window: Sequence[float] | None, **options: Unpack[FigureOptions]
+) -> Figure:
     """Draw normalised velocity against normalised rotation in a window, in units of a `Course`."""
     span = resolve_window(response, window)
     course = compute_course(response, *span)
@@ -381,7 +383,7 @@ def draw_phase_plane(response: Simulated, window: Sequence[float] | None, **opti
     return page.figure
 
 
-def draw_energies(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
+def draw_energies(response: ResponseData, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw kinetic, potential and total energy, divided by the overturning energy, in a window."""
     course = compute_course(response, *resolve_window(response, window))
     time, total = course.time, course.kinetic + course.potential

@@ -98,7 +98,7 @@ class TimeHistory:
         ends = np.append(nodes["time"][1:], self.end)
         return np.column_stack([nodes["time"][rows], ends[rows]])
 
-    def find_tipping_time(self, balances: tuple[float, float]) -> float:
+    def compute_tipping_time(self, balances: tuple[float, float]) -> float:
         """Return the last time, s, at which a body passes its unstable balance outwards; NaN if it ends within it.
 
         ``balances``: coordinates of the balance on side + and side -.

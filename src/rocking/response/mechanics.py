@@ -91,7 +91,7 @@ class Contact:
         horizontal[outside] = vertical[outside] = np.nan
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
-    def find_extremes(self) -> tuple[float, float]:
+    def compute_extremes(self) -> tuple[float, float]:
         """Return the largest friction required to stick, and the smallest normal force."""
         times, rows = self._sample_steps()
         forces = self._compute_forces_in(times.ravel(), rows.ravel())
@@ -154,8 +154,8 @@ class Contact:
         theta, rate, acceleration = self.history.states_in(times, rows).T
         side = self.history.trail.nodes["side"][rows]
         ground = self._evaluate_ground(times, rows, side < 0)
-        stretch = compute_elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
-        return self.law((theta, rate, acceleration), ground, side, stretch)
+        elongation = compute_elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
+        return self.law((theta, rate, acceleration), ground, side, elongation)
 
     def _evaluate_ground(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
         """Return both ground accelerations in g, from the piece at the start of a step or, at rest, any piece."""
@@ -220,7 +220,7 @@ class Energy:
     @cached_property
     def balance(self) -> Floats:
         """Rotation of the unstable balance on each side in this model, rad; infinite if there is none."""
-        return np.array(self.body.balance) if self.nonlinear else find_linear_balance(self.body)
+        return np.array(self.body.balance) if self.nonlinear else compute_linear_balance(self.body)
 
     @cached_property
     def has_balances(self) -> bool:
@@ -295,7 +295,7 @@ class Energy:
         return self.kinetic(impacts["speed_before"], left) - self.kinetic(impacts["speed_after"], entered)
 
 
-def find_linear_balance(body: Block | RestrainedBlock) -> Floats:
+def compute_linear_balance(body: Block | RestrainedBlock) -> Floats:
     """Return the rotation of the unstable balance on each side in the linear model, rad; infinite if there is none.
 
     For a yielding tendon the first yield is considered, with the smaller of elastic force and strength, so the nearer
@@ -305,8 +305,8 @@ def find_linear_balance(body: Block | RestrainedBlock) -> Floats:
     elastic = _solve_linear_balance(record, record["added_weight"], record["added_push"], record["prestress"])
     if not record["yielding"]:
         return elastic
-    stretch = record["yield_elongation"] - record["slack_elongation"]
-    force = record["base_prestress"] + record["tendon_stiffness"] * stretch
+    elongation = record["yield_elongation"] - record["slack_elongation"]
+    force = record["base_prestress"] + record["tendon_stiffness"] * elongation
     return np.minimum(elastic, _solve_linear_balance(record, record["base_weight"], record["base_push"], force))
 
 
@@ -319,7 +319,7 @@ def _solve_linear_balance(record: Record, added_weight: Floats, added_push: Floa
     return balance
 
 
-def build_energy(body: Body, record: Record, *, nonlinear: bool) -> Energy:
+def create_energy(body: Body, record: Record, *, nonlinear: bool) -> Energy:
     """Return the energy of a block; raise `InvalidOption` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
         raise InvalidOption(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")

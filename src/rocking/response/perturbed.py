@@ -17,12 +17,12 @@ from rocking.core.tables import Column, columns_to_records, format_columns
 from rocking.errors import InvalidOption
 
 #: Relative step and number of factors in summaries and tables.
-RELATIVE: Final = 1e-6
-COUNT: Final = 5
+RELATIVE_STEP: Final = 1e-6
+FACTOR_COUNT: Final = 5
 
 #: Relative precision of a ground motion, and number of factors within it, in summaries and tables.
-PRECISION: Final = 1e-3
-_N_WITHIN_PRECISION: Final = 11
+MOTION_PRECISION: Final = 1e-3
+_PRECISION_FACTOR_COUNT: Final = 11
 
 #: Outcomes. A block that does not move also stands.
 OVERTURNS: Final = "overturns"
@@ -35,7 +35,7 @@ class Repeat(NamedTuple):
 
     See Also
     --------
-    rocking.response.Perturbed : Collect repeated simulations.
+    rocking.response.PerturbedSimulations : Collect repeated simulations.
     rocking.Response.perturbed : Repeat a simulation.
 
     Examples
@@ -58,7 +58,7 @@ class Repeat(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Perturbed(Result):
+class PerturbedSimulations(Result):
     """Repeated simulations with the motion or the initial state scaled, from `Response.perturbed`.
 
     The table "repeats" has a row for each factor.
@@ -124,17 +124,17 @@ class Perturbed(Result):
     @property
     def peak_range(self) -> tuple[float, float]:
         """Smallest and largest peak among the simulations with the outcome of factor 1, rad."""
-        return _find_range([repeat.peak for repeat in self.agreeing_repeats])
+        return _compute_range([repeat.peak for repeat in self.agreeing_repeats])
 
     @property
     def peak_time_range(self) -> tuple[float, float]:
         """Earliest and latest time of the peak among the simulations with the outcome of factor 1, s."""
-        return _find_range([repeat.peak_time for repeat in self.agreeing_repeats])
+        return _compute_range([repeat.peak_time for repeat in self.agreeing_repeats])
 
     @property
     def overturn_range(self) -> tuple[float, float]:
         """Earliest and latest time of overturning, s; NaN if the block does not overturn at factor 1."""
-        return _find_range([repeat.overturn_time for repeat in self.agreeing_repeats])
+        return _compute_range([repeat.overturn_time for repeat in self.agreeing_repeats])
 
     @property
     def event_ranges(self) -> Floats:
@@ -231,7 +231,7 @@ def list_factors(relative: float, count: int) -> list[float]:
 def choose_steps(precision: float) -> tuple[float, int]:
     """Return the relative step and number (eleven) of factors within a precision, for `Response.perturbed`."""
     limit = checks.between(precision, "precision", InvalidOption, 1e-6, 0.1)
-    return limit / (_N_WITHIN_PRECISION - 2), _N_WITHIN_PRECISION
+    return limit / (_PRECISION_FACTOR_COUNT - 2), _PRECISION_FACTOR_COUNT
 
 
 def format_percent(share: float) -> str:
@@ -246,5 +246,5 @@ def _merge(outcome: str) -> str:
     return STANDS if outcome == UNMOVED else outcome
 
 
-def _find_range(values: Sequence[float]) -> tuple[float, float]:
+def _compute_range(values: Sequence[float]) -> tuple[float, float]:
     return float(np.min(values)), float(np.max(values))

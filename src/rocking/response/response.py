@@ -18,8 +18,8 @@ from rocking.errors import InvalidOption
 from rocking.response import figure, summary
 from rocking.response.figure import RotationUnits
 from rocking.response.history import create_times
-from rocking.response.perturbed import PRECISION, choose_steps
-from rocking.response.simulated import Simulated
+from rocking.response.perturbed import MOTION_PRECISION, choose_steps
+from rocking.response.simulated import ResponseData
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ _N_POINTS = 2000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Simulated):
+class Response(ResponseData):
     """Response of one body to one motion, returned by `rocking.simulate`.
 
     Attributes
@@ -97,11 +97,11 @@ class Response(Simulated):
     def _headline(self) -> str:
         return summary.format_line(self)
 
-    def summary_rows(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
+    def summary_rows(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> Sequence[Row]:
         """Return the lines of `summary` as rows of name, value, unit and note; arguments as of `summary`."""
-        return summary.build_rows(self, friction, precision)
+        return summary.create_rows(self, friction, precision)
 
-    def facts(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
+    def result_rows(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> Sequence[Row]:
         """Return the entries of `to_dict` as rows of name, value and unit; arguments as of `summary`."""
         body, motion, limit = self.block, self.motion, self.block.coordinate.limit
         entries = motion and {
@@ -113,7 +113,7 @@ class Response(Simulated):
             and {"name": motion.vertical.name, add_unit("pga", "m/s^2"): motion.vertical.pga},
         }
         rows = [Row("block", {"description": body.description, **self._list_parameters()}), Row("motion", entries)]
-        rows += self._build_outcome_rows()
+        rows += self._create_outcome_rows()
         if limit:
             rows.append(Row(f"peak_over_{limit}", self.peak_over_slenderness))
         if isinstance(body, RestrainedBlock):
@@ -137,7 +137,7 @@ class Response(Simulated):
         gravity = {add_unit("gravity", "m/s^2"): self.block.gravity}
         return {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters} | gravity
 
-    def _build_outcome_rows(self) -> list[Row]:
+    def _create_outcome_rows(self) -> list[Row]:
         name, unit = self.block.coordinate.name, self.block.coordinate.unit
         rows = [Row("model", self.model), Row("chattering", repr(self.chattering))]
         rows += [Row(flag, getattr(self, flag)) for flag in ("overturned", "unfinished", "stopped", "leans")]
@@ -145,7 +145,7 @@ class Response(Simulated):
         rows.append(Row(f"peak_{name}", self.peak_rotation, unit))
         return [*rows, Row(f"residual_{name}", self.residual_rotation, unit)]
 
-    def summary(self, friction: float | None = None, *, precision: float = PRECISION) -> str:
+    def summary(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> str:
         """Return a description of the response, line by line, as printed by ``rocking simulate``.
 
         Parameters
@@ -163,12 +163,12 @@ class Response(Simulated):
         """
         return format_rows(self.summary_rows(friction, precision=precision), _WIDTH)
 
-    def to_dict(self, friction: float | None = None, *, precision: float = PRECISION) -> dict[str, Any]:
+    def to_dict(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> dict[str, Any]:
         """Return the result as plain values, as printed by ``rocking simulate --json``; arguments as of `summary`.
 
         Names contain units. Numbers that are not finite are None.
         """
-        return rows_to_dict(self.facts(friction, precision=precision))
+        return rows_to_dict(self.result_rows(friction, precision=precision))
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
         """Return time histories and events as a dataset. Its ``to_dataframe`` multiplies all dimensions.
@@ -186,7 +186,7 @@ class Response(Simulated):
                 column = values.astype(object) if values.dtype.kind == "U" else values
                 variables[f"{dimension}_{name}"] = (dimension, column, {"units": unit})
         motion = self.motion
-        rows = [row for row in self._build_outcome_rows() if row.name != "tipping_time"]
+        rows = [row for row in self._create_outcome_rows() if row.name != "tipping_time"]
         rows += [Row("peak_time", self.peak_time, "s"), Row("ambiguous", self.ambiguous)]
         attributes = {
             "block": self.block.description,
@@ -214,7 +214,7 @@ class Response(Simulated):
     def _columns(self, table: str, dt: float | None = None) -> list[Column]:
         checks.choice(table, "table", InvalidOption, self.TABLES)
         if table == "histories":
-            return self._build_histories(dt)
+            return self._create_histories(dt)
         if dt is not None:
             raise InvalidOption(f"{{}} is the step of the histories, and does not apply to {table}; omit it", "dt")
         return self._convert_table(table)
@@ -225,7 +225,7 @@ class Response(Simulated):
         units |= {"elongation": "m", "force": "N", "plastic_elongation": "m"}
         return [Column(name, rows[name], units.get(name, "s")) for name in rows.dtype.names]
 
-    def _build_histories(self, dt: float | None) -> list[Column]:
+    def _create_histories(self, dt: float | None) -> list[Column]:
         motion, (name, rate, _, unit, _) = self.motion, self.block.coordinate
         step = checks.positive(self._default_dt if dt is None else dt, "dt", InvalidOption, "s")
         if self.duration > _MAX_POINTS * step:

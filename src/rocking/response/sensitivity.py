@@ -83,19 +83,19 @@ class Sensitivity:
     @cached_property
     def peak(self) -> NDArray[np.void]:
         """Derivatives of the peak rotation, rad, shape (1,); 0 if overturned."""
-        return self._build_table(0)
+        return self._create_table(0)
 
     @cached_property
     def impacts(self) -> NDArray[np.void]:
         """Derivatives of the times of impacts, s."""
-        return self._build_table(1)
+        return self._create_table(1)
 
     @cached_property
     def events(self) -> NDArray[np.void]:
         """Derivatives of the times of events, s."""
-        return self._build_table(2)
+        return self._create_table(2)
 
-    def _build_table(self, index: int) -> NDArray[np.void]:
+    def _create_table(self, index: int) -> NDArray[np.void]:
         """Return changes of peak, impacts or events, with a field for each input."""
         values = self._changes[index]
         table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
@@ -162,7 +162,7 @@ def find_ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding
 
     ``height`` is the height of the peak above the stop, and ``rounding_decisions`` the known number of ties.
     """
-    early, late = (_find_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
+    early, late = (_compute_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
     rounding_decisions += int(np.any(late > early + AMBIGUITY))
     peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._changes)
     is_peak_clear = np.all(peak <= AMBIGUITY * max(height, 1e-300))
@@ -170,7 +170,7 @@ def find_ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding
     return tuple(name for name, clear in zip(("peak", "events", "touch"), is_clear, strict=True) if not clear)
 
 
-def _find_uplifts(trail: Trail, factor: float) -> Floats:
+def _compute_uplifts(trail: Trail, factor: float) -> Floats:
     """Return times of the next uplifts from all rests, with thresholds scaled by a factor."""
     block, times = trail.block.copy(), np.zeros(len(trail.nodes))
     block["threshold"] *= factor

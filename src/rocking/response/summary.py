@@ -14,7 +14,7 @@ from rocking.core.result import Row
 from rocking.core.tables import format_count
 from rocking.engine.problem import compute_thresholds
 from rocking.response.perturbed import choose_steps, format_percent
-from rocking.response.simulated import Simulated
+from rocking.response.simulated import ResponseData
 
 #: Largest numbers of decimals of a time and digits of a peak, and digits of a range of peaks.
 _MAX_DECIMALS: Final = 9
@@ -39,7 +39,7 @@ _AMBIGUITIES: Final = {
 }
 
 
-def build_rows(response: Simulated, friction: float | None, precision: float) -> list[Row]:
+def create_rows(response: ResponseData, friction: float | None, precision: float) -> list[Row]:
     """Return the rows of a summary, including the check of a coefficient of friction if given."""
     body = response.block
     sliding = math.nan if friction is None else response.sliding_time(friction)
@@ -49,9 +49,9 @@ def build_rows(response: Simulated, friction: float | None, precision: float) ->
         *([Row("balance", _describe_balance(response))] if isinstance(body, RestrainedBlock) else []),
         Row("motion", _summarize_motion(response)),
         Row("uplift above", _describe_thresholds(response)),
-        *_build_event_rows(response),
+        *_create_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
-        *_build_peak_rows(response),
+        *_create_peak_rows(response),
         *([Row(f"residual {body.coordinate.name}", _format_residual(response))] if response.leans else []),
     ]
     for row in response.tendons:
@@ -82,12 +82,12 @@ def build_rows(response: Simulated, friction: float | None, precision: float) ->
     return [*rows, Row("", response.perturbed(*choose_steps(precision)).describe_agreement())]
 
 
-def describe_subject(response: Simulated) -> str:
+def describe_subject(response: ResponseData) -> str:
     """Return the body and its motion as text."""
     return f"{response.block.description} under {'no motion' if response.motion is None else response.motion.label}"
 
 
-def format_line(response: Simulated) -> str:
+def format_line(response: ResponseData) -> str:
     """Return the response in one line."""
     limit, peak = response.block.coordinate.limit, ""
     if limit and not response.overturned and math.isfinite(response._balance_at_peak):
@@ -97,7 +97,7 @@ def format_line(response: Simulated) -> str:
     return f"{describe_subject(response)}: {outcome}{peak}; {counts}, {response.duration:.5g} s"
 
 
-def format_outcome(response: Simulated, overturn_time: str) -> str:
+def format_outcome(response: ResponseData, overturn_time: str) -> str:
     """Return the outcome for the summary. The time of overturning is passed as text."""
     if response.overturned:
         return f"overturns at {overturn_time}"
@@ -114,7 +114,7 @@ def format_outcome(response: Simulated, overturn_time: str) -> str:
     return "rocks and does not overturn" if response.block.coordinate.limit else "moves, and comes to rest"
 
 
-def format_brief_outcome(response: Simulated, precision: float) -> str:
+def format_brief_outcome(response: ResponseData, precision: float) -> str:
     """Return the outcome for a row of a table."""
     perturbed, within_precision = response.perturbed(), response.perturbed(*choose_steps(precision))
     counts_overturned = not perturbed.is_decided and perturbed.overturned.any()
@@ -135,17 +135,17 @@ def format_brief_outcome(response: Simulated, precision: float) -> str:
     return f"{text} in {', '.join(parts)}{', AMBIGUOUS' if response.ambiguous else ''}"
 
 
-def _format_residual(response: Simulated) -> str:
+def _format_residual(response: ResponseData) -> str:
     """Return the residual rotation, which depends on the peak if a tendon has yielded."""
     return f"{response.residual_rotation:.{_count_peak_digits(response)}g} {response.block.coordinate.unit}"
 
 
-def format_ratio(response: Simulated) -> str:
+def format_ratio(response: ResponseData) -> str:
     """Return the normalised peak rotation with the known digits."""
     return f"{response.peak_over_slenderness:.{min(_count_peak_digits(response), 4)}g}"
 
 
-def round_ratio(response: Simulated) -> float:
+def round_ratio(response: ResponseData) -> float:
     """Return the normalised peak rotation, rounded if fewer than four digits are known."""
     is_known = _count_peak_digits(response) >= _SHORT_DECIMALS
     return response.peak_over_slenderness if is_known else float(format_ratio(response))
@@ -159,7 +159,7 @@ def format_time(time: float, low: float, high: float) -> str:
     return f"{time:.{decimals}f} s" if is_narrow else f"{low:.{decimals}f} to {high:.{decimals}f} s"
 
 
-def format_tipping_time(response: Simulated) -> str:
+def format_tipping_time(response: ResponseData) -> str:
     """Return the tipping time with the known digits, which equal the ones of the overturning time."""
     uncertainty = 0.0
     if response.overturned:
@@ -168,7 +168,7 @@ def format_tipping_time(response: Simulated) -> str:
     return f"{prefix}{response.tipping_time:.{min(_count_decimals(uncertainty), _SHORT_DECIMALS)}f} s"
 
 
-def _summarize_motion(response: Simulated) -> str:
+def _summarize_motion(response: ResponseData) -> str:
     """Describe the ground motion. In all texts g is standard gravity."""
     motion = response.motion
     if motion is None:
@@ -179,7 +179,7 @@ def _summarize_motion(response: Simulated) -> str:
     return "; ".join(parts)
 
 
-def _describe_thresholds(response: Simulated) -> str:
+def _describe_thresholds(response: ResponseData) -> str:
     """Return the uplift thresholds, which vary with the weight under vertical motion."""
     motion = response.motion
     (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
@@ -195,7 +195,7 @@ def _describe_thresholds(response: Simulated) -> str:
     return f"{text}; from {lowest:.4f} to {highest:.4f} g with the weight{'' if is_single else ', to side +'}"
 
 
-def _build_event_rows(response: Simulated) -> list[Row]:
+def _create_event_rows(response: ResponseData) -> list[Row]:
     sequences = {float(row["end"]): row for row in response.sequences}
     perturbed = response.perturbed()
     rows: list[Row] = []
@@ -226,7 +226,7 @@ def _describe_proof(uncertainty: float, sequence: np.void) -> str:
     return f", complete chattering proven{start}{bracket}"
 
 
-def _build_peak_rows(response: Simulated) -> list[Row]:
+def _create_peak_rows(response: ResponseData) -> list[Row]:
     """Return rows of the peak and its time, each with the known digits."""
     perturbed, (name, _, _, unit, limit) = response.perturbed(), response.block.coordinate
     (low, high), digits, balance = perturbed.peak_range, _count_peak_digits(response), response._balance_at_peak
@@ -246,7 +246,7 @@ def _build_peak_rows(response: Simulated) -> list[Row]:
     return [Row(f"peak {name}", value, unit, note)]
 
 
-def _describe_balance(response: Simulated) -> str:
+def _describe_balance(response: ResponseData) -> str:
     """Return the unstable balance of a restrained block."""
     plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
     if plus != minus and not (isinstance(response.block, RestrainedBlock) and response.block.is_one_sided):
@@ -254,7 +254,7 @@ def _describe_balance(response: Simulated) -> str:
     return "none: restraints hold it at any rotation" if plus == "none" else plus
 
 
-def _describe_outcome(response: Simulated) -> str:
+def _describe_outcome(response: ResponseData) -> str:
     text = response.perturbed().describe_outcome()
     if response.overturned:
         text += f", at {format_time(response.overturn_time, *response.perturbed().overturn_range)}"
@@ -268,7 +268,7 @@ def _describe_outcome(response: Simulated) -> str:
     return text
 
 
-def _describe_stop(response: Simulated) -> str:
+def _describe_stop(response: ResponseData) -> str:
     end = f"{response.duration:.6g} s"
     if not math.isnan(response.tipping_time):
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
@@ -277,7 +277,7 @@ def _describe_stop(response: Simulated) -> str:
     return f"at rest at {end}" if response.moved else f"has not moved by {end}"
 
 
-def _count_peak_digits(response: Simulated) -> int:
+def _count_peak_digits(response: ResponseData) -> int:
     """Return the number of known digits of the peak."""
     uncertainty = _compute_uncertainty(response.peak_rotation, *response.perturbed().peak_range)
     value = abs(response.peak_rotation - response.block.stops[0])

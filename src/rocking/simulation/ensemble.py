@@ -25,7 +25,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 from rocking.records.named import Motions, list_motion_names, list_motions
-from rocking.response.perturbed import COUNT, RELATIVE, list_factors
+from rocking.response.perturbed import FACTOR_COUNT, RELATIVE_STEP, list_factors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -195,7 +195,7 @@ class Product:
         return self.bodies
 
 
-def build_product(
+def create_product(
     blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     levels: ArrayLike | None,
@@ -211,7 +211,7 @@ def build_product(
     return Product(bodies, ground_motions, scales, polarity, model, scheme, duration)
 
 
-def build_setup(product: Product, bodies: slice | None = None) -> Setup:
+def create_setup(product: Product, bodies: slice | None = None) -> Setup:
     """Return the setup for all or some bodies of a product."""
     selected = product.bodies if bodies is None else product.bodies.select(bodies)
     return Setup(selected, product.model, product.chattering, product.duration)
@@ -227,7 +227,7 @@ def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
             yield Task(block, motion, perturbation * (signs[k] * factors[s]), (m, s, k))
 
 
-def build_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
+def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     """Create a dataset from arrays named as in `VARIABLES`, without the dimensions that were not requested."""
     import xarray as xr
 
@@ -350,16 +350,16 @@ def simulate_many(
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    product = build_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
     names = (*VARIABLES, *(TIMES if checks.boolean(times, "times", InvalidOption) else ()))
-    setup = build_setup(product)
+    setup = create_setup(product)
     outcomes = simulate_product(product, setup, names)
     if checks.boolean(robust, "robust", InvalidOption):
-        factors = [factor for factor in list_factors(RELATIVE, COUNT) if factor != 1.0]
+        factors = [factor for factor in list_factors(RELATIVE_STEP, FACTOR_COUNT) if factor != 1.0]
         repeats = [simulate_product(product, setup, ["overturned"], factor) for factor in factors]
         overturned = [result["overturned"].astype(bool) for result in (outcomes, *repeats)]
         outcomes["overturned_share"] = np.mean(overturned, axis=0)
-    return build_dataset(product, outcomes)
+    return create_dataset(product, outcomes)
 
 
 def simulate_product(

@@ -212,7 +212,7 @@ class Moments(NamedTuple):
 
 def compute_signed_volumes(vertices: Floats, faces: Integers) -> Floats:
     """Return the volume between each triangle and the middle, positive if its normal points outwards."""
-    first, second, third = (vertices[faces[:, k]] - _find_middle(vertices) for k in range(3))
+    first, second, third = (vertices[faces[:, k]] - _compute_middle(vertices) for k in range(3))
     return np.asarray(np.einsum("ij,ij->i", first, np.cross(second, third)) / 6.0)
 
 
@@ -222,7 +222,7 @@ def compute_moments(vertices: Floats, faces: Integers) -> Moments:
     Every triangle and a common point span a tetrahedron of signed volume V. With the sum s of its corners a, b, c
     relative to this point, its first moment is V s/4, its second V (s s^T + a a^T + b b^T + c c^T)/20.
     """
-    reference = _find_middle(vertices)
+    reference = _compute_middle(vertices)
     corners = vertices[faces] - reference
     volumes = compute_signed_volumes(vertices, faces)
     amount = float(volumes.sum())
@@ -245,7 +245,7 @@ def combine_moments(parts: Sequence[Moments], densities: Sequence[float]) -> Mom
     return Moments(total, centre, second)
 
 
-def _find_middle(vertices: Floats) -> Floats:
+def _compute_middle(vertices: Floats) -> Floats:
     """Return the middle of all corners, a reference point that avoids cancellation."""
     return np.asarray(0.5 * (vertices.min(axis=0) + vertices.max(axis=0)))
 

@@ -22,8 +22,8 @@ from rocking.inputs.bodies import (
     check_parameters,
     create_block,
     create_body,
+    find_description,
     find_reader,
-    find_shape,
     note_likely_mistakes,
 )
 from rocking.inputs.declared import BLOCK, COUPLES, FORCES, INPUTS, SUPPORTS, read_noted_acceleration
@@ -181,7 +181,7 @@ def _read_bodies(tables: Tables) -> Bodies:
             raise tables.create_error("blocks", "csv", "{} cannot be combined with other keys", "csv")
         return _read_blocks_csv(tables, tables.file.parent / entries["csv"])
     with tables.locating_errors("blocks"):
-        find_shape(entries)
+        find_description(entries)
     axes: dict[str, Any] = {}
     for name in (*(name for name in entries if name in BLOCK), "one_sided", "lean", *COUPLES):
         with tables.locating_errors("blocks", key=name):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rocking.dynamics.bodies  # noqa: F401 -- registers its kinds
-from rocking.block.body import KINDS
+from rocking.block.body import BODIES_TYPES
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import format_count, write_bytes
@@ -26,7 +26,7 @@ from rocking.errors import DamagedStudy, OutputError, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, Scales, build_setup
+from rocking.simulation.ensemble import Product, Scales, create_setup
 from rocking.studies.units import OUTCOMES, Key, UnitGrid, UnitInput, decode, format_key, identify_program, seal, unseal
 
 if sys.platform == "win32":
@@ -136,7 +136,7 @@ class Store:
         """Create the complete input of a worker for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
-        return UnitInput(build_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
+        return UnitInput(create_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
 
     def _compute_factors(self, unit: int) -> Floats:
         """Return the factors on the motions of a unit, shape (motions, scales, polarities)."""
@@ -245,7 +245,7 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
 
 def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
     """Create the inputs from their arrays."""
-    kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in KINDS), "")
+    kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in BODIES_TYPES), "")
     if not kind:
         raise StudyError("the study contains an unknown kind of body: import its module first")
     values = {name.partition("/")[2]: array for name, array in arrays.items() if name.startswith(f"{kind}/")}
@@ -253,7 +253,7 @@ def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
     texts = {name: json.loads(str(array)) for name, array in arrays.items() if array.dtype.kind == "U"}
     measure, chattering = texts["scales/measure"], chattering_scheme(texts["rules/chattering"])
     return Product(
-        KINDS[kind](**{**values, "gravity": float(values["gravity"])}),
+        BODIES_TYPES[kind](**{**values, "gravity": float(values["gravity"])}),
         tuple(_motion_from_arrays(arrays, f"motions/{k}") for k in motions),
         Scales(None if measure is None else Measure(**measure), arrays["scales/values"]),
         *(texts["rules/polarity"], texts["rules/model"], chattering, texts["rules/duration"]),

@@ -48,7 +48,7 @@ from rocking.engine.problem import compute_slenderness
 from rocking.engine.tasks import OUTCOME, describe_missing
 from rocking.errors import InvalidOption, StudyError, Unfitted, describe_install
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, body_coordinates, build_dataset, collect_verticals
+from rocking.simulation.ensemble import Product, body_coordinates, collect_verticals, create_dataset
 from rocking.studies.folder import Store
 from rocking.studies.units import OUTCOMES, format_key
 
@@ -78,7 +78,7 @@ def open_results(store: Store) -> xr.Dataset:
         outcomes["done"] = np.zeros(grid.shape, dtype=bool)
         for key in done:
             outcomes["done"][grid.ranges(key)] = True
-    return _add_records(store, build_dataset(store.product, outcomes))
+    return _add_records(store, create_dataset(store.product, outcomes))
 
 
 def _add_records(store: Store, data: xr.Dataset) -> xr.Dataset:
@@ -197,7 +197,7 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     changed = (holds[:, 1:] != holds[:, :-1]) & (below[:, :-1] >= 0)
     motion, polarity, block, scale = np.nonzero(changed.transpose(0, 2, 3, 1))
     low = below[motion, scale, polarity, block]
-    dataset, attributes = _add_records(store, build_dataset(product, {})), product.scales.attributes
+    dataset, attributes = _add_records(store, create_dataset(product, {})), product.scales.attributes
     name, meaning = ("overturns", "whether the scale above overturns the block, and the one below does not")
     if outcome == "complete_chattering":
         name, meaning = ("completes", "whether chattering is complete at the scale above, and not below")

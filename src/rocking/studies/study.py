@@ -35,7 +35,7 @@ from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions
-from rocking.simulation.ensemble import Polarity, Product, build_product
+from rocking.simulation.ensemble import Polarity, Product, create_product
 from rocking.studies.folder import Store, contains_study, lock_folder, read_bytes, require_empty, write_atomically
 from rocking.studies.results import (
     BlockTable,
@@ -428,7 +428,7 @@ def create_study(
     >>> rocking.Study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    product = build_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
     return open_or_create(folder, product, unit_blocks)
 
 
