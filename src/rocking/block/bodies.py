@@ -19,7 +19,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.tables import format_range
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 from rocking.kernels import state
 
 _FIELDS: Final = ("p", "alpha", "restitution")
@@ -65,7 +65,7 @@ class Blocks:
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If a value is out of range, or p and alpha determine no restitution. The message names the block.
 
     See Also
@@ -103,13 +103,13 @@ class Blocks:
             arguments |= {**_TERMS, **terms}
             if unknown := [*terms.keys() - _TERMS.keys()]:
                 message = f"blocks have no parameter {{}}; the terms of restraints are {', '.join(_TERMS)}"
-                raise InvalidBlock(message, unknown[0])
+                raise BlockError(message, unknown[0])
         try:
-            columns = [_expand_sides(checks.numbers(values, name, InvalidBlock)) for name, values in arguments.items()]
+            columns = [_expand_sides(checks.numbers(values, name, BlockError)) for name, values in arguments.items()]
             arrays = dict(zip(arguments, np.broadcast_arrays(*columns), strict=True))
         except ValueError:
             message = "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with the same n"
-            raise InvalidBlock(message, *_FIELDS) from None
+            raise BlockError(message, *_FIELDS) from None
         g = check_gravity(gravity)
         for name in _FIELDS if restitution is not None else _FIELDS[:2]:
             check_sides(arrays[name], name)
@@ -158,10 +158,10 @@ class Blocks:
         arguments = {"p": resolve_p(p, size, gravity), "alpha": alpha}
         if restitution is not None:
             arguments["restitution"] = restitution
-        axes = {name: np.atleast_1d(checks.numbers(axis, name, InvalidBlock)) for name, axis in arguments.items()}
+        axes = {name: np.atleast_1d(checks.numbers(axis, name, BlockError)) for name, axis in arguments.items()}
         if any(axis.ndim != 1 or axis.size == 0 for axis in axes.values()):
-            raise InvalidBlock("each parameter of a grid must be a number or a sequence of at least one number")
-        checks.grid_size({name: axis.size for name, axis in axes.items()}, InvalidBlock)
+            raise BlockError("each parameter of a grid must be a number or a sequence of at least one number")
+        checks.grid_size({name: axis.size for name, axis in axes.items()}, BlockError)
         blocks = cls(*(column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")), gravity=gravity)
         return blocks._fill(blocks.gravity, blocks._arrays(), axes)
 
@@ -184,7 +184,7 @@ class Blocks:
 
         Raises
         ------
-        InvalidBlock
+        BlockError
             If there are no blocks, an item is not a block, or gravities differ.
         """
         if isinstance(blocks, Blocks):
@@ -197,7 +197,7 @@ class Blocks:
         gravities = {body.gravity for body in bodies}
         if len(gravities) != 1:
             message = "Blocks.from_bodies requires at least one block, and the same {} for all of them"
-            raise InvalidBlock(message, "gravity")
+            raise BlockError(message, "gravity")
         rows = [body._create_rows() for body in bodies]
         if max(len(sides[0]) for sides in rows) > len(_FIELDS):
             rows = [[(*side, *[*_TERMS.values()][len(side) - len(_FIELDS) :]) for side in sides] for sides in rows]
@@ -302,7 +302,7 @@ class Blocks:
     def __getitem__(self, index: int) -> Block | RestrainedBlock:
         if isinstance(index, (slice, tuple, list, np.ndarray)):
             message = "the index of a block must be a whole number; use blocks.select for slices, indices and masks"
-            raise InvalidBlock(message)
+            raise BlockError(message)
         p, alpha, e = (tuple(array[index]) for array in (self.p, self.alpha, self.restitution))
         block = Block.from_parameters(p, alpha, e, gravity=self.gravity)
         terms, is_one_sided = [Terms(), Terms()], False
@@ -329,7 +329,7 @@ class Blocks:
         if rows.ndim != 1:
             requirement = f"a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} values"
             hint = "use blocks[0] for a single block"
-            raise InvalidBlock(f"select requires {requirement}, not {checks.short_repr(index)}; {hint}")
+            raise BlockError(f"select requires {requirement}, not {checks.short_repr(index)}; {hint}")
         arrays = {name: values[rows] for name, values in self._arrays().items()}
         return Blocks.__new__(Blocks)._fill(self.gravity, arrays)
 
@@ -349,10 +349,10 @@ def resolve_p(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> Ar
     if p is not None and size is None:
         return p
     if size is not None and p is None:
-        g = checks.positive(gravity, "gravity", InvalidBlock, "m/s^2")
-        return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidBlock))
+        g = checks.positive(gravity, "gravity", BlockError, "m/s^2")
+        return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", BlockError))
     suffix = "" if p is None else ", not both"
-    raise InvalidBlock(f"give either {{}} (rad/s) or {{}} (half diagonals, m){suffix}", "p", "size")
+    raise BlockError(f"give either {{}} (rad/s) or {{}} (half diagonals, m){suffix}", "p", "size")
 
 
 def _expand_sides(array: Floats) -> Floats:
@@ -370,12 +370,12 @@ def _compute_restitutions(p: Floats, alpha: Floats) -> Floats:
     factors[asymmetric], _ = compute_rigid_bodies(p[asymmetric], alpha[asymmetric])
     if (undetermined := np.isnan(factors).any(axis=1)).any():
         first = int(np.argmax(undetermined))
-        raise InvalidBlock(f"{describe_missing_body(p[first], alpha[first])} (block {first})", "restitution")
+        raise BlockError(f"{describe_missing_body(p[first], alpha[first])} (block {first})", "restitution")
     stocky = np.flatnonzero(~(factors > 0.0).all(axis=1))
     if len(stocky):
         result = f"gives block {stocky[0]} a restitution of {factors[stocky[0]].min():.3g}, because it is too stocky"
         message = f"conservation of angular momentum {result}; set {{}} to a value or a pair in (0, 1]"
-        raise InvalidBlock(message, "restitution")
+        raise BlockError(message, "restitution")
     return check_sides(factors, "restitution")
 
 

@@ -36,7 +36,7 @@ from rocking.cli.options import (
 )
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.core.result import DatasetResult
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.inputs.bodies import create_block, note_likely_mistakes
 from rocking.inputs.declared import BLOCK_DESCRIPTIONS
 from rocking.inputs.quantities import read_angle, read_array, read_length, read_tilt
@@ -86,10 +86,10 @@ def spectrum(
         Abscissa of the figure.
     """
     if alpha is None and ensemble is None:
-        raise InvalidOption("a spectrum requires {}, or the {} of a calibration", "alpha", "ensemble")
+        raise OptionError("a spectrum requires {}, or the {} of a calibration", "alpha", "ensemble")
     if ensemble is not None and (alpha is not None or restitution is not None):
         message = "the file of {} contains slendernesses and restitutions: omit {} and {}"
-        raise InvalidOption(message, "ensemble", "alpha", "restitution")
+        raise OptionError(message, "ensemble", "alpha", "restitution")
     with output.folder() as folder:
         axes: dict[str, Any] = {
             "p": None if p is None else read_array(p, "p"),
@@ -250,7 +250,7 @@ def _create_slender_block(options: BlockOptions) -> Block:
     values = options.read_values()
     if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
         message = "the restitution of two different sides depends on {} and {} of both; also set {}"
-        raise InvalidBlock(message, "p", "alpha", "p")
+        raise BlockError(message, "p", "alpha", "p")
     block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_DESCRIPTIONS)
     note_likely_mistakes([block])
     return block

@@ -17,11 +17,11 @@ from cyclopts import Group, Parameter, Token
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.errors import (
-    InvalidBlock,
-    InvalidMotion,
-    InvalidOption,
+    BlockError,
+    MotionError,
+    OptionError,
+    RecordError,
     RockingError,
-    UnreadableRecord,
     escape_braces,
     join_placeholders,
 )
@@ -132,10 +132,10 @@ class RestrainedOptions(BlockOptions):
                     forces.append(couple(INPUTS[name].read(texts[name])))
         try:
             body = bodies.create_body(block, self.read_values("restitution", "one_sided", "lean"), forces)
-        except InvalidBlock as error:
+        except BlockError as error:
             if not forces or error.argument != "offset":
                 raise
-            raise InvalidBlock(escape_braces(str(error))) from error  # of a restraint, not the --offset of the block
+            raise BlockError(escape_braces(str(error))) from error  # of a restraint, not the --offset of the block
         bodies.note_likely_mistakes([block], [body])
         return body
 
@@ -155,7 +155,7 @@ class EnsembleOptions(RestrainedOptions):
             return {"blocks": self.body(), "model": model.model}
         if conflicting := [name for name in self.supplied() if name != "ensemble"]:
             message = f"{{}} replaces the block: omit {join_placeholders(conflicting)}"
-            raise InvalidBlock(message, "ensemble", *conflicting)
+            raise BlockError(message, "ensemble", *conflicting)
         return read_ensemble_arguments(self.ensemble, model)
 
 
@@ -173,7 +173,7 @@ def _add_option_to_errors(option: str) -> Iterator[None]:
     try:
         yield
     except RockingError as error:
-        raise InvalidOption(f"{{}}: {escape_braces(str(error))}", option) from error
+        raise OptionError(f"{{}}: {escape_braces(str(error))}", option) from error
 
 
 def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
@@ -186,9 +186,9 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
         name = name.replace("-", "_")
         if not equals or name in values:
             message = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
-            raise InvalidOption(message + escape_braces(repr(text)), option, value=text)
+            raise OptionError(message + escape_braces(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
-            raise InvalidOption(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
+            raise OptionError(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
         values[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
     bodies.check_parameters(kind, values, "{}", option)
     with _add_option_to_errors(option):
@@ -274,7 +274,7 @@ def read_records(
         for name in names:
             try:
                 results[name] = read(name)
-            except (UnreadableRecord, InvalidMotion) as error:
+            except (RecordError, MotionError) as error:
                 if not keep_going:
                     raise
                 message = error.text(lambda argument: _FILE_OPTIONS.get(argument, argument))
@@ -296,13 +296,13 @@ class _RecordOptions(FileOptions):
         records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
         if not records and not pulses:
             message = "at least one record is required: file, folder, or name of a shipped record, or {}"
-            raise InvalidOption(message, "pulse")
+            raise OptionError(message, "pulse")
         pulse_motions = self.pulses()
         read = functools.partial(self.motion, several=len(records) > 1)
         motions, skipped = read_records(records, read, keep_going=self.keep_going)
         messages = [*skipped.values()]
         if records and not motions:
-            raise UnreadableRecord(f"none of {len(records)} records could be read; the first: {messages[0]}")
+            raise RecordError(f"none of {len(records)} records could be read; the first: {messages[0]}")
         for message in messages:
             note(f"skipped: {message}")
         motions |= pulse_motions
@@ -398,7 +398,7 @@ def read_positive_acceleration(text: str, name: str) -> float:
     """Read a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
     if not read_acceleration(text, name) > 0.0:
         message = f"{{}} must be positive; got {text.strip()}; use {{}} -1 to reverse a motion"
-        raise InvalidOption(message, name, "scale", value=text)
+        raise OptionError(message, name, "scale", value=text)
     return read_noted_acceleration(text, name)
 
 
@@ -406,9 +406,9 @@ def _read_ratio(text: str, name: str) -> float:
     """Read a level of a measure in the units of the block."""
     try:
         return read_number(text, name)
-    except InvalidOption:
+    except OptionError:
         message = "{} must be plain numbers with this {}, which is in units of the block; got "
-        raise InvalidOption(message + repr(text.strip()), name, "measure") from None
+        raise OptionError(message + repr(text.strip()), name, "measure") from None
 
 
 def parse_limit_states(text: str) -> dict[str, float]:
@@ -418,13 +418,13 @@ def parse_limit_states(text: str) -> dict[str, float]:
         name, equals, value = part.strip().partition("=")
         if not equals and name != "overturning":
             message = f"{{}} must be overturning or NAME=ROTATION divided by slenderness; got {part.strip()!r}"
-            raise InvalidOption(message, "limit_states", value=text)
+            raise OptionError(message, "limit_states", value=text)
         if name in limits or (equals and name in ("", "overturning")):
             message = f"contains {name} twice" if name in limits else f"must not name a rotation {name!r}"
-            raise InvalidOption(f"{{}} {message}; name each limit state once, as half=0.5", "limit_states")
+            raise OptionError(f"{{}} {message}; name each limit state once, as half=0.5", "limit_states")
         try:
             limits[name] = read_number(value, "limit_states") if equals else math.inf
-        except InvalidOption:
+        except OptionError:
             message = f"{{}} {name} must be a number; got {value.strip()!r}"
-            raise InvalidOption(message, "limit_states", value=text) from None
+            raise OptionError(message, "limit_states", value=text) from None
     return limits

@@ -11,7 +11,7 @@ from rocking.block import Block, RestrainedBlock, Restraint
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.progress import note
-from rocking.errors import InvalidBlock, InvalidOption, escape_braces, join_placeholders
+from rocking.errors import BlockError, OptionError, escape_braces, join_placeholders
 from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, INPUTS, READERS, BlockDescription
 from rocking.inputs.notes import block_notes, restraint_notes
@@ -31,7 +31,7 @@ _FREQUENCY_PARAMETER: Final = (
 def find_description(
     names: Iterable[str], descriptions: Sequence[BlockDescription] = BLOCK_DESCRIPTIONS
 ) -> BlockDescription:
-    """Return the description that contains the named inputs, or raise `InvalidBlock` if there is not exactly one."""
+    """Return the description that contains the named inputs, or raise `BlockError` if there is not exactly one."""
     provided = [name for name in BLOCK if name in {*names} and name != "restitution"]
     for description in descriptions:
         if {*description.needed} <= {*provided} <= {*description.needed, *description.optional}:
@@ -49,7 +49,7 @@ def find_description(
         message, alternatives = f"a block requires more than {placeholders}; give ", partly_given
     hint = f"; {_FREQUENCY_PARAMETER}" if provided == ["alpha"] and "p" in partly_given[0] else ""
     message += ", or ".join(map(join_placeholders, alternatives)) + hint
-    raise InvalidBlock(message, *provided, *itertools.chain(*alternatives))
+    raise BlockError(message, *provided, *itertools.chain(*alternatives))
 
 
 def create_block(values: Mapping[str, Any], descriptions: Sequence[BlockDescription] = BLOCK_DESCRIPTIONS) -> Block:
@@ -97,12 +97,12 @@ def check_parameters(factory: Callable[..., object], provided: Iterable[str], ow
     parameters = inspect.signature(factory).parameters
     for name in provided:
         if name not in parameters:
-            raise InvalidOption(
+            raise OptionError(
                 f"{owner} has no {escape_braces(name)}; {checks.suggest(name, [*parameters])}", *names, name
             )
     missing = [name for name, item in parameters.items() if item.default is item.empty and name not in {*provided}]
     if missing:
-        raise InvalidOption(f"{owner} also requires {' and '.join(missing)}", *names)
+        raise OptionError(f"{owner} also requires {' and '.join(missing)}", *names)
 
 
 def _convert_arguments(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import round_decimal
-from rocking.errors import InvalidOption, escape_braces, join_placeholders
+from rocking.errors import OptionError, escape_braces, join_placeholders
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import ACCELERATION_UNITS, TIME_UNITS, Unit, normalise_spelling
 
@@ -61,7 +61,7 @@ def read_number(text: str, name: str) -> float:
     """Return a number without a unit."""
     value, unit = _split_unit(text)
     if value is None or unit:
-        raise InvalidOption(f"{{}} must be a number, not {text.strip()!r}", name, value=text)
+        raise OptionError(f"{{}} must be a number, not {text.strip()!r}", name, value=text)
     return value
 
 
@@ -72,7 +72,7 @@ def _create_reader(units: Mapping[str, Unit], expected: str) -> Quantity:
         value, spelling = _split_unit(text)
         unit = units.get(normalise_spelling(spelling))
         if value is None or unit is None:
-            raise InvalidOption(f"{{}} must be {expected}, not {text.strip()!r}", name, value=text)
+            raise OptionError(f"{{}} must be {expected}, not {text.strip()!r}", name, value=text)
         return value * unit.multiplier / unit.divisor
 
     return read
@@ -91,7 +91,7 @@ def read_length(text: str, name: str) -> float:
     """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
     value = read_position(text, name)
     if not value > 0.0:
-        raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", name, value=text)
+        raise OptionError(f"{{}} must be a positive length, in m, not {text.strip()}", name, value=text)
     return value
 
 
@@ -105,7 +105,7 @@ def read_tilt(text: str, name: str) -> float:
         message = (
             f"{{}} must be below pi/2 rad; got {text.strip()}, which is read as rad; did you mean {text.strip()}deg?"
         )
-    raise InvalidOption(message, name, value=text)
+    raise OptionError(message, name, value=text)
 
 
 def read_sides(text: str, name: str, quantity: Quantity = read_number) -> float | list[float]:
@@ -123,7 +123,7 @@ def read_bounds(text: str, name: str, quantity: Quantity = read_number) -> float
 def _read_one_or_two(text: str, name: str, quantity: Quantity, expected: str) -> float | list[float]:
     numbers = [quantity(part, name) for part in text.split(",")]
     if len(numbers) > 2:
-        raise InvalidOption(f"{{}} must be {expected}, not {text!r}", name, value=text)
+        raise OptionError(f"{{}} must be {expected}, not {text!r}", name, value=text)
     return numbers[0] if len(numbers) == 1 else numbers
 
 
@@ -152,14 +152,14 @@ def read_array(text: str, name: str, quantity: Quantity = read_number) -> Floats
         else:
             numbers = np.geomspace(start, stop, count) if is_logarithmic else np.linspace(start, stop, count)
             return np.array([round_decimal(number) for number in numbers])  # 0.3, not 0.30000000000000004
-    raise InvalidOption(f"{{}} must be {requirement}, not {text!r}", name, value=text)
+    raise OptionError(f"{{}} must be {requirement}, not {text!r}", name, value=text)
 
 
 def read_level_at_period(text: str, name: str, quantity: Quantity = read_acceleration) -> tuple[float, float]:
     """Return an acceleration, m/s^2, and a period, s, from "0.4g@1.0"."""
     level, at, period = text.partition("@")
     if not at:
-        raise InvalidOption(f"{{}} must be an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
+        raise OptionError(f"{{}} must be an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
     return quantity(level, name), read_duration(period, name)
 
 
@@ -171,19 +171,19 @@ def read_scaling(
     if not options:
         return None
     if len(options) > 1:
-        raise InvalidOption(f"{join_placeholders(options)} scale the same motion; use only one of them", *options)
+        raise OptionError(f"{join_placeholders(options)} scale the same motion; use only one of them", *options)
     ((name, value),) = options.items()
     if name == "pga":
-        return checks.finite(quantity(str(value), name), name, InvalidOption), Measure("pga")
+        return checks.finite(quantity(str(value), name), name, OptionError), Measure("pga")
     if name == "sa":
         numbers = read_level_at_period(str(value), name, quantity)
-        level, period = (checks.finite(number, name, InvalidOption) for number in numbers)
+        level, period = (checks.finite(number, name, OptionError) for number in numbers)
         return level, Measure("sa", period)
     read = read_number if name == "scale" else read_velocity
     number = read(value, name) if isinstance(value, str) else float(value)
     if name == "scale":
-        return checks.finite(number, name, InvalidOption), FACTOR
-    return checks.positive(number, name, InvalidOption, "m/s"), Measure("pgv")
+        return checks.finite(number, name, OptionError), FACTOR
+    return checks.positive(number, name, OptionError, "m/s"), Measure("pgv")
 
 
 def _split_unit(text: str) -> tuple[float | None, str]:
@@ -201,6 +201,6 @@ def read_densities(text: str, name: str) -> float | dict[str, float]:
         part, equals, value = entry.rpartition("=")
         if not equals:
             message = f"{{}} must be a number, or PART=NUMBER separated by commas, not {escape_braces(repr(text))}"
-            raise InvalidOption(message, name, value=text)
+            raise OptionError(message, name, value=text)
         densities[part.strip()] = read_number(value, name)
     return densities

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 from rocking.motion import piecewise
 from rocking.motion.description import Description, Origin, compute_start_delay
 from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
@@ -78,7 +78,7 @@ class ProcessingMethods(MotionMeasures):
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If an azimuth is unknown or not a number, the components are nearly parallel, begin at different times by
             the clock of their files, or have different vertical components.
 
@@ -88,7 +88,7 @@ class ProcessingMethods(MotionMeasures):
         """
         if not isinstance(other, ProcessingMethods):
             message = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
-            raise InvalidMotion(message, "other", value=other)
+            raise MotionError(message, "other", value=other)
         azimuths = _resolve_azimuths(self, other, recorded)
         if delay := compute_start_delay(self.description, other.description, self.dt):
             early, late = (self, other) if delay > 0.0 else (other, self)
@@ -97,11 +97,11 @@ class ProcessingMethods(MotionMeasures):
                 f"according to their files, {second} begins {abs(delay):.6g} s after {first}; remove the start of "
             )
             call = f"processed(trim=({abs(delay):.6g}, {early.duration:.6g}))"
-            raise InvalidMotion(f"{message}the latter with {call}")
-        target = checks.finite(azimuth, "azimuth", InvalidMotion)
+            raise MotionError(f"{message}the latter with {call}")
+        target = checks.finite(azimuth, "azimuth", MotionError)
         if self.vertical is not None and other.vertical not in (None, self.vertical):
             message = "the components have different vertical components; use with_vertical to add only one of them"
-            raise InvalidMotion(message)
+            raise MotionError(message)
         factors = compute_rotation_factors(azimuths, target)
         breakpoints, rows = piecewise.align_pieces(self, other)
         fields: dict[str, Any] = {"channel": f"{target:g} deg", "number": None, "azimuth": target, "reversed": False}
@@ -120,7 +120,7 @@ class ProcessingMethods(MotionMeasures):
 
     def delayed(self, delay: float) -> Self:
         """Return the motion after a time of zero acceleration, s. ``processed(trim=...)`` removes an early part."""
-        wait = checks.positive(delay, "delay", InvalidMotion, "s")
+        wait = checks.positive(delay, "delay", MotionError, "s")
         rows = np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients])
         pieces = {"breakpoints": np.append(0.0, self.breakpoints + wait), "coefficients": rows}
         vertical = None if self.vertical is None else self.vertical.delayed(wait)
@@ -144,7 +144,7 @@ class ProcessingMethods(MotionMeasures):
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If period or damping is out of range, or both damping and `ringing` are missing.
 
         Notes
@@ -190,7 +190,7 @@ class ProcessingMethods(MotionMeasures):
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If no step is specified, an argument is invalid or out of place, or `baseline` or `band_pass` is applied to
             a motion that jumps or is not linear between even samples (resample it in a previous call).
         """
@@ -202,11 +202,11 @@ class ProcessingMethods(MotionMeasures):
             low, high = _unpack_pair(band_pass, "band_pass")
             steps.append(lambda motion: _apply_band_pass(motion, low, high, 4 if order is None else order))
         elif order is not None:
-            raise InvalidMotion("{} requires {}; give both, or neither", "order", "band_pass")
+            raise MotionError("{} requires {}; give both, or neither", "order", "band_pass")
         if resample is not None:
             steps.append(lambda motion: _resample(motion, resample))
         if window is None and not steps:
-            raise InvalidMotion("at least one of trim, baseline, band_pass and resample is required")
+            raise MotionError("at least one of trim, baseline, band_pass and resample is required")
         vertical = self.vertical
         if vertical is not None and window is not None and window[0] > vertical.duration - piecewise.MIN_DURATION:
             vertical = None  # the vertical motion has ended by then
@@ -237,24 +237,24 @@ def _unpack_pair(values: tuple[T, T], argument: str) -> tuple[T, T]:
     try:
         first, second = values
     except (TypeError, ValueError) as error:
-        raise InvalidMotion(f"{{}} must be two numbers, not {values!r}", argument, value=values) from error
+        raise MotionError(f"{{}} must be two numbers, not {values!r}", argument, value=values) from error
     return first, second
 
 
 def _find_window(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
     """Return the ends (s) of the part to keep, at the nearest samples if these are even."""
-    first = checks.finite(start, "start of the part to keep", InvalidMotion)
-    last = checks.finite(end, "end of the part to keep", InvalidMotion)
+    first = checks.finite(start, "start of the part to keep", MotionError)
+    last = checks.finite(end, "end of the part to keep", MotionError)
     duration = float(motion.breakpoints[-1])
     if not 0.0 <= first < last <= duration * (1.0 + 1e-12):
         requirement = f"0 <= start < end <= {duration:.6g} s, the duration"
         message = f"{{}} requires {requirement}; got {first:.6g} and {last:.6g}"
-        raise InvalidMotion(message, "trim", value=(start, end))
+        raise MotionError(message, "trim", value=(start, end))
     step = piecewise.find_even_step(motion)
     if step is None:
         return first, min(last, duration)
     if round(last / step) <= round(first / step):
-        raise InvalidMotion(f"{{}} must keep at least two samples, {step:.6g} s apart", "trim", value=(start, end))
+        raise MotionError(f"{{}} must keep at least two samples, {step:.6g} s apart", "trim", value=(start, end))
     return round(first / step) * step, round(last / step) * step
 
 
@@ -285,7 +285,7 @@ def _remove_baseline(motion: Piecewise, degree: int) -> ProcessedPieces:
     """Subtract the polynomial of this degree with the best least-squares fit to the samples."""
     step = _require_even_step(motion, "baseline")
     times, samples = piecewise.sample_breakpoints(motion)
-    degree = checks.integer(degree, "degree of a baseline", InvalidMotion, 0, min(10, len(samples) - 1))
+    degree = checks.integer(degree, "degree of a baseline", MotionError, 0, min(10, len(samples) - 1))
     baseline = np.polynomial.Legendre.fit(times, samples, degree)(times)
     return _join_samples(samples - baseline, step, f"baseline of degree {degree} removed")
 
@@ -297,14 +297,14 @@ def _apply_band_pass(motion: Piecewise, low: float | None, high: float | None, o
     step = _require_even_step(motion, "band_pass")
     nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
     given = [corner for corner in (low, high) if corner is not None]
-    corners = [checks.positive(corner, "corner frequency", InvalidMotion, "Hz") for corner in given]
+    corners = [checks.positive(corner, "corner frequency", MotionError, "Hz") for corner in given]
     if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
         message = f"{{}} must be (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one may be None"
-        raise InvalidMotion(message, "band_pass", value=(low, high))
+        raise MotionError(message, "band_pass", value=(low, high))
     if corners[0] * duration < 0.1:
         message = f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s"
-        raise InvalidMotion(f"{message}; use at least {0.1 / duration:.6g} Hz", value=(low, high))
-    order = checks.integer(order, "order of a filter", InvalidMotion, 1, 12)
+        raise MotionError(f"{message}; use at least {0.1 / duration:.6g} Hz", value=(low, high))
+    order = checks.integer(order, "order of a filter", MotionError, 1, 12)
     kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     frequencies = corners if kind == "bandpass" else corners[0]
     sections = signal.butter(order, frequencies, btype=kind, output="sos", fs=1.0 / step)
@@ -317,12 +317,12 @@ def _apply_band_pass(motion: Piecewise, low: float | None, high: float | None, o
 
 def _resample(motion: Piecewise, step: float) -> ProcessedPieces:
     """Sample the motion at the multiples of `step` (s) up to its end, joined by straight lines."""
-    new_dt = checks.positive(step, "new sampling step", InvalidMotion, "s")
+    new_dt = checks.positive(step, "new sampling step", MotionError, "s")
     duration = float(motion.breakpoints[-1])
     count = math.floor(duration / new_dt * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MAX_SAMPLES:
         message = f"a step of {new_dt:.6g} s gives {count} samples of a motion of {duration:.6g} s; use a step that"
-        raise InvalidMotion(f"{message} gives 2 to {_MAX_SAMPLES}", value=step)
+        raise MotionError(f"{message} gives 2 to {_MAX_SAMPLES}", value=step)
     times = np.minimum(new_dt * np.arange(count), duration)
     samples = piecewise.evaluate_at(motion.breakpoints, motion.coefficients, times)
     return _join_samples(samples, new_dt, f"resampled to a step of {new_dt:.6g} s")
@@ -331,10 +331,10 @@ def _resample(motion: Piecewise, step: float) -> ProcessedPieces:
 def _require_even_step(motion: Piecewise, argument: str) -> float:
     step = piecewise.find_even_step(motion)
     if step is None:
-        raise InvalidMotion("{} requires samples at even steps; call processed(resample=...) first", argument)
+        raise MotionError("{} requires samples at even steps; call processed(resample=...) first", argument)
     if piecewise.has_jumps(motion):
         message = "{} requires a motion that is linear between samples; call processed(resample=...) first"
-        raise InvalidMotion(message, argument)
+        raise MotionError(message, argument)
     return step
 
 
@@ -352,21 +352,21 @@ def _compute_floor_motion(
     solution about its start, from the series of the solutions of the states (1, 0) and (0, 1) and of the one from rest.
     """
     end = float(motion.breakpoints[-1])
-    natural_period = checks.positive(period, "period", InvalidMotion, "s")
-    rate, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, InvalidMotion)
+    natural_period = checks.positive(period, "period", MotionError, "s")
+    rate, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, MotionError)
     if ringing is None and damping_ratio == 0.0:
-        raise InvalidMotion("the motion of a floor without {} does not decay; give {}, in s", "damping", "ringing")
+        raise MotionError("the motion of a floor without {} does not decay; give {}, in s", "damping", "ringing")
     # By default a free oscillation continues until it has decayed to a thousandth.
     if ringing is None:
         tail = -math.log(1e-3) / (damping_ratio * rate)
     else:
-        tail = checks.between(ringing, "ringing", InvalidMotion, 0.0, 1e15, "s")
+        tail = checks.between(ringing, "ringing", MotionError, 0.0, 1e15, "s")
     step = _MAX_ANGLE / rate
     if not (end + tail) / step <= 1e6:
         message = (
             f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s; use a longer one, "
         )
-        raise InvalidMotion(f"{message}or a shorter {{}}", "period", "ringing", value=period)
+        raise MotionError(f"{message}or a shorter {{}}", "period", "ringing", value=period)
     nodes = np.append(motion.breakpoints, end + tail) if tail > 0.0 else motion.breakpoints
     subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / step)).astype(np.int64)
     start, width = np.repeat(nodes[:-1], subdivisions), np.repeat(np.diff(nodes) / subdivisions, subdivisions)
@@ -427,16 +427,16 @@ def _resolve_azimuths(
         if None in recorded:
             name = checks.short_repr((first_motion, second_motion)[recorded.index(None)].name)
             remedy = "give {}=(first, second), the directions of both components in degrees clockwise from north"
-            raise InvalidMotion(f"the azimuth of {name} is unknown; {remedy}", "recorded")
-    azimuths = checks.numbers(recorded, "recorded", InvalidMotion)
+            raise MotionError(f"the azimuth of {name} is unknown; {remedy}", "recorded")
+    azimuths = checks.numbers(recorded, "recorded", MotionError)
     if azimuths.shape != (2,) or not np.all(np.isfinite(azimuths)):
         message = "{} must be the azimuths of both components, two numbers in degrees"
-        raise InvalidMotion(message, "recorded", value=recorded)
+        raise MotionError(message, "recorded", value=recorded)
     first, second = azimuths.tolist()
     angle = abs((second - first + 90.0) % 180.0 - 90.0)
     if angle < 15.0:
         message = f"the components have azimuths of {first:g} and {second:g} deg, along one line within {angle:g} deg"
-        raise InvalidMotion(f"{message}; use two perpendicular components")
+        raise MotionError(f"{message}; use two perpendicular components")
     return first, second
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
 from rocking.kernels.march import march
@@ -90,7 +90,7 @@ class Gradient:
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If the motion is not linear between samples.
         """
         return _convert_to_samples(self.motion, self.coefficients)
@@ -101,11 +101,11 @@ class Gradient:
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If there is no vertical component, or it is not linear between samples.
         """
         if self.motion is None or self.motion.vertical is None or self.vertical is None:
-            raise InvalidOption("the motion has no vertical component; add one by `with_vertical`")
+            raise OptionError("the motion has no vertical component; add one by `with_vertical`")
         return _convert_to_samples(self.motion.vertical, self.vertical)
 
     def __repr__(self) -> str:
@@ -137,7 +137,7 @@ def gradient(response: Response, quantity: Quantity = "peak", time_or_index: flo
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If the response is not a `Response`, the quantity does not exist, or `time_or_index` is missing, superfluous or
         out of range.
 
@@ -162,8 +162,8 @@ def gradient(response: Response, quantity: Quantity = "peak", time_or_index: flo
     ['-0.00175', '-0.01310', '0.01048', '0.04288', '0.03351']
     """
     if not isinstance(response, Response):
-        raise InvalidOption("{} must be a Response, as rocking.simulate returns", "response", value=response)
-    checks.choice(quantity, "quantity", InvalidOption, get_args(Quantity))
+        raise OptionError("{} must be a Response, as rocking.simulate returns", "response", value=response)
+    checks.choice(quantity, "quantity", OptionError, get_args(Quantity))
     if quantity == "peak":
         target = _target_peak(response, time_or_index)
     elif quantity in ("rotation", "velocity"):
@@ -204,7 +204,7 @@ class _Target:
 
 def _target_peak(response: Response, time_or_index: float | None) -> _Target:
     if time_or_index is not None:
-        raise InvalidOption('{} does not apply to a "peak"', "time_or_index", value=time_or_index)
+        raise OptionError('{} does not apply to a "peak"', "time_or_index", value=time_or_index)
     trail, value, instant = response.solution.trail, response.peak_rotation, response.peak_time
     reason = _OVERTURNS if response.overturned else _AT_STOP if response._reaches_second_stop else ""
     row = max(0, int(np.searchsorted(trail.nodes["time"], instant)) - 1)
@@ -215,9 +215,9 @@ def _target_peak(response: Response, time_or_index: float | None) -> _Target:
 def _target_state(response: Response, quantity: Quantity, at: float | None) -> _Target:
     """Create the target for the rotation or velocity at a time."""
     if at is None:
-        raise InvalidOption(f"a {quantity} requires {{}}, the time in s", "time_or_index")
+        raise OptionError(f"a {quantity} requires {{}}, the time in s", "time_or_index")
     time, column = (
-        checks.between(at, "time_or_index", InvalidOption, 0.0, response.duration, "s"),
+        checks.between(at, "time_or_index", OptionError, 0.0, response.duration, "s"),
         int(quantity == "velocity"),
     )
     trail, motion_state = response.solution.trail, response._history.states(time)
@@ -234,8 +234,8 @@ def _target_time(response: Response, quantity: Quantity, index: float | None) ->
     trail, is_event = response.solution.trail, quantity == "event"
     nodes, results = trail.nodes, response.events if is_event else response.impacts
     if not len(results):
-        raise InvalidOption(f"the response has no {quantity}; choose another {{}}", "quantity", value=quantity)
-    k = checks.integer(index, "time_or_index", InvalidOption, -len(results), len(results) - 1)
+        raise OptionError(f"the response has no {quantity}; choose another {{}}", "quantity", value=quantity)
+    k = checks.integer(index, "time_or_index", OptionError, -len(results), len(results) - 1)
     rows = find_event_steps(nodes, overturns=response.overturned) if is_event else find_impact_steps(nodes)
     row, instant = int(rows[k]), float(results["time"][k])
     if row > 0 and nodes["side"][row + 1] < 0 and nodes["time"][row + 1] == nodes["time"][row]:
@@ -326,6 +326,6 @@ def _sum_over_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
 def _convert_to_samples(motion: Motion | None, values: Floats) -> Floats:
     """Convert derivatives by the coefficients of lines to accelerations at their ends."""
     if motion is None or values.shape[1] != 2 or piecewise.has_jumps(motion):
-        raise InvalidOption("the motion is not linear between samples; use the derivatives by its `coefficients`")
+        raise OptionError("the motion is not linear between samples; use the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)
     return np.asarray(np.append(values[:, 0] - rates, 0.0) + np.append(0.0, rates))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.errors import InvalidBlock, InvalidOption, describe_install, escape_braces
+from rocking.errors import BlockError, OptionError, describe_install, escape_braces
 from rocking.inputs.notes import density_notes, height_notes
 from rocking.motion.processing import sine_cosine
 from rocking.solid import support as polygons
@@ -73,7 +73,7 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
             message = (
                 "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, not"
             )
-            raise InvalidBlock(f"{message} {checks.short_repr(mesh)}", "mesh", value=mesh)
+            raise BlockError(f"{message} {checks.short_repr(mesh)}", "mesh", value=mesh)
         name = path = PurePath(scene.name).name
         scene = _read_stream(scene, name)
     up = "y" if scene is not mesh and PurePath(name).suffix.lower() in (".glb", ".gltf") else "z"
@@ -83,22 +83,22 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
         shapes = [(node, scene.geometry[key], transform) for node, transform, key in placements]
     shapes = [shape for shape in shapes if len(getattr(shape[1], "faces", ()))]
     if max_faces is not None and (count := sum(len(shape.faces) for _, shape, _ in shapes)) > max_faces:
-        raise InvalidBlock(f"contains {count} triangles; use a coarser mesh of at most {max_faces}", path=path)
+        raise BlockError(f"contains {count} triangles; use a coarser mesh of at most {max_faces}", path=path)
     if not shapes:
         message = "contains no faces; a mesh of triangles is required, not points, lines or other text"
-        raise InvalidBlock(message, path=path)
+        raise BlockError(message, path=path)
     parts = tuple(_place_part(*shape) for shape in shapes)
     if not all(np.all(np.isfinite(part.vertices)) for part in parts):
-        raise InvalidBlock("has corners that are not finite numbers; export the mesh again", path=path)
+        raise BlockError("has corners that are not finite numbers; export the mesh again", path=path)
     return MeshParts(parts, name, up)
 
 
 def _read_file(file: Path, path: str) -> Scene:
     if file.is_dir():
-        raise InvalidBlock("this is a folder, not a file; choose a file in it", path=path)
+        raise BlockError("this is a folder, not a file; choose a file in it", path=path)
     if not file.is_file():
         hint = f"; the mesh that ships is {', '.join(SHIPPED_MESHES)}" if not file.suffix else ""
-        raise InvalidBlock(f"there is no such file{hint}", path=path)
+        raise BlockError(f"there is no such file{hint}", path=path)
     return _load_scene(file, path)
 
 
@@ -118,7 +118,7 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
         import trimesh
     except ImportError:
         message = f"meshes are read with trimesh, which is not installed: {describe_install('mesh')}"
-        raise InvalidOption(message) from None
+        raise OptionError(message) from None
     suffix = PurePath(source.name).suffix.lower().removeprefix(".")
     # Objects and groups of OBJ files are parts, regardless of material. Corners are unchanged.
     options |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
@@ -130,7 +130,7 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
         message = f"{cause or type(error).__name__}; check that the file is complete and has the correct suffix"
         if suffix not in formats:
             message = f"trimesh reads only the formats {', '.join(formats)}"
-        raise InvalidBlock(f"cannot be read: {escape_braces(message)}", path=path) from None
+        raise BlockError(f"cannot be read: {escape_braces(message)}", path=path) from None
 
 
 def _place_part(name: str, mesh: Any, transform: Any) -> MeshPart:
@@ -147,20 +147,20 @@ def _place_part(name: str, mesh: Any, transform: Any) -> MeshPart:
 def parse_length_unit(unit: object) -> float:
     """Return the length of the unit of a mesh, m, from its name or a number."""
     if isinstance(unit, str):
-        return LENGTH_UNITS[checks.choice(unit, "unit", InvalidBlock, [*LENGTH_UNITS])]
-    return checks.positive(unit, "unit", InvalidBlock, "m")
+        return LENGTH_UNITS[checks.choice(unit, "unit", BlockError, [*LENGTH_UNITS])]
+    return checks.positive(unit, "unit", BlockError, "m")
 
 
 def compute_upright_rotation(up: object) -> Floats:
     """Return the smallest rotation, shape (3, 3), of an axis of a mesh to z."""
     if isinstance(up, str):
-        axis = checks.choice(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
+        axis = checks.choice(up, "up", BlockError, ["x", "y", "z", "-x", "-y", "-z"])
         u = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
     else:
-        u = checks.numbers(up, "up", InvalidBlock)  # type: ignore[arg-type]
+        u = checks.numbers(up, "up", BlockError)  # type: ignore[arg-type]
         length = float(np.linalg.norm(u)) if u.shape == (3,) else 0.0
         if not 0.0 < length < np.inf:
-            raise InvalidBlock("{} must be x, y or z, or a vector of three numbers that points up", "up", value=up)
+            raise BlockError("{} must be x, y or z, or a vector of three numbers that points up", "up", value=up)
         u = u / length
     if u[2] < 0.0 and not u[0] * u[0] + u[1] * u[1] > 0.0:
         return np.diag([1.0, -1.0, -1.0])
@@ -206,14 +206,14 @@ def compute_properties(
 ) -> tuple[dict[str, Any], list[Surface]]:
     """Return the arguments of `Solid`, and closed surfaces of its parts with the lowest corner at height 0."""
     if support is not None and tolerance is not None:
-        raise InvalidBlock("{} is used only to find the support; omit it if {} is given", "tolerance", "support")
+        raise BlockError("{} is used only to find the support; omit it if {} is given", "tolerance", "support")
     scene = read_parts(mesh, max_faces)
     with np.errstate(over="ignore"):
         extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in scene.parts) * parse_length_unit(unit)
     if extent and not 1e-9 < extent < 1e9:
         message = f"is {extent:.3g} m large, outside the range of bodies; correct {{}}"
-        raise InvalidBlock(message, "unit", path=scene.name)
-    sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", InvalidBlock)))
+        raise BlockError(message, "unit", path=scene.name)
+    sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", BlockError)))
     clockwise = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])  # seen from above
     rotation = clockwise @ compute_upright_rotation(scene.up if up is None else up) * parse_length_unit(unit)
     parts = [part._replace(vertices=part.vertices @ rotation.T) for part in scene.parts]
@@ -228,13 +228,13 @@ def compute_properties(
         if not moments.amount > 1e-9 * float(np.ptp(surface.vertices, axis=0).max()) ** 3:
             prefix = "" if name == scene.name else f"{name} "
             message = f"{prefix}encloses no volume: it is a surface without an inside; give it a thickness"
-            raise InvalidBlock(message, path=scene.name)
+            raise BlockError(message, path=scene.name)
     part_densities = [densities[name] for name in names]
     total = combine_moments(part_moments, [1.0 if value is None else value for value in part_densities])
-    max_height = 1e-3 * height if tolerance is None else checks.positive(tolerance, "tolerance", InvalidBlock, "m")
+    max_height = 1e-3 * height if tolerance is None else checks.positive(tolerance, "tolerance", BlockError, "m")
     if max_height >= height:
         message = f"{{}} must be below the height of the mesh, {height:.4g} m, not {max_height:g}"
-        raise InvalidBlock(message, "tolerance", value=tolerance)
+        raise BlockError(message, "tolerance", value=tolerance)
     polygon, notes = _find_support(corners, support, max_height, scene.name)
     prefixes = [f"{name}: " if len(names) > 1 else "" for name in names]
     repairs = [prefix + repair for prefix, part in zip(prefixes, surfaces, strict=True) for repair in part.repairs]
@@ -260,16 +260,16 @@ def _resolve_densities(
     if density is None:
         return dict.fromkeys(names)
     if not isinstance(density, Mapping):
-        return dict.fromkeys(names, checks.positive(density, "density", InvalidBlock, "kg/m^3"))
+        return dict.fromkeys(names, checks.positive(density, "density", BlockError, "kg/m^3"))
     parts_text = f"its parts are {', '.join(known)}"
     unknown, missing = [name for name in density if name not in known], [name for name in names if name not in density]
     if unknown:
         hint = checks.suggest(str(unknown[0]), known, parts_text)
         message = f"{{}} has a part {checks.short_repr(unknown[0])}, which the mesh does not have; {hint}"
-        raise InvalidBlock(message, "density")
+        raise BlockError(message, "density")
     if missing:
-        raise InvalidBlock(f"{{}} is missing for {', '.join(missing)}; {parts_text}", "density")
-    return {name: checks.positive(density[name], "density", InvalidBlock, "kg/m^3") for name in names}
+        raise BlockError(f"{{}} is missing for {', '.join(missing)}; {parts_text}", "density")
+    return {name: checks.positive(density[name], "density", BlockError, "kg/m^3") for name in names}
 
 
 def _close_surfaces(
@@ -308,12 +308,12 @@ def _find_support(
                 f"{{}} reaches {excess:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in "
             )
             message += f"the east and {south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, "
-            raise InvalidBlock(f"{message}in the mesh's own coordinates", "support")
+            raise BlockError(f"{message}in the mesh's own coordinates", "support")
         return polygon, ()
     base = polygons.compute_hull(corners[corners[:, 2] <= tolerance, :2])
     if base is None:
         message = f"stands on a point or a line: the corners within {{}}, {tolerance:.3g} m, of the lowest one span no "
-        raise InvalidBlock(f"{message}polygon; give a larger one, or {{}}", "tolerance", "support", path=path)
+        raise BlockError(f"{message}polygon; give a larger one, or {{}}", "tolerance", "support", path=path)
     wider = polygons.compute_hull(corners[corners[:, 2] <= 10.0 * tolerance, :2])
     assert wider is not None
     growth = polygons.compute_area(wider) / polygons.compute_area(base) - 1.0
