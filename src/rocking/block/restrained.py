@@ -262,11 +262,9 @@ def _tilt(block: Block, lean: float) -> Block:
         return block
     plus, minus = block.sides
     if not -minus.alpha < lean < plus.alpha:
-        message = (
-            f"{{}} must be between {-minus.alpha:.4g} and {plus.alpha:.4g} rad for the block to stand, not {lean:g}"
-        )
+        requirement = f"between {-minus.alpha:.4g} and {plus.alpha:.4g} rad for the block to stand"
         hint = f"; if it is in degrees, give math.radians({lean:g})" if 0.5 <= abs(lean) < 90.0 else ""
-        raise BlockError(message + hint, "lean", value=lean)
+        raise BlockError(f"{{}} must be {requirement}, not {lean:g}{hint}", "lean", value=lean)
     return block._with_sides((replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)))
 
 

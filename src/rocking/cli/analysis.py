@@ -152,10 +152,8 @@ def map(
     parameters: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
     with output.folder() as folder:
         slender_block = _create_slender_block(block)
-        axes = {
-            "amplitudes": read_array(amplitudes, "amplitudes"),
-            "frequencies": read_array(frequencies, "frequencies"),
-        }
+        texts = {"amplitudes": amplitudes, "frequencies": frequencies}
+        axes = {name: read_array(text, name) for name, text in texts.items()}
         result = overturning_map(slender_block, pulse, **axes, model=model.model, rtol=rtol, **parameters)
         _write_and_print(result, "map", None, folder=folder, as_json=output.as_json)
 

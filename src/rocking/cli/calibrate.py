@@ -182,9 +182,8 @@ def validate(
     """
     with output.folder() as folder:
         rows = read_tests(tests, **file.metadata())
-        validation = run_validation(
-            rows, **block.blocks(model), outlier_probability=outlier_probability, bins=bins, seed=seed
-        )
+        options: dict[str, Any] = {"outlier_probability": outlier_probability, "bins": bins, "seed": seed}
+        validation = run_validation(rows, **block.blocks(model), **options)
         result = validation.to_dict()
         if folder is not None:
             write_tables(folder, validation)

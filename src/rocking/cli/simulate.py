@@ -219,10 +219,10 @@ def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
             entry["units"] = {name: family.unit(name) for name in (*family.needed, *family.optional)}
         print(to_json({"pulses": entries}))
         return
-    texts = [
-        [_format_parameters(f, parameters) for parameters in (dict.fromkeys(f.needed), f.optional)] for f in families
-    ]
-    rows = [(family.name, *columns) for family, columns in zip(families, texts, strict=True)]
+    rows = []
+    for family in families:
+        needed = _format_parameters(family, dict.fromkeys(family.needed))
+        rows.append((family.name, needed, _format_parameters(family, family.optional)))
     print(format_table(["pulse", "needs", "takes"], rows))
     print("\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:")
     print("rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1")

@@ -93,13 +93,12 @@ def find_reader(parameter: str) -> Quantity:
 
 
 def check_parameters(factory: Callable[..., object], provided: Iterable[str], owner: str, *names: str) -> None:
-    """Check that names are parameters of a kind and that none is missing; ``names`` are the parameters in ``of``."""
+    """Check that names are parameters of a kind and that none is missing; ``names`` are the parameters in ``owner``."""
     parameters = inspect.signature(factory).parameters
     for name in provided:
         if name not in parameters:
-            raise OptionError(
-                f"{owner} has no {escape_braces(name)}; {checks.suggest(name, [*parameters])}", *names, name
-            )
+            message = f"{owner} has no {escape_braces(name)}; {checks.suggest(name, [*parameters])}"
+            raise OptionError(message, *names, name)
     missing = [name for name, item in parameters.items() if item.default is item.empty and name not in {*provided}]
     if missing:
         raise OptionError(f"{owner} also requires {' and '.join(missing)}", *names)

@@ -100,11 +100,10 @@ def read_tilt(text: str, name: str) -> float:
     value = read_angle(text, name)
     if abs(value) < 0.5 * math.pi:
         return value
-    message = f"{{}} must be below 90deg in size, not {text.strip()}"
+    number = text.strip()
+    message = f"{{}} must be below 90deg in size, not {number}"
     if abs(value) < 90.0 and not _split_unit(text)[1]:
-        message = (
-            f"{{}} must be below pi/2 rad; got {text.strip()}, which is read as rad; did you mean {text.strip()}deg?"
-        )
+        message = f"{{}} must be below pi/2 rad; got {number}, which is read as rad; did you mean {number}deg?"
     raise OptionError(message, name, value=text)
 
 

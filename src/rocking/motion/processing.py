@@ -93,11 +93,9 @@ class ProcessingMethods(MotionMeasures):
         if delay := compute_start_delay(self.description, other.description, self.dt):
             early, late = (self, other) if delay > 0.0 else (other, self)
             first, second = checks.short_repr(early.name), checks.short_repr(late.name)
-            message = (
-                f"according to their files, {second} begins {abs(delay):.6g} s after {first}; remove the start of "
-            )
+            message = f"according to their files, {second} begins {abs(delay):.6g} s after {first}"
             call = f"processed(trim=({abs(delay):.6g}, {early.duration:.6g}))"
-            raise MotionError(f"{message}the latter with {call}")
+            raise MotionError(f"{message}; remove the start of the latter with {call}")
         target = checks.finite(azimuth, "azimuth", MotionError)
         if self.vertical is not None and other.vertical not in (None, self.vertical):
             message = "the components have different vertical components; use with_vertical to add only one of them"
@@ -363,10 +361,8 @@ def _compute_floor_motion(
         tail = checks.between(ringing, "ringing", MotionError, 0.0, 1e15, "s")
     step = _MAX_ANGLE / rate
     if not (end + tail) / step <= 1e6:
-        message = (
-            f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s; use a longer one, "
-        )
-        raise MotionError(f"{message}or a shorter {{}}", "period", "ringing", value=period)
+        message = f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s"
+        raise MotionError(f"{message}; use a longer one, or a shorter {{}}", "period", "ringing", value=period)
     nodes = np.append(motion.breakpoints, end + tail) if tail > 0.0 else motion.breakpoints
     subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / step)).astype(np.int64)
     start, width = np.repeat(nodes[:-1], subdivisions), np.repeat(np.diff(nodes) / subdivisions, subdivisions)

@@ -324,14 +324,9 @@ def compute_course(response: ResponseData, start: float, end: float) -> Course:
     rotation, velocity = (insert(theta, 0.0 * impact_times, 0.0 * impact_times), insert(rate, v_before, v_after))
     side_index = np.maximum(side, 0)
     unit = energy.unit_of_rotation[side_index]
-    return Course(
-        insert(times, impact_times, impact_times),
-        rotation / unit,
-        velocity / (energy.p[side_index] * unit),
-        energy.kinetic(velocity, side),
-        energy.potential(rotation, side),
-        positions + 2 * np.arange(len(positions)),
-    )
+    all_times, impact_rows = insert(times, impact_times, impact_times), positions + 2 * np.arange(len(positions))
+    energies = energy.kinetic(velocity, side), energy.potential(rotation, side)
+    return Course(all_times, rotation / unit, velocity / (energy.p[side_index] * unit), *energies, impact_rows)
 
 
 def compute_boundary(response: ResponseData) -> tuple[Floats, Floats]:

@@ -212,14 +212,12 @@ def _target_peak(response: Response, time_or_index: float | None) -> _Target:
     return _Target(value, instant, trail, row, since, (1.0, 0.0), reason, is_height=True)
 
 
-def _target_state(response: Response, quantity: Quantity, at: float | None) -> _Target:
+def _target_state(response: Response, quantity: Quantity, instant: float | None) -> _Target:
     """Create the target for the rotation or velocity at a time."""
-    if at is None:
+    if instant is None:
         raise OptionError(f"a {quantity} requires {{}}, the time in s", "time_or_index")
-    time, column = (
-        checks.between(at, "time_or_index", OptionError, 0.0, response.duration, "s"),
-        int(quantity == "velocity"),
-    )
+    time = checks.between(instant, "time_or_index", OptionError, 0.0, response.duration, "s")
+    column = int(quantity == "velocity")
     trail, motion_state = response.solution.trail, response._history.states(time)
     row = int(np.searchsorted(trail.nodes["time"], time, side="right")) - 1
     nodes = state.expose_fields(np.concatenate([trail.nodes[: row + 1], _find_later_nodes(response, row, time)]))

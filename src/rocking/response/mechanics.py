@@ -41,10 +41,8 @@ def check_friction(value: object) -> float:
     """Return a coefficient of friction, or raise `OptionError` if it is not in (0, 3]."""
     coefficient = checks.positive(value, "friction", OptionError)
     if coefficient > _MAX_FRICTION:
-        message = (
-            f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}; use the tangent of an angle of friction"
-        )
-        raise OptionError(message, "friction", value=value)
+        message = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}"
+        raise OptionError(f"{message}; use the tangent of an angle of friction", "friction", value=value)
     return coefficient
 
 

@@ -229,17 +229,12 @@ class Response(ResponseData):
         motion, (name, rate, _, unit, _) = self.motion, self.block.coordinate
         step = checks.positive(self._default_dt if dt is None else dt, "dt", OptionError, "s")
         if self.duration > _MAX_POINTS * step:
-            message = (
-                f"{{}} = {step:g} s gives more than {_MAX_POINTS:,} points of {self.duration:g} s; use a longer step"
-            )
-            raise OptionError(message, "dt", value=dt)
+            message = f"{{}} = {step:g} s gives more than {_MAX_POINTS:,} points of {self.duration:g} s"
+            raise OptionError(f"{message}; use a longer step", "dt", value=dt)
         times = create_times(self.duration, step)
-        states, ground = self.states(times), np.zeros_like(times) if motion is None else motion.acceleration(times)
-        columns = [
-            Column("time", times, "s"),
-            Column(name, states[:, 0], unit),
-            Column(rate, states[:, 1], f"{unit}/s"),
-        ]
+        rotation, velocity, _ = self.states(times).T
+        ground = np.zeros_like(times) if motion is None else motion.acceleration(times)
+        columns = [Column("time", times, "s"), Column(name, rotation, unit), Column(rate, velocity, f"{unit}/s")]
         columns.append(Column("ground_acceleration", ground, "m/s^2"))
         if motion is not None and motion.vertical is not None:
             columns.append(Column("vertical_ground_acceleration", motion.vertical.acceleration(times), "m/s^2"))

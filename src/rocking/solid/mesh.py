@@ -70,10 +70,8 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
         name, path, scene = file.name, str(mesh), _read_file(file, str(mesh))
     elif not is_mesh and not hasattr(mesh, "geometry"):
         if not (hasattr(mesh, "read") and isinstance(getattr(mesh, "name", None), str)):
-            message = (
-                "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, not"
-            )
-            raise BlockError(f"{message} {checks.short_repr(mesh)}", "mesh", value=mesh)
+            requirement = "the path of a file, a binary stream that has a name, or a mesh or scene of trimesh"
+            raise BlockError(f"{{}} must be {requirement}, not {checks.short_repr(mesh)}", "mesh", value=mesh)
         name = path = PurePath(scene.name).name
         scene = _read_stream(scene, name)
     up = "y" if scene is not mesh and PurePath(name).suffix.lower() in (".glb", ".gltf") else "z"
@@ -304,11 +302,10 @@ def _find_support(
             excess = float(np.max((polygon - outline[0]) @ polygons.compute_directions(azimuths).T - distances))
         if outline is None or excess > 1e-6 * float(np.ptp(corners, axis=0).max()):
             (west, south, _), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
-            message = (
-                f"{{}} reaches {excess:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in "
-            )
-            message += f"the east and {south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, "
-            raise BlockError(f"{message}in the mesh's own coordinates", "support")
+            span = f"from {west:.4g} m to {east:.4g} m in the east and {south:.4g} m to {north:.4g} m in the north"
+            message = f"{{}} reaches {excess:.3g} m beyond the outline of the mesh, {span}"
+            hint = "its corners are (east, north) in m, in the mesh's own coordinates"
+            raise BlockError(f"{message}; {hint}", "support")
         return polygon, ()
     base = polygons.compute_hull(corners[corners[:, 2] <= tolerance, :2])
     if base is None:

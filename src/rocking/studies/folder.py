@@ -93,9 +93,8 @@ class Store:
 
     def check_inputs(self, product: Product) -> None:
         """Check the inputs against the store; a StudyError names the parts that differ."""
-        stored, new = (
-            {k: a.tobytes() for k, a in arrays.items()} for arrays in (self.inputs, _product_to_arrays(product))
-        )
+        inputs = self.inputs, _product_to_arrays(product)
+        stored, new = ({name: array.tobytes() for name, array in arrays.items()} for arrays in inputs)
         changed = [name for name in stored | new if stored.get(name) != new.get(name)]
         if changed:
             parts = dict.fromkeys("/".join(name.split("/")[:2]) for name in changed)
@@ -264,11 +263,8 @@ def _motion_to_arrays(motion: Motion, prefix: str) -> dict[str, NDArray[Any]]:
     family, text, parameters = (getattr(motion.description, name) for name in ("family", "text", "parameters"))
     texts = {"name": motion.name, "family": family, "parameters": dict(parameters), "text": text}
     texts |= {"history": motion.history, "error": motion.error}
-    arrays = {
-        "breakpoints": motion.breakpoints,
-        "coefficients": motion.coefficients,
-        "words": np.array(json.dumps(texts)),
-    }
+    arrays = {"breakpoints": motion.breakpoints, "coefficients": motion.coefficients}
+    arrays["words"] = np.array(json.dumps(texts))
     vertical = {} if motion.vertical is None else _motion_to_arrays(motion.vertical, f"{prefix}/vertical")
     return {f"{prefix}/{name}": array for name, array in arrays.items()} | vertical
 

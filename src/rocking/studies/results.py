@@ -309,17 +309,17 @@ class BlockTable(DatasetResult):
         else:
             measure, names = _parse_measure(self.data.attrs), [str(name) for name in plotted.limit_state.values]
             panels, missing, label = measure.display_factor * plotted.values, "no curve fits", f"median {measure.label}"
-        p, alpha = (
-            np.mean([parameters[key] for key in (name, f"{name}_plus", f"{name}_minus") if key in parameters], axis=0)
-            for name in ("p", "alpha")
-        )
-        labels = {
-            "value_label": label,
-            "missing_label": missing,
-            "title": title or escape_dollars(self.data.description),
-        }
+
+        def average(name: str) -> Floats:
+            keys = [key for key in (name, f"{name}_plus", f"{name}_minus") if key in parameters]
+            return np.asarray(np.mean([parameters[key] for key in keys], axis=0))
+
         selected = {names[k]: panels[k] for k in select_evenly(len(names), 4)}
-        return draw_blocks(p, alpha, panels=selected, ax=ax, figsize=figsize, **labels)
+        labels = {"value_label": label, "missing_label": missing}
+        title = title or escape_dollars(self.data.description)
+        return draw_blocks(
+            average("p"), average("alpha"), panels=selected, **labels, title=title, ax=ax, figsize=figsize
+        )
 
     def _table(self, name: str) -> xr.Dataset:
         return _rename_for_tables(self.data)
@@ -373,11 +373,9 @@ def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
         "overturned_share": variable(("scale", "block"), overturned, unit="1"),
     }
     coordinates = {"fractile": shares, "scale": ("scale", scales.values, scales.attributes)}
-    parts = ["fractiles of peak rotation over slenderness", format_count(len(product.motions), "motion")]
-    attributes = {
-        "description": _describe(f"{', '.join(parts)}, {product.model} model", missing),
-        "model": product.model,
-    }
+    text = f"fractiles of peak rotation over slenderness, {format_count(len(product.motions), 'motion')}"
+    description = _describe(f"{text}, {product.model} model", missing)
+    attributes = {"description": description, "model": product.model}
     return BlockTable(xr.Dataset(variables, coordinates | body_coordinates(product.bodies), attributes))
 
 
