@@ -76,7 +76,7 @@ def test_a_rest_that_the_ground_ends_at_once_passes_on_what_shifts_it():
         )
 
     response, h = run(), 1e-5
-    found = response.sensitivity.rotation(0.5, of=["motion", "initial_rotation", "initial_velocity"])
+    found = response.sensitivity.rotation(0.5, inputs=["motion", "initial_rotation", "initial_velocity"])
     expected = {
         "motion": (run(1.0 + h).position(0.5) - run(1.0 - h).position(0.5)) / (2.0 * h),
         "initial_rotation": (

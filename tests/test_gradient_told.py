@@ -359,11 +359,11 @@ def test_the_time_of_overturning_has_derivatives_though_the_peak_has_none() -> N
 @pytest.mark.parametrize(
     ("of", "at", "match"),
     [
-        ("height", None, "of must be one of"),
+        ("height", None, "quantity must be one of"),
         ("peak", 1.0, 'does not apply to a "peak"'),
-        ("rotation", None, "requires at, the time"),
-        ("impact", 10_000, "at must be a whole number"),
-        ("event", 0.5, "at must be a whole number"),
+        ("rotation", None, "requires time_or_index, the time"),
+        ("impact", 10_000, "time_or_index must be a whole number"),
+        ("event", 0.5, "time_or_index must be a whole number"),
     ],
 )
 def test_what_is_not_told_is_refused_in_a_sentence(of: Any, at: Any, match: str) -> None:

@@ -11,7 +11,7 @@ from rocking.explorer.inputs import read_case
 from rocking.explorer.parameters import PARAMETERS
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.bodies import create_block, write_block_call
-from rocking.inputs.declared import BLOCK, INPUTS, SHAPES, SUPPORTS
+from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, INPUTS, SUPPORTS
 from rocking.studies import read_study
 from rocking.studies.file import SCHEMA
 
@@ -93,14 +93,14 @@ def test_every_input_of_a_body_is_an_option_and_a_key_and_every_other_has_an_opt
     assert described - {"model", "chattering"} == options & INPUTS.keys()  # these have options of their own
 
 
-@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.name)
+@pytest.mark.parametrize("shape", BLOCK_DESCRIPTIONS, ids=lambda shape: shape.name)
 def test_a_description_of_a_block_is_complete_or_refused(shape):
     values = dict.fromkeys(shape.needed, 0.3) | ({"pivots": (0.3, 0.3)} if "pivots" in shape.needed else {})
     assert eval(write_block_call(values), {"Block": Block}) == create_block(values)
     for name in shape.needed if len(shape.needed) > 1 else ():
         with pytest.raises(RockingError, match="a block requires more than"):
             create_block({each: value for each, value in values.items() if each != name})
-    for other in SHAPES:
+    for other in BLOCK_DESCRIPTIONS:
         if other is not shape:
             with pytest.raises(RockingError, match="are from different descriptions of a block"):
                 create_block(values | dict.fromkeys(other.needed, 0.3))

@@ -97,7 +97,7 @@ def judged_rotations(seed: int, model: Model, names: tuple[str, ...]) -> int:
     )
     times = np.sort(rng.uniform(0.0, min(response.duration, 2.5), 12))
     assert np.min(np.abs(times[:, None] - response.impacts["time"])) > 1e-6
-    found = response.sensitivity.rotation(times, of=names)
+    found = response.sensitivity.rotation(times, inputs=names)
     h, judged = 2.0**-36, 0
     for name in names:
         rotations = []
@@ -138,7 +138,7 @@ def test_changes_of_the_rotation_are_zero_at_rest_none_outside_and_the_sum_of_bo
     (start, end) = response.rest_intervals[-1]
     assert (start < 19.0, end) == (True, 20.0)
     times = np.array([[0.5 * start, -0.1, 0.9 * start], [19.5, np.nan, 20.1]])
-    found = response.sensitivity.rotation(times, of=EVERY)
+    found = response.sensitivity.rotation(times, inputs=EVERY)
     assert {values.shape for values in found.values()} == {(2, 3)}
     for name in ("p", "alpha", "restitution"):
         together = found[f"{name}_plus"] + found[f"{name}_minus"]
@@ -148,8 +148,8 @@ def test_changes_of_the_rotation_are_zero_at_rest_none_outside_and_the_sum_of_bo
         assert np.array_equal(np.isnan(values), [[False, True, False], [False, True, True]])
         assert values[1, 0] == 0.0
     assert response.sensitivity.rotation(0.0)["initial_rotation"] == pytest.approx(-0.05, rel=1e-15)
-    with pytest.raises(rocking.errors.OptionError, match=r"of must be among motion, .*, not 'gravity'"):
-        response.sensitivity.rotation(times, of=["gravity"])
+    with pytest.raises(rocking.errors.OptionError, match=r"inputs must be among motion, .*, not 'gravity'"):
+        response.sensitivity.rotation(times, inputs=["gravity"])
 
 
 def test_changes_of_the_rotation_just_before_a_proven_rest_are_those_of_its_bounces() -> None:

@@ -70,7 +70,7 @@ def same_sensitivities(one, other):
             first, second = (getattr(each.sensitivity, rows)[quantity][:3] for each in (one, other))
             same(first, second, f"{rows} by {quantity}")
     by_side = [f"{each}_{side}" for each in ("p", "alpha", "restitution") for side in ("plus", "minus")]
-    first, second = (each.sensitivity.rotation(times, of=by_side) for each in (one, other))
+    first, second = (each.sensitivity.rotation(times, inputs=by_side) for each in (one, other))
     for each in by_side:
         swapped = each.replace("plus", "minus") if "plus" in each else each.replace("minus", "plus")
         same(first[each], -second[swapped], each)

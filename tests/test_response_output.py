@@ -47,9 +47,9 @@ def test_a_summary_is_its_rows(shaken):
     assert peak.unit == "rad" and float(peak.value) == pytest.approx(
         shaken.peak_rotation, rel=5e-3
     )  # to its known digits
-    facts = {row.name: row for row in shaken.facts(0.5)}
+    facts = {row.name: row for row in shaken.result_rows(0.5)}
     assert facts["peak_rotation"] == ("peak_rotation", shaken.peak_rotation, "rad", "")
-    assert [*shaken.to_dict(0.5)] == [add_unit(row.name, row.unit) for row in shaken.facts(0.5)]
+    assert [*shaken.to_dict(0.5)] == [add_unit(row.name, row.unit) for row in shaken.result_rows(0.5)]
 
 
 @pytest.mark.parametrize(

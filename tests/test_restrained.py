@@ -145,7 +145,7 @@ def test_restraints_stay_where_they_are_on_the_block_when_a_load_that_follows_mo
         holding -= thrust[0] * arms(thrust[2], thrust[1])[1]
         holding += tendon[1] * (pivot - tendon[2])
         assert found == pytest.approx(sign * holding / height, rel=1e-13)
-    assert body.tendons_at((0.02, 0.0))[0][0] == pytest.approx(2.0 * (right - 0.1) * math.sin(0.01))
+    assert body.compute_tendon_extremes((0.02, 0.0))[0][0] == pytest.approx(2.0 * (right - 0.1) * math.sin(0.01))
 
 
 def test_a_body_too_stocky_for_angular_momentum_carries_a_load_with_a_restitution_that_is_given():

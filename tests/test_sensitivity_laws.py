@@ -94,7 +94,7 @@ def test_rotations_impacts_and_uplifts_change_with_everything_as_differences_say
         # Of a tendon that yields, what is held while slenderness changes is another thing before and after that.
         names = [each for each in BY_SIDE if name != "yielding tendon" or not each.startswith("alpha")]
         names = ("motion", *names)
-        changes = found.sensitivity.rotation(times, of=names)
+        changes = found.sensitivity.rotation(times, inputs=names)
         _, by_impact, by_event = found.sensitivity._compute_changes(names)
         uplifts = np.flatnonzero(found.events["kind"] == "uplift")[:2]
         for k, of in enumerate(names):

@@ -7,7 +7,7 @@ attributes.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -43,11 +43,6 @@ _LONGEST_WORD: Final = 400
 Spelling = Callable[[str], str]
 
 
-def spell_argument(name: str) -> str:
-    """Return the name of an argument as in Python."""
-    return name
-
-
 def _shorten(text: str) -> str:
     """Shorten a long word to its ends."""
     half = _LONGEST_WORD // 2
@@ -57,6 +52,11 @@ def _shorten(text: str) -> str:
 def escape_braces(text: str) -> str:
     """Escape each "{}" in a text for use in a template."""
     return text.replace("{}", "{{}}")
+
+
+def join_placeholders(names: Collection[str]) -> str:
+    """Return placeholders for all names in a template."""
+    return " and ".join(["{}"] * len(names))
 
 
 def describe_install(part: str) -> str:
@@ -79,7 +79,7 @@ class Message:
     template: str
     arguments: tuple[str, ...] = ()
 
-    def text(self, spelling: Spelling = spell_argument) -> str:
+    def text(self, spelling: Spelling = str) -> str:
         """Return the sentence in one line, with names as written by ``spelling``."""
         names = map(spelling, self.arguments)
         sentence = _PLACEHOLDER.sub(lambda match: "{}" if match[0] == "{{}}" else next(names, "{}"), self.template)
@@ -134,7 +134,7 @@ class RockingError(Exception):
         """Name of the invalid argument, if the message contains one."""
         return self.message.arguments[0] if self.message.arguments else None
 
-    def text(self, spelling: Spelling = spell_argument) -> str:
+    def text(self, spelling: Spelling = str) -> str:
         """Return file, line and sentence in one line, with names as written by ``spelling``."""
         if self.path is None:
             return self.message.text(spelling)

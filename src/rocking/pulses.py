@@ -275,9 +275,8 @@ def _create_motion(
     breakpoints: Floats, series: Floats, peak: float, description: Description, name: str = ""
 ) -> Motion:
     """Create a motion from pieces with an error proportional to the peak acceleration."""
-    return Motion(
-        breakpoints, series, name=name or description.family, description=description, error=_RELATIVE_ERROR * abs(peak)
-    )
+    error = _RELATIVE_ERROR * abs(peak)
+    return Motion(breakpoints, series, name=name or description.family, description=description, error=error)
 
 
 def _create_sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
@@ -289,9 +288,8 @@ def _create_sine(family: str, amplitude: float, frequency: float, cycles: float,
     breakpoints = np.linspace(0.0, cycles / frequency, _count_breakpoints(_PIECES_PER_CYCLE * cycles))
     parameters = {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase}
     description = Description(family, parameters, "amplitude sin(2 pi frequency t + phase) over the given cycles")
-    return _create_motion(
-        breakpoints, amplitude * _compute_sine_pieces(breakpoints, frequency, phase), amplitude, description
-    )
+    series = amplitude * _compute_sine_pieces(breakpoints, frequency, phase)
+    return _create_motion(breakpoints, series, amplitude, description)
 
 
 def _expand_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> list[float]:
@@ -303,7 +301,8 @@ def _expand_amplitudes(amplitude: float | Sequence[float], lobes: int | None) ->
     if np.ndim(amplitude) == 0 and count is not None:
         return amplitudes * count
     if np.ndim(amplitude) == 0 or not amplitudes or count not in (None, len(amplitudes)):
-        raise MotionError("give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe")
+        message = "give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe"
+        raise MotionError(message)
     return amplitudes
 
 
@@ -356,23 +355,20 @@ def ricker(
     limit = 2.0 * (9.1 if symmetric else 9.3) / rate  # limit at 1e-16 of the peak
     span = limit if duration is None else checks.positive(duration, "duration", MotionError, "s")
     if span > limit:
-        sentence = f"a Ricker pulse of {frequency:.6g} Hz lasts {limit:.6g} s; give a duration of at most this value"
-        raise MotionError(sentence)
+        message = f"a Ricker pulse of {frequency:.6g} Hz lasts {limit:.6g} s; give a duration of at most this value"
+        raise MotionError(message)
     breakpoints = np.linspace(0.0, span, _count_breakpoints(rate * span / _GAUSSIAN_PIECE_LENGTH))
     series = -_compute_gaussian_series(2 if symmetric else 3, _compute_midpoints(breakpoints) - 0.5 * span, rate)
     # (x^2 - 3) x exp(-x^2 / 2) is stationary at x^4 - 6 x^2 + 3 = 0.
     x_squared = 3.0 - math.sqrt(6.0)
     peak = 1.0 if symmetric else (3.0 - x_squared) * math.sqrt(x_squared) * math.exp(-0.5 * x_squared)
-    formula = (
-        "amplitude (1 - x^2) exp(-x^2/2), x = sqrt(2) pi frequency (t - duration/2)"
-        if symmetric
-        else "(amplitude/1.3801) (x^2 - 3) x exp(-x^2/2), x = 2 pi frequency (t - duration/2)/sqrt(3)"
-    )
+    formula = "(amplitude/1.3801) (x^2 - 3) x exp(-x^2/2), x = 2 pi frequency (t - duration/2)/sqrt(3)"
+    if symmetric:
+        formula = "amplitude (1 - x^2) exp(-x^2/2), x = sqrt(2) pi frequency (t - duration/2)"
     parameters = {"amplitude": amplitude, "frequency": frequency, "duration": span}
     description = Description(f"{kind} Ricker", parameters, formula)
-    return _create_motion(
-        breakpoints, _shift_to_starts(breakpoints, series * (amplitude / peak)), amplitude, description
-    )
+    series = _shift_to_starts(breakpoints, series * (amplitude / peak))
+    return _create_motion(breakpoints, series, amplitude, description)
 
 
 def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float, gamma: float) -> Motion:
@@ -420,8 +416,8 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
     amplitude, frequency, phase = parameters.values()
     gamma = checks.positive(gamma, "gamma", MotionError, "cycles")
     if not 1.0 <= gamma <= _MAX_CYCLES:
-        sentence = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MAX_CYCLES}, not {gamma}"
-        raise MotionError(sentence, "gamma", value=gamma)
+        message = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MAX_CYCLES}, not {gamma}"
+        raise MotionError(message, "gamma", value=gamma)
     breakpoints = np.linspace(0.0, gamma / frequency, _count_breakpoints(_PIECES_PER_CYCLE * (gamma + 1.0)))
     turns, rest = multiply_exactly(frequency, _compute_midpoints(breakpoints))
     carrier = _compute_angle(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
@@ -435,12 +431,9 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
         + 0.25 * (1.0 - shift) * _compute_sine_series(_add_angles(carrier, envelope, -1.0), rate * (1.0 - shift))
     )
     peak = rate * amplitude
-    description = Description(
-        "Mavroeidis-Papageorgiou",
-        parameters | {"gamma": gamma},
-        "derivative of amplitude/2 [1 + cos(2 pi frequency s/gamma)] cos(2 pi frequency s + phase), "
-        "s = t - gamma/(2 frequency); amplitude is a velocity, m/s",
-    )
+    formula = "derivative of amplitude/2 [1 + cos(2 pi frequency s/gamma)] cos(2 pi frequency s + phase), "
+    formula += "s = t - gamma/(2 frequency); amplitude is a velocity, m/s"
+    description = Description("Mavroeidis-Papageorgiou", parameters | {"gamma": gamma}, formula)
     return _create_motion(breakpoints, _shift_to_starts(breakpoints, -peak * series), peak, description)
 
 

@@ -324,10 +324,10 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Makris, N. and Konstantinidis, D. (2003). The rocking spectrum and the limitations of practical design
     methodologies. Earthquake Engineering and Structural Dynamics 32(2), 265-289.
     """
-    lowest, restitution = math.exp(-0.5 / _DAMPING_FACTOR), blocks.restitution.min()
-    if restitution <= lowest:
-        message = f"the rule priestley requires a restitution above {lowest:.2g}, where its damping is below critical"
-        raise BlockError(f"{message}; got {restitution:g}; omit this rule")
+    lowest, smallest = math.exp(-0.5 / _DAMPING_FACTOR), blocks.restitution.min()
+    if smallest <= lowest:
+        requirement = f"a restitution above {lowest:.2g}, where its damping is below critical"
+        raise BlockError(f"the rule priestley requires {requirement}; got {smallest:g}; omit this rule")
     return _compute_min_ratio(blocks, motion, _create_free_rocking_oscillator)
 
 

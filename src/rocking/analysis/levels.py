@@ -22,10 +22,10 @@ from rocking.engine.problem import gather_bodies
 from rocking.engine.tasks import Setup, describe_missing, simulate_each
 from rocking.errors import Message, OptionError
 from rocking.inputs.notes import is_multiple
-from rocking.motion.description import Origin, compose_label
+from rocking.motion.description import Origin, create_label
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.response.perturbed import COUNT, RELATIVE, format_percent, list_factors
+from rocking.response.perturbed import FACTOR_COUNT, RELATIVE_STEP, format_percent, list_factors
 from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def create_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_h
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
     histories = data.histories if with_history else [""] * len(names)
     return [
-        compose_label(str(name), history.split("; ") if history else [], str(vertical))
+        create_label(str(name), history.split("; ") if history else [], str(vertical))
         for name, history, vertical in zip(names, histories, verticals, strict=True)
     ]
 
@@ -305,7 +305,7 @@ def describe_undecided(setup: Setup, motions: Sequence[Motion], factors: ArrayLi
     indices = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
     _, motion, block, _ = np.unravel_index(indices, overturned.shape)
     factor, original = np.broadcast_to(factors, overturned.shape).ravel()[indices], overturned.ravel()[indices]
-    scales, count = np.array(list_factors(RELATIVE, COUNT))[[0, -1]], len(indices)
+    scales, count = np.array(list_factors(RELATIVE_STEP, FACTOR_COUNT))[[0, -1]], len(indices)
     has_changed = np.zeros(2 * count, dtype=bool)
     for k, outcomes in simulate_each(
         setup, motions, np.tile(block, 2), np.tile(motion, 2), np.outer(scales, factor).ravel()
@@ -328,7 +328,7 @@ class Brackets:
     @property
     def level(self) -> Floats:
         """Midpoint of every bracket."""
-        return bisection.find_middles(self.low, self.high)
+        return bisection.compute_midpoints(self.low, self.high)
 
 
 def find_boundaries(

@@ -21,7 +21,7 @@ from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
 from rocking.response import Response
 from rocking.response.mechanics import check_friction
-from rocking.response.perturbed import PRECISION, choose_steps
+from rocking.response.perturbed import MOTION_PRECISION, choose_steps
 from rocking.response.summary import format_brief_outcome, format_ratio, round_ratio
 from rocking.simulation.ensemble import body_coordinates, collect_verticals
 from rocking.simulation.simulate import simulate
@@ -100,7 +100,7 @@ class Survey(BlockUnderRecords):
     """
 
     friction: float | None = None
-    precision: float = PRECISION
+    precision: float = MOTION_PRECISION
 
     def rows(self) -> list[dict[str, Any]]:
         friction, rows = self.friction, []
@@ -166,7 +166,7 @@ class RuleComparison(BlockUnderRecords):
         rows, labels = [], self._create_labels()
         columns = labels, self.responses, self.ratios, self.margins, self.overturns_when_scaled_down
         for label, response, ratios, margin, overturns_when_scaled_down in zip(*columns, strict=True):
-            motion, verdict, factor = require_motion(response), format_brief_outcome(response, PRECISION), 1.0 / margin
+            motion, verdict, factor = require_motion(response), format_brief_outcome(response, MOTION_PRECISION), 1.0 / margin
             if overturns_when_scaled_down:  # with more digits near 1
                 verdict += f"; overturns at x {factor:.{2 if factor < 0.985 else 4}f}"
             rows.append(
@@ -240,7 +240,7 @@ def format_rule_name(rule: str) -> str:
 
 
 def survey(
-    block: Body, motions: Motions, *, friction: float | None = None, precision: float = PRECISION, **options: Any
+    block: Body, motions: Motions, *, friction: float | None = None, precision: float = MOTION_PRECISION, **options: Any
 ) -> Survey:
     """Simulate a block under many motions.
 

@@ -10,10 +10,10 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.block.body import KINDS
+from rocking.block.body import BODIES_TYPES
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Terms
-from rocking.block.sides import check_gravity, check_sides, describe_missing_body, find_rigid_bodies
+from rocking.block.sides import check_gravity, check_sides, compute_rigid_bodies, describe_missing_body
 from rocking.block.single import Block, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -102,17 +102,14 @@ class Blocks:
         if terms:
             arguments |= {**_TERMS, **terms}
             if unknown := [*terms.keys() - _TERMS.keys()]:
-                raise BlockError(
-                    f"blocks have no parameter {{}}; the terms of restraints are {', '.join(_TERMS)}", unknown[0]
-                )
+                message = f"blocks have no parameter {{}}; the terms of restraints are {', '.join(_TERMS)}"
+                raise BlockError(message, unknown[0])
         try:
             columns = [_expand_sides(checks.numbers(values, name, BlockError)) for name, values in arguments.items()]
             arrays = dict(zip(arguments, np.broadcast_arrays(*columns), strict=True))
         except ValueError:
-            raise BlockError(
-                "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with the same n",
-                "p", "alpha", "restitution",
-            ) from None  # fmt: skip
+            message = "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with the same n"
+            raise BlockError(message, *_FIELDS) from None
         g = check_gravity(gravity)
         for name in _FIELDS if restitution is not None else _FIELDS[:2]:
             check_sides(arrays[name], name)
@@ -199,10 +196,9 @@ class Blocks:
                 require_block(body)
         gravities = {body.gravity for body in bodies}
         if len(gravities) != 1:
-            raise BlockError(
-                "Blocks.from_bodies requires at least one block, and the same {} for all of them", "gravity"
-            )
-        rows = [body._build_rows() for body in bodies]
+            message = "Blocks.from_bodies requires at least one block, and the same {} for all of them"
+            raise BlockError(message, "gravity")
+        rows = [body._create_rows() for body in bodies]
         if max(len(sides[0]) for sides in rows) > len(_FIELDS):
             rows = [[(*side, *[*_TERMS.values()][len(side) - len(_FIELDS) :]) for side in sides] for sides in rows]
         table = np.array(rows).transpose(2, 0, 1)
@@ -248,10 +244,8 @@ class Blocks:
         is_one_sided = terms["one_sided"] > 0.0
         records["next_side"][is_one_sided] = 0
         records["threshold"][:, 1] = np.where(is_one_sided[:, 1], math.inf, records["threshold"][:, 1])
-        records["min_restitution"], records["restitution_slope"] = (
-            terms["restitution_least"],
-            terms["restitution_slope"],
-        )
+        records["min_restitution"] = terms["restitution_least"]
+        records["restitution_slope"] = terms["restitution_slope"]
         records["seed"] = terms["restitution_seed"][:, 0]
         records["variable_restitution"] = (records["seed"] >= 0) | np.any(records["restitution_slope"] > 0.0, axis=1)
         records["prestress"], records["spring"] = p * p * terms["prestress"], p * p * terms["spring"]
@@ -280,16 +274,9 @@ class Blocks:
             records["added_push"] += records["tendon_push"]
             records["prestress"] += p * p * slack_moment
             records["restraint_threshold"] += slack_moment / gain
-        names = (
-            "restraint_threshold",
-            "added_weight",
-            "added_push",
-            "prestress",
-            "spring",
-            "damping",
-            "tendon_stiffness",
-        )
-        records["restrained"] = np.any([np.any(records[name] != 0.0, axis=1) for name in names], axis=0)
+        names = ("restraint_threshold", "added_weight", "added_push", "prestress", "spring", "damping")
+        is_restrained = [np.any(records[name] != 0.0, axis=1) for name in (*names, "tendon_stiffness")]
+        records["restrained"] = np.any(is_restrained, axis=0)
 
     @property
     def stops(self) -> Floats:
@@ -314,9 +301,8 @@ class Blocks:
 
     def __getitem__(self, index: int) -> Block | RestrainedBlock:
         if isinstance(index, (slice, tuple, list, np.ndarray)):
-            raise BlockError(
-                "the index of a block must be a whole number; use blocks.select for slices, indices and masks"
-            )
+            message = "the index of a block must be a whole number; use blocks.select for slices, indices and masks"
+            raise BlockError(message)
         p, alpha, e = (tuple(array[index]) for array in (self.p, self.alpha, self.restitution))
         block = Block.from_parameters(p, alpha, e, gravity=self.gravity)
         terms, is_one_sided = [Terms(), Terms()], False
@@ -326,10 +312,7 @@ class Blocks:
         if not is_one_sided and terms == [Terms(), Terms()]:
             return block
         text = "block with restraints" + ", rocking one way" * is_one_sided
-        body = RestrainedBlock.__new__(RestrainedBlock)
-        body.__dict__.update(block=block, _terms=tuple(terms), is_one_sided=is_one_sided, restraints=None, lean=0.0)
-        body.__dict__.update(description=text)
-        return body
+        return RestrainedBlock.__new__(RestrainedBlock)._fill(block, terms, text, is_one_sided=is_one_sided)
 
     def __iter__(self) -> Iterator[Block | RestrainedBlock]:
         return (self[index] for index in range(len(self)))
@@ -344,10 +327,9 @@ class Blocks:
         except IndexError:
             rows = np.array(0)
         if rows.ndim != 1:
-            raise BlockError(
-                f"select requires a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} values, "
-                f"not {checks.short_repr(index)}; use blocks[0] for a single block"
-            )
+            requirement = f"a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} values"
+            hint = "use blocks[0] for a single block"
+            raise BlockError(f"select requires {requirement}, not {checks.short_repr(index)}; {hint}")
         arrays = {name: values[rows] for name, values in self._arrays().items()}
         return Blocks.__new__(Blocks)._fill(self.gravity, arrays)
 
@@ -385,18 +367,16 @@ def _compute_restitutions(p: Floats, alpha: Floats) -> Floats:
     """Compute the restitutions by angular momentum of rigid bodies with these p and alpha."""
     factors: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
     asymmetric = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
-    factors[asymmetric], _ = find_rigid_bodies(p[asymmetric], alpha[asymmetric])
+    factors[asymmetric], _ = compute_rigid_bodies(p[asymmetric], alpha[asymmetric])
     if (undetermined := np.isnan(factors).any(axis=1)).any():
         first = int(np.argmax(undetermined))
         raise BlockError(f"{describe_missing_body(p[first], alpha[first])} (block {first})", "restitution")
     stocky = np.flatnonzero(~(factors > 0.0).all(axis=1))
     if len(stocky):
-        raise BlockError(
-            f"conservation of angular momentum gives block {stocky[0]} a restitution of "
-            f"{factors[stocky[0]].min():.3g}, because it is too stocky; set {{}} to a value or a pair in (0, 1]",
-            "restitution",
-        )
+        result = f"gives block {stocky[0]} a restitution of {factors[stocky[0]].min():.3g}, because it is too stocky"
+        message = f"conservation of angular momentum {result}; set {{}} to a value or a pair in (0, 1]"
+        raise BlockError(message, "restitution")
     return check_sides(factors, "restitution")
 
 
-KINDS["blocks"] = KINDS["restrained-blocks"] = Blocks
+BODIES_TYPES["blocks"] = BODIES_TYPES["restrained-blocks"] = Blocks

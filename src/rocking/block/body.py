@@ -128,7 +128,7 @@ class Bodies(Protocol):
 
     @property
     def kind(self) -> str:
-        """Name of the kind, the key in `KINDS`."""
+        """Name of the kind, the key in `BODIES_TYPES`."""
 
     @property
     def gravity(self) -> float:
@@ -176,7 +176,7 @@ class BodiesFactory(Protocol):
 
 
 #: Registry of classes of many bodies, which avoids circular imports.
-KINDS: Final[dict[str, BodiesFactory]] = {}
+BODIES_TYPES: Final[dict[str, BodiesFactory]] = {}
 
 #: Registry of classes of single bodies.
-SINGLE: Final[dict[str, Callable[..., Any]]] = {}
+SINGLE_BODY_TYPES: Final[dict[str, Callable[..., Any]]] = {}

@@ -6,12 +6,12 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from rocking.block.body import SINGLE, ContactLaw, Coordinate
-from rocking.block.restraints import Load, Pivot, Restitution, Restraint, Tendon, Terms
+from rocking.block.body import SINGLE_BODY_TYPES, ContactLaw, Coordinate
+from rocking.block.restraints import Load, Pivot, Pivots, Restitution, Restraint, Tendon, Terms
 from rocking.block.sides import Side, check_pair, check_parameter, one_sided_restitution
 from rocking.block.single import Block, Rocking, require_block
 from rocking.core import checks
@@ -113,27 +113,36 @@ class RestrainedBlock(Rocking):
             standing_block = standing_block._with_sides((plus, minus))
         if sum(isinstance(restraint, Tendon) and restraint.strength < math.inf for restraint in restraints) > 1:
             raise BlockError("only one tendon of a block may yield; omit {} of the others", "strength")
-        pivots = _build_pivots(standing_block, tilt, restraints)
-        terms = [
-            functools.reduce(
-                Terms.add, (restraint._compute_terms(pivot) for restraint in restraints), Terms()
-            )._replace(**(law._compute_terms(side) if law else {}))
-            for side, pivot in enumerate(pivots)
-        ]
+        pivots = _create_pivots(standing_block, tilt, restraints)
+        terms = []
+        for side, pivot in enumerate(pivots):
+            total = functools.reduce(Terms.add, (restraint._compute_terms(pivot) for restraint in restraints), Terms())
+            terms.append(total._replace(**(law._compute_terms(side) if law else {})))
         description = ", ".join([free_block.description, *_describe_restraints(restraints), *details])
-        self.__dict__.update(
-            block=standing_block, _terms=tuple(terms), is_one_sided=is_one_sided, restraints=restraints, lean=tilt
-        )
-        self.__dict__.update(description=description)
+        self._fill(standing_block, terms, description, restraints, tilt, is_one_sided=is_one_sided)
         if (min_uplift := min(self.uplift_thresholds())) <= 0.0:
-            raise BlockError(
-                f"this block does not stand: its uplift acceleration is {min_uplift:.3g} m/s^2; reduce the thrust, "
-                f"load or lean{'; forces are in N, masses in kg' * (min_uplift < -self.gravity)}"
-            )
+            hint = "; forces are in N, masses in kg" if min_uplift < -self.gravity else ""
+            message = f"this block does not stand: its uplift acceleration is {min_uplift:.3g} m/s^2"
+            raise BlockError(f"{message}; reduce the thrust, load or lean{hint}")
 
-    def _build_rows(self) -> list[tuple[float, ...]]:
+    def _fill(
+        self,
+        block: Block,
+        terms: Sequence[Terms],
+        description: str,
+        restraints: tuple[Restraint, ...] | None = None,
+        lean: float = 0.0,
+        *,
+        is_one_sided: bool,
+    ) -> RestrainedBlock:
+        """Set all attributes from valid values."""
+        values = {"block": block, "_terms": tuple(terms), "is_one_sided": is_one_sided, "description": description}
+        self.__dict__.update(values, restraints=restraints, lean=lean)
+        return self
+
+    def _create_rows(self) -> list[tuple[float, ...]]:
         """Return parameters and, unless free, terms of both sides as stored in `Blocks`."""
-        rows = self.block._build_rows()
+        rows = self.block._create_rows()
         if not self.is_one_sided and self._terms == (Terms(), Terms()):
             return rows
         rows = [(*row, *terms, float(self.is_one_sided)) for row, terms in zip(rows, self._terms, strict=True)]
@@ -152,7 +161,7 @@ class RestrainedBlock(Rocking):
     @property
     def balance(self) -> tuple[float, float]:
         """Rotation of the unstable balance on each side, rad; infinite if restraints hold it at any rotation."""
-        plus, minus = map(_find_balance, self.block.sides, self._terms)
+        plus, minus = map(_compute_balance, self.block.sides, self._terms)
         return plus, math.inf if self.is_one_sided else minus
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
@@ -177,26 +186,30 @@ class RestrainedBlock(Rocking):
         motion: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],
         side: Integers,
-        stretch: Floats,
+        elongation: Floats,
     ) -> tuple[Floats, Floats]:
-        horizontal, vertical = self.block.contact(motion, ground_over_g, side, stretch)
+        horizontal, vertical = self.block.contact(motion, ground_over_g, side, elongation)
         if self.restraints and self.block.mass is not None:
-            pivots, weight = _build_pivots(self.block, self.lean, self.restraints), self.block.mass * self.gravity
+            pivots, weight = _create_pivots(self.block, self.lean, self.restraints), self.block.mass * self.gravity
             for restraint in self.restraints:
-                force_x, force_z = restraint._compute_force(pivots, motion[0], side, stretch)
+                force_x, force_z = restraint._compute_force(pivots, motion[0], side, elongation)
                 horizontal, vertical = horizontal - force_x / weight, vertical - force_z / weight
         if self.is_one_sided:
             horizontal = np.where(side < 0, np.minimum(horizontal, 0.0), horizontal)
         return horizontal, vertical
 
-    def tendons_at(self, largest: tuple[float, float], model: Model = "nonlinear") -> list[tuple[float, float, float]]:
+    def compute_tendon_extremes(
+        self, largest_rotations: tuple[float, float], model: Model = "nonlinear"
+    ) -> list[tuple[float, float, float]]:
         """Return the largest elongation (m), largest force (N) and plastic elongation (m) of each tendon, in order.
 
-        `largest` is the largest rotation on each side, rad. The list is empty if the restraints are not
+        The largest rotations are on side + and side -, rad. The list is empty if the restraints are not
         available.
         """
-        plus, minus = largest if model == "linear" else (2.0 * math.sin(0.5 * u) for u in largest)
-        pivots = _build_pivots(self.block, self.lean, self.restraints or ())
+        plus, minus = largest_rotations
+        if model != "linear":
+            plus, minus = 2.0 * math.sin(0.5 * plus), 2.0 * math.sin(0.5 * minus)
+        pivots = _create_pivots(self.block, self.lean, self.restraints or ())
         tendons = [tendon for tendon in self.restraints or () if isinstance(tendon, Tendon)]
         return [tendon._compute_extremes(pivots, (plus, minus)) for tendon in tendons]
 
@@ -213,9 +226,8 @@ def _check_restraints(restraints: Sequence[object], block: Block) -> None:
     """Reject invalid restraints, and restraints of a block without a mass."""
     for restraint in restraints:
         if not isinstance(restraint, Restraint):
-            raise BlockError(
-                f"{checks.short_repr(restraint)} is not a restraint; give {_RESTRAINT_NAMES} as separate arguments"
-            )
+            message = f"{checks.short_repr(restraint)} is not a restraint"
+            raise BlockError(f"{message}; give {_RESTRAINT_NAMES} as separate arguments")
     if restraints and block.mass is None:
         raise BlockError("a block with restraints requires its {}, kg", "mass")
 
@@ -237,19 +249,11 @@ def _add_loads(block: Block, loads: Sequence[Load], restitution: float | Sequenc
     gyration = float(mass_shares[0] * gyration_squared + mass_shares @ ((offsets - x) ** 2 + (heights - z) ** 2))
     overhang = max(x - distance_plus, -x - distance_minus)
     if overhang >= 0.0:
-        raise BlockError(
-            f"with its loads, the centre of mass of this block lies {overhang:.3g} m beyond its pivot; reduce "
-            "the mass of a load, or its {}",
-            "offset",
-        )
-    return Block.from_pivots(
-        (distance_plus - x, distance_minus + x),
-        z,
-        math.sqrt(gyration),
-        restitution=restitution,
-        mass=float(masses.sum()),
-        gravity=block.gravity,
-    )
+        message = f"with its loads, the centre of mass of this block lies {overhang:.3g} m beyond its pivot; reduce "
+        raise BlockError(f"{message}the mass of a load, or its {{}}", "offset")
+    distances, mass = (distance_plus - x, distance_minus + x), float(masses.sum())
+    options: dict[str, Any] = {"restitution": restitution, "mass": mass, "gravity": block.gravity}
+    return Block.from_pivots(distances, z, math.sqrt(gyration), **options)
 
 
 def _tilt(block: Block, lean: float) -> Block:
@@ -258,14 +262,10 @@ def _tilt(block: Block, lean: float) -> Block:
         return block
     plus, minus = block.sides
     if not -minus.alpha < lean < plus.alpha:
-        raise BlockError(
-            f"{{}} must be between {-minus.alpha:.4g} and {plus.alpha:.4g} rad for the block to stand, not {lean:g}"
-            f"{f'; if it is in degrees, give math.radians({lean:g})' if 0.5 <= abs(lean) < 90.0 else ''}",
-            "lean",
-            value=lean,
-        )
-    sides = replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)
-    return block._with_sides(sides)
+        requirement = f"between {-minus.alpha:.4g} and {plus.alpha:.4g} rad for the block to stand"
+        hint = f"; if it is in degrees, give math.radians({lean:g})" if 0.5 <= abs(lean) < 90.0 else ""
+        raise BlockError(f"{{}} must be {requirement}, not {lean:g}{hint}", "lean", value=lean)
+    return block._with_sides((replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)))
 
 
 def _find_following_loads(restraints: Sequence[Restraint]) -> list[Load]:
@@ -273,7 +273,7 @@ def _find_following_loads(restraints: Sequence[Restraint]) -> list[Load]:
     return [restraint for restraint in restraints if isinstance(restraint, Load) and restraint.follows]
 
 
-def _build_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) -> tuple[Pivot, Pivot]:
+def _create_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) -> Pivots:
     """Return both pivots of a leaning block with the loads that follow it."""
     mass = math.nan if block.mass is None else block.mass
     shift = sum(load.mass * load.offset for load in _find_following_loads(restraints)) / mass
@@ -287,7 +287,7 @@ def _build_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) ->
     return plus, minus
 
 
-def _find_balance(side: Side, terms: Terms) -> float:
+def _compute_balance(side: Side, terms: Terms) -> float:
     """Return the first rotation without restoring moment or ground motion, rad.
 
     For a yielding tendon, the first yield is considered.
@@ -297,8 +297,8 @@ def _find_balance(side: Side, terms: Terms) -> float:
 
     def moment(u: float) -> float:
         weight_moment = (1.0 + terms.sine) * math.sin(side.alpha - u) + terms.cosine * math.cos(side.alpha - u)
-        stretch = min(2.0 * terms.opening * math.sin(0.5 * u), terms.yields) - terms.slack
-        return weight_moment + (terms.prestress + terms.stiffness * stretch) * math.cos(0.5 * u) + terms.spring * u
+        elongation = min(2.0 * terms.opening * math.sin(0.5 * u), terms.yields) - terms.slack
+        return weight_moment + (terms.prestress + terms.stiffness * elongation) * math.cos(0.5 * u) + terms.spring * u
 
     rotations = np.linspace(0.0, 0.5 * math.pi, _N_SAMPLES)
     values = np.array([moment(u) for u in rotations.tolist()])
@@ -309,4 +309,4 @@ def _find_balance(side: Side, terms: Terms) -> float:
     return bisect(float(rotations[k]), float(rotations[k + 1]), lambda u: moment(u) <= 0.0)[1]
 
 
-SINGLE["restrained"] = RestrainedBlock
+SINGLE_BODY_TYPES["restrained"] = RestrainedBlock

@@ -63,7 +63,7 @@ class Pivot(NamedTuple):
     moment: float  # weight times R, N m
     gravity: float  # m/s^2
 
-    def find_arms(self, height: float, offset: float) -> tuple[float, float]:
+    def compute_arms(self, height: float, offset: float) -> tuple[float, float]:
         """Return the inward distance from the pivot and the height above it, m, of a point of the standing block.
 
         The height is above the base, the offset from the centre of mass without loads to side +, both along the axes
@@ -77,6 +77,10 @@ class Pivot(NamedTuple):
         """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line to the centre of mass, m."""
         c, s = math.cos(self.alpha), math.sin(self.alpha)
         return inwards * c - upwards * s, upwards * c + inwards * s
+
+
+#: Pivots of both sides.
+Pivots = tuple[Pivot, Pivot]
 
 
 class Restraint(ABC):
@@ -100,10 +104,10 @@ class Restraint(ABC):
     def _compute_terms(self, pivot: Pivot) -> Terms:
         """Compute the terms while the block leans to one side."""
 
-    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         """Compute the force on the block to side + and up, N, which is zero for springs and dampers.
 
-        ``side`` is -1 at rest, ``stretch`` the elongation of a yielding tendon beyond its plastic elongation, m.
+        ``side`` is -1 at rest, ``elongation`` that of a yielding tendon beyond its plastic elongation, m.
         """
         return 0.0, 0.0
 
@@ -173,63 +177,52 @@ class Tendon(Restraint):
             raise BlockError("a tendon requires {} (N/m) or {} (N)", "stiffness", "prestress")
         object.__setattr__(self, "strength", checks.real(self.strength, "strength", BlockError))
         if not self.strength > prestress:
-            raise BlockError(
-                f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}",
-                "strength",
-                value=self.strength,
-            )
+            message = f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}"
+            raise BlockError(message, "strength", value=self.strength)
         if stiffness == 0.0 and self.strength < math.inf:
             raise BlockError("a yielding tendon requires a {}, N/m", "stiffness")
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
-        x = self._find_lever(pivot)
+        x = self._compute_lever(pivot)
         if self.strength < math.inf:
-            yields = (self.strength - self.prestress) / self.stiffness
-            return Terms(
-                opening=x, stiffness=self.stiffness * x / pivot.moment, yields=yields,
-                slack=-self.prestress / self.stiffness,
-            )  # fmt: skip
+            yields, slack = (self.strength - self.prestress) / self.stiffness, -self.prestress / self.stiffness
+            return Terms(opening=x, stiffness=self.stiffness * x / pivot.moment, yields=yields, slack=slack)
         factor = self.stiffness * x * x / pivot.moment
         return Terms(-factor * math.cos(pivot.alpha), factor * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
-    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         """Compute the force of the tendon, along the chord between its ends."""
         if self.strength == math.inf:
-            x = np.where(side == 1, self._find_lever(pivots[1]), self._find_lever(pivots[0]))
-            stretch = 2.0 * x * np.sin(0.5 * np.abs(rotation))
-        tension = np.clip(self.prestress + self.stiffness * stretch, 0.0, self.strength)
+            x = np.where(side == 1, self._compute_lever(pivots[1]), self._compute_lever(pivots[0]))
+            elongation = 2.0 * x * np.sin(0.5 * np.abs(rotation))
+        tension = np.clip(self.prestress + self.stiffness * elongation, 0.0, self.strength)
         inclination = 0.5 * rotation + pivots[0].lean
         return -tension * np.sin(inclination), -tension * np.cos(inclination)
 
-    def _compute_extremes(self, pivots: tuple[Pivot, Pivot], ratios: tuple[float, float]) -> tuple[float, float, float]:
+    def _compute_extremes(self, pivots: Pivots, ratios: tuple[float, float]) -> tuple[float, float, float]:
         """Compute the largest elongation, m, the largest force, N, and the plastic elongation, m.
 
         ``ratios``: largest opening of the base on each side divided by the distance from the pivot.
         """
-        elongation = max(self._find_lever(pivot) * ratio for pivot, ratio in zip(pivots, ratios, strict=True))
+        elongation = max(self._compute_lever(pivot) * ratio for pivot, ratio in zip(pivots, ratios, strict=True))
         elastic = self.prestress + self.stiffness * elongation
         if elastic <= self.strength:
             return elongation, elastic, 0.0
         return elongation, self.strength, (elastic - self.strength) / self.stiffness
 
     def __str__(self) -> str:
-        parts = [
-            _format_si(self.stiffness, "N/m") if self.stiffness else "constant force",
-            f"prestress {_format_si(self.prestress, 'N')}" if self.prestress else "no prestress",
-            f"yielding at {_format_si(self.strength, 'N')}" if self.strength < math.inf else "",
-        ]
-        return f"tendon of {', '.join(filter(None, parts))}{_describe_offset(self.offset) or ' at the centre of mass'}"
+        stiffness = _format_si(self.stiffness, "N/m") if self.stiffness else "constant force"
+        prestress = f"prestress {_format_si(self.prestress, 'N')}" if self.prestress else "no prestress"
+        strength = f", yielding at {_format_si(self.strength, 'N')}" if self.strength < math.inf else ""
+        position = _describe_offset(self.offset) or " at the centre of mass"
+        return f"tendon of {stiffness}, {prestress}{strength}{position}"
 
-    def _find_lever(self, pivot: Pivot) -> float:
+    def _compute_lever(self, pivot: Pivot) -> float:
         """Return the distance of the duct from the pivot, m."""
         x = pivot.distance - pivot.sign * self.offset
         if x < -1e-12 * pivot.distance:
-            raise BlockError(
-                f"a tendon at {{}} = {self.offset:g} m is beyond the pivot, which is {pivot.distance:g} m from the "
-                "centre of mass",
-                "offset",
-                value=self.offset,
-            )
+            place = f"beyond the pivot, which is {pivot.distance:g} m from the centre of mass"
+            raise BlockError(f"a tendon at {{}} = {self.offset:g} m is {place}", "offset", value=self.offset)
         return max(x, 0.0)
 
 
@@ -334,17 +327,16 @@ class Thrust(Restraint):
         self._set_positive("height", "m")
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
-        rho_sin, rho_cos = pivot.rotate(*pivot.find_arms(self.height, self.offset))
+        rho_sin, rho_cos = pivot.rotate(*pivot.compute_arms(self.height, self.offset))
         force = pivot.sign * self.force / pivot.moment
         return Terms(force * rho_sin, -force * rho_cos)
 
-    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         return self.force, 0.0
 
     def __str__(self) -> str:
-        return (
-            f"thrust of {_format_si(self.force, 'N')} at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
-        )
+        position = f"at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
+        return f"thrust of {_format_si(self.force, 'N')} {position}"
 
 
 @dataclass(frozen=True)
@@ -392,18 +384,17 @@ class Load(Restraint):
     def _compute_terms(self, pivot: Pivot) -> Terms:
         if self.follows:  # part of the block
             return Terms()
-        rho_sin, rho_cos = pivot.rotate(*pivot.find_arms(self.height, self.offset))
+        rho_sin, rho_cos = pivot.rotate(*pivot.compute_arms(self.height, self.offset))
         weight = self.mass * pivot.gravity / pivot.moment
         return Terms(weight * rho_cos, weight * rho_sin)
 
-    def _compute_force(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+    def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         return 0.0, 0.0 if self.follows else -self.mass * pivots[0].gravity
 
     def __str__(self) -> str:
         behaviour = "that follows" if self.follows else "that only presses"
-        return (
-            f"load of {self.mass:.5g} kg {behaviour} at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
-        )
+        position = f"at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
+        return f"load of {self.mass:.5g} kg {behaviour} {position}"
 
 
 @dataclass(frozen=True)
@@ -458,18 +449,15 @@ class Restitution:
             object.__setattr__(self, "slope", 0.0)
         slopes = check_pair(self.slope, "slope")
         if invalid := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
-            raise BlockError(
-                f"{{}} must be finite and at least 0, in s/rad, not {invalid[0]:g}", "slope", value=self.slope
-            )
+            message = f"{{}} must be finite and at least 0, in s/rad, not {invalid[0]:g}"
+            raise BlockError(message, "slope", value=self.slope)
         for low, high in zip(check_pair(self.minimum, "minimum"), check_pair(self.maximum, "maximum"), strict=True):
             if not 0.0 < high <= 1.0:
                 hint = checks.hint_at_percent(high)
                 raise BlockError(f"{{}} must be in (0, 1], not {high:g}{hint}", "maximum", value=self.maximum)
             if not 0.0 < low <= high:
-                raise BlockError(
-                    f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}", "minimum", "maximum",
-                    value=self.minimum,
-                )  # fmt: skip
+                message = f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}"
+                raise BlockError(message, "minimum", "maximum", value=self.minimum)
         if self.seed is not None:
             checks.integer(self.seed, "seed", BlockError, 0, _LARGEST_SEED)
             if max(slopes) > 0.0:

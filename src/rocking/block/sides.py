@@ -71,9 +71,8 @@ def check_pair(value: Any, name: str) -> tuple[float, float]:
         return value, value
     values = checks.numbers(value, name, BlockError)
     if values.shape not in ((), (2,)):
-        raise BlockError(
-            f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name, value=value
-        )
+        message = f"{{}} must be a number or a pair (side +, side -), not {values.size} values"
+        raise BlockError(message, name, value=value)
     plus, minus = np.broadcast_to(values, 2).tolist()
     return plus, minus
 
@@ -174,10 +173,8 @@ def impact_restitution(
         arms = check_length(plus, "distances"), check_length(minus, "distances")
         h, k = check_length(height, "height"), check_length(radius_of_gyration, "radius_of_gyration")
     else:
-        raise BlockError(
-            "give either {} for a rectangular block, or {}, {} and {} for another body",
-            "alpha", "distances", "height", "radius_of_gyration",
-        )  # fmt: skip
+        message = "give either {} for a rectangular block, or {}, {} and {} for another body"
+        raise BlockError(message, "alpha", "distances", "height", "radius_of_gyration")
     kappa = checks.fraction(contact, "contact", BlockError, below=math.nextafter(1.0, 2.0))
     count = checks.integer(points, "points", BlockError, 2, _MAX_POINTS)
     if kappa < 1.0 and count > 2:
@@ -185,17 +182,14 @@ def impact_restitution(
     inertia = k * k + h * h
     factors = (_compute_factor(arms, inertia, kappa, count), _compute_factor(arms[::-1], inertia, kappa, count))
     if min(factors) <= 0.0:
-        raise BlockError(
-            f"conservation of angular momentum gives this body a restitution of {min(factors):.3g}, because it is too "
-            "stocky; use a more slender one"
-        )
+        result = f"gives this body a restitution of {min(factors):.3g}, because it is too stocky"
+        raise BlockError(f"conservation of angular momentum {result}; use a more slender one")
     short, long = sorted(arms)
     ratio = math.sqrt((inertia + long * long) / (inertia + short * short))  # ratio of the speeds without energy loss
     min_kappa = inertia * (ratio - 1.0) / (long * (long + ratio * short))
     if kappa < min_kappa:
-        raise BlockError(
-            f"{{}} must be at least {min_kappa:.4g}, because this body would otherwise gain energy", "contact"
-        )
+        message = f"{{}} must be at least {min_kappa:.4g}, because this body would otherwise gain energy"
+        raise BlockError(message, "contact")
     return factors
 
 
@@ -266,7 +260,7 @@ def format_sides(sides: Sequence[object]) -> str:
     return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
 
 
-def build_even_sides(
+def create_even_sides(
     gravity: float, radius: float, alpha: float, restitution: object, conserved: float, arm: float | None = None
 ) -> tuple[Side, Side]:
     """Return both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
@@ -275,7 +269,7 @@ def build_even_sides(
     return Side(p, alpha, plus, radius, arm), Side(p, alpha, minus, radius, arm)
 
 
-def build_sides(
+def create_sides(
     distances: tuple[float, float], height: float, gyration_sq: float, gravity: float, restitution: object
 ) -> tuple[Side, Side]:
     """Return the sides of a body, from its pivot distances, the height of its centre of mass, m, and k^2, m^2."""
@@ -295,17 +289,13 @@ def choose_restitutions(restitution: object, conserved: Sequence[float]) -> tupl
     """Return the given restitutions, by default the ones that conserve angular momentum."""
     if restitution is None:
         if min(conserved) <= 0.0:
-            raise BlockError(
-                f"conservation of angular momentum gives this block a restitution of {min(conserved):.3g}, because it "
-                "is too stocky; correct its sizes if they are swapped, or set {} to a value in (0, 1]",
-                "restitution",
-            )
+            result = f"gives this block a restitution of {min(conserved):.3g}, because it is too stocky"
+            hint = "correct its sizes if they are swapped, or set {} to a value in (0, 1]"
+            raise BlockError(f"conservation of angular momentum {result}; {hint}", "restitution")
         return conserved[0], conserved[1]
     if hasattr(restitution, "maximum"):  # a Restitution, whose module imports this one
-        raise BlockError(
-            "{} of a Block must be a number or a pair; for a law, use RestrainedBlock(block, restitution=...)",
-            "restitution",
-        )
+        message = "{} of a Block must be a number or a pair; for a law, use RestrainedBlock(block, restitution=...)"
+        raise BlockError(message, "restitution")
     plus, minus = (check_parameter(value, "restitution") for value in check_pair(restitution, "restitution"))
     return plus, minus
 
@@ -314,7 +304,7 @@ def choose_restitutions(restitution: object, conserved: Sequence[float]) -> tupl
 _ROUNDING: Final = 1e-9
 
 
-def find_rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
+def compute_rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
     """Compute the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
 
     Returns the restitutions by angular momentum, NaN without such a body, and the height of the centre of mass divided
@@ -344,9 +334,8 @@ def _compare_sides(p: Floats, cosine: Floats) -> tuple[Floats, Floats]:
 
 def describe_missing_body(p: Floats, alpha: Floats) -> str:
     """Return the message that no rigid body has the p and alpha of two sides."""
-    difference, bound = (
-        100.0 * math.expm1(float(values[0])) for values in _compare_sides(p[None], np.cos(alpha)[None])
-    )
+    comparison = _compare_sides(p[None], np.cos(alpha)[None])
+    difference, bound = (100.0 * math.expm1(float(values[0])) for values in comparison)
     return (
         f"no rigid body has p = {p[0]:g} and {p[1]:g} rad/s on sides of alpha = {alpha[0]:g} and {alpha[1]:g} rad; its "
         f"p must differ by less than {bound:.2g} %, not by {difference:.2g} %; give p and alpha with more digits, or "

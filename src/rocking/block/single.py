@@ -9,19 +9,19 @@ from typing import Any, Final, Never
 
 import numpy as np
 
-from rocking.block.body import KINDS, SINGLE, Bodies, Body, Coordinate
+from rocking.block.body import BODIES_TYPES, SINGLE_BODY_TYPES, Bodies, Body, Coordinate
 from rocking.block.sides import (
     Side,
-    build_even_sides,
-    build_sides,
     check_gravity,
     check_length,
     check_mass,
     check_pair,
     check_parameter,
     choose_restitutions,
+    compute_rigid_bodies,
+    create_even_sides,
+    create_sides,
     describe_missing_body,
-    find_rigid_bodies,
     format_sides,
     housner_restitution,
     square_gyration,
@@ -58,7 +58,7 @@ class Rocking:
 
     def as_bodies(self) -> Bodies:
         """Return `Blocks` that contain only this block."""
-        return KINDS["blocks"].from_bodies([self])
+        return BODIES_TYPES["blocks"].from_bodies([self])
 
 
 @dataclass(frozen=True, repr=False)
@@ -143,17 +143,14 @@ class Block(Rocking):
         description = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
         s = checks.finite(offset, "offset", BlockError)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
-            raise BlockError(
-                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}; for a larger one, give the "
-                "pivots and the radius of gyration",
-                "offset",
-                value=offset,
-            )
+            message = f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}"
+            hint = "for a larger one, give the pivots and the radius of gyration"
+            raise BlockError(f"{message}; {hint}", "offset", value=offset)
         if s == 0.0:
             alpha = math.atan2(b, h)
-            sides = build_even_sides(g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha))
+            sides = create_even_sides(g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha))
         else:
-            sides = build_sides((b - s, b + s), h, square_gyration(b, h, s), g, restitution)
+            sides = create_sides((b - s, b + s), h, square_gyration(b, h, s), g, restitution)
             description += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
         self._fill(sides, g, description, mass, (b, h, s))
 
@@ -174,7 +171,7 @@ class Block(Rocking):
         self.__dict__.update(zip(("half_width", "half_height", "offset"), rectangle, strict=True))
         return self
 
-    def _build_rows(self) -> list[tuple[float, ...]]:
+    def _create_rows(self) -> list[tuple[float, ...]]:
         """Collect the parameters of both sides as stored in `Blocks`."""
         return [(side.p, side.alpha, side.restitution) for side in self.sides]
 
@@ -239,7 +236,7 @@ class Block(Rocking):
         if rates[0] == rates[1] and angles[0] == angles[1]:
             e = choose_restitutions(restitution, (housner_restitution(angles[0]),) * 2)
         else:
-            factors, depths = find_rigid_bodies(np.array([rates]), np.array([angles]))
+            factors, depths = compute_rigid_bodies(np.array([rates]), np.array([angles]))
             conserved, depth = factors[0].tolist(), g * float(depths[0])
             if restitution is None and math.isnan(conserved[0]):
                 raise BlockError(describe_missing_body(np.array(rates), np.array(angles)), "restitution")
@@ -247,11 +244,10 @@ class Block(Rocking):
             if depth > 0.0 and all(abs(e[i] - conserved[i]) <= _RESTITUTION_TOLERANCE for i in range(2)):
                 radii = [depth / math.cos(angle) for angle in angles]
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
-                description = (
-                    f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
-                )
-        sides = tuple(Side(rates[i], angles[i], e[i], radii[i]) for i in range(2))
-        return cls.__new__(cls)._fill((sides[0], sides[1]), g, description)
+                details = f"centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
+                description = f"body from its parameters, {details}"
+        plus, minus = map(Side, rates, angles, e, radii)
+        return cls.__new__(cls)._fill((plus, minus), g, description)
 
     @classmethod
     def from_pivots(
@@ -312,7 +308,7 @@ class Block(Rocking):
         h = check_length(height, "height")
         k = check_length(radius_of_gyration, "radius_of_gyration")
         g = check_gravity(gravity)
-        sides = build_sides((plus, minus), h, k * k, g, restitution)
+        sides = create_sides((plus, minus), h, k * k, g, restitution)
         pivots = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
         return cls.__new__(cls)._fill(sides, g, description or pivots, mass)
 
@@ -369,7 +365,7 @@ class Block(Rocking):
         numerator = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
         # The beam moves twice as far as the centres of the columns.
         arm = math.hypot(b, h) * (1.0 + 2.0 * gamma) / (1.0 + gamma)
-        sides = build_even_sides(g, radius, alpha, restitution, numerator / (1.0 + 3.0 * gamma), arm)
+        sides = create_even_sides(g, radius, alpha, restitution, numerator / (1.0 + 3.0 * gamma), arm)
         description = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
         return cls.__new__(cls)._fill(sides, g, description)
 
@@ -405,7 +401,7 @@ class Block(Rocking):
         """
         # A wall may be too stocky for the default of a block.
         block = cls(restitution=None if restitution is None else 1.0, **sizes)
-        return SINGLE["restrained"](block, *restraints, one_sided=True, lean=lean, restitution=restitution)
+        return SINGLE_BODY_TYPES["restrained"](block, *restraints, one_sided=True, lean=lean, restitution=restitution)
 
     @property
     def width(self) -> float | None:
@@ -445,12 +441,9 @@ class Block(Rocking):
     def _get_common(self, name: str) -> float:
         plus, minus = (getattr(side, name) for side in self.sides)
         if plus != minus:
-            raise UnequalSidesError(
-                f"{name} is {plus:g} on side + and {minus:g} on side - of this block: use block.sides[0].{name} and "
-                f"block.sides[1].{name}"
-            )
-        value: float = plus
-        return value
+            remedy = f"use block.sides[0].{name} and block.sides[1].{name}"
+            raise UnequalSidesError(f"{name} is {plus:g} on side + and {minus:g} on side - of this block: {remedy}")
+        return float(plus)
 
     @property
     def coordinate(self) -> Coordinate:
@@ -467,7 +460,7 @@ class Block(Rocking):
         motion: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],
         side: Integers,
-        stretch: Floats,
+        elongation: Floats,
     ) -> tuple[Floats, Floats]:
         """Return the ratio of the ground forces to the weight, horizontal and vertical (see `rocking.block.body`).
 
@@ -509,7 +502,5 @@ def _resolve_half_sizes(
         return check_length(halves[0], "half_width"), check_length(halves[1], "half_height")
     if is_given == [False, False, True, True]:
         return 0.5 * check_length(full[0], "width"), 0.5 * check_length(full[1], "height")
-    raise BlockError(
-        "a block requires either {} and {}, or {} and {} (the full sizes), all in m",
-        "half_width", "half_height", "width", "height",
-    )  # fmt: skip
+    message = "a block requires either {} and {}, or {} and {} (the full sizes), all in m"
+    raise BlockError(message, "half_width", "half_height", "width", "height")

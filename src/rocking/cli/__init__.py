@@ -44,11 +44,8 @@ for _module, _commands in {
     _lines = _read_help_lines(_module)
     for _command in _commands:
         app.command(f"rocking.cli.{_module}:{_command}", name=_command, help=_lines[_command])
-app.command(
-    "rocking.cli.study:study",
-    name="study",
-    help="Run many simulations in a study, which can be interrupted and resumed.",
-)
+_study_help = "Run many simulations in a study, which can be interrupted and resumed."
+app.command("rocking.cli.study:app", name="study", help=_study_help)
 
 
 def _print_version(*, verbose: bool = False) -> None:
@@ -69,14 +66,9 @@ def _print_version(*, verbose: bool = False) -> None:
         print(rocking.__version__)
         return
     versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy"))
-    rows = {
-        "rocking": rocking.__version__,
-        "Python": f"{platform.python_version()} on {platform.platform()}",
-        "packages": versions,
-        "compiled code": compiled.describe_mode(),
-    }
-    for name, value in rows.items():
-        print(f"{name:13}  {value}")
+    print(f"rocking        {rocking.__version__}")
+    print(f"Python         {platform.python_version()} on {platform.platform()}")
+    print(f"packages       {versions}\ncompiled code  {compiled.describe_mode()}")
 
 
 app.command(_print_version, name=["--version", "-V"], help="Display the version.")
@@ -102,10 +94,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     except Exception as error:
         if not _is_interrupt(error):
-            sentence = _format_error(error, words)
-            if not sentence:
+            message = _format_error(error, words)
+            if not message:
                 raise
-            print(f"rocking: {sentence}", file=sys.stderr)
+            print(f"rocking: {message}", file=sys.stderr)
             sys.exit(2)
     # Outside `except`: the traceback would keep alive iterators that own threads.
     print(INTERRUPTED, file=sys.stderr)
@@ -127,19 +119,15 @@ def _format_error(error: Exception, words: list[str]) -> str:
         return error.text(create_spelling(find_command(words))).rstrip(".")
     if isinstance(error, UnknownCommandError):
         unknown, commands = (error.unused_tokens or words)[0], [*filter(str.isalpha, find_command(words))]
-        hint = suggest(unknown, commands, f"there are {', '.join(commands)}")
-        return f"there is no command {unknown}; {hint}"
+        return f"there is no command {unknown}; {suggest(unknown, commands)}"
     if isinstance(error, MissingArgumentError) and (missing := error.argument) is not None:
+        name = missing.name.lstrip("-").upper() if _is_positional(missing) else missing.name
         is_given = any(word.partition("=")[0] in missing.names for word in words)
-        requirement = (
-            f"{missing.name} requires a value"
-            if is_given
-            else f"{_format_command(words)} requires {_format_argument(missing)}"
-        )
-        return f"{requirement}; see {_format_command(words)} --help"
+        message = f"{name} requires a value" if is_given else f"{_format_command(words)} requires {name}"
+        return f"{message}; see {_format_command(words)} --help"
     if isinstance(error, CycloptsError):
-        sentence = " ".join(str(error).split()).rstrip(".")
-        return sentence if sentence.endswith("?") else f"{sentence}; see {_format_command(words)} --help"
+        message = " ".join(str(error).split()).rstrip(".")
+        return message if message.endswith("?") else f"{message}; see {_format_command(words)} --help"
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         # File errors have their own sentence; this is printing to a full disk.
         _close_output()
@@ -189,10 +177,8 @@ def reject_unknown_options(values: Iterable[object], arguments: Sequence[str]) -
         if isinstance(value, str) and value.startswith("-") and value.lstrip("-")[:1].isalpha() and value in typed:
             option = value.partition("=")[0]
             # Short names are too alike to guess: a suggestion must not lead to another quantity.
-            candidates = [
-                name for name in _list_options(find_command(arguments)) if min(len(name), len(option)) > len("--pga")
-            ]
-            options_by_word = {name.lstrip("-"): name for name in candidates}
+            known = _list_options(find_command(arguments)) if len(option) > len("--pga") else ()
+            options_by_word = {name.lstrip("-"): name for name in known if len(name) > len("--pga")}
             # The cutoff allows a typo of one or two letters in six.
             hint = suggest(option.lstrip("-"), options_by_word, "see its --help", 0.8)
             raise OptionError(f"{_format_command(arguments)} has no option {option}; {hint}")
@@ -211,18 +197,8 @@ def _list_options(command: App) -> Iterable[str]:
     """List the options of a command without its positional arguments."""
     if command.default_command is None:
         return ()
-    arguments = command.assemble_argument_collection()
-    return [
-        name
-        for argument in arguments
-        if not _is_positional(argument)
-        for name in argument.names
-        if name.startswith("-")
-    ]
-
-
-def _format_argument(argument: Argument) -> str:
-    return argument.name.lstrip("-").upper() if _is_positional(argument) else argument.name
+    options = [argument for argument in command.assemble_argument_collection() if not _is_positional(argument)]
+    return [name for argument in options for name in argument.names if name.startswith("-")]
 
 
 def _is_positional(argument: Argument) -> bool:

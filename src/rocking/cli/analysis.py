@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -33,16 +34,17 @@ from rocking.cli.options import (
     parse_labels,
     read_ensemble_arguments,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.core.result import DatasetResult
 from rocking.errors import BlockError, OptionError
 from rocking.inputs.bodies import create_block, note_likely_mistakes
-from rocking.inputs.declared import SHAPES
+from rocking.inputs.declared import BLOCK_DESCRIPTIONS
 from rocking.inputs.quantities import read_angle, read_array, read_length, read_tilt
 
 #: Descriptions of a block for which the slenderness alone suffices.
-_SLENDER_SHAPES: Final = tuple(
-    shape._replace(needed=("alpha",), optional=("p",)) if "alpha" in shape.needed else shape for shape in SHAPES
+_SLENDER_DESCRIPTIONS: Final = tuple(
+    shape._replace(needed=("alpha",), optional=("p",)) if "alpha" in shape.needed else shape
+    for shape in BLOCK_DESCRIPTIONS
 )
 
 
@@ -86,9 +88,8 @@ def spectrum(
     if alpha is None and ensemble is None:
         raise OptionError("a spectrum requires {}, or the {} of a calibration", "alpha", "ensemble")
     if ensemble is not None and (alpha is not None or restitution is not None):
-        raise OptionError(
-            "the file of {} contains slendernesses and restitutions: omit {} and {}", "ensemble", "alpha", "restitution"
-        )
+        message = "the file of {} contains slendernesses and restitutions: omit {} and {}"
+        raise OptionError(message, "ensemble", "alpha", "restitution")
     with output.folder() as folder:
         axes: dict[str, Any] = {
             "p": None if p is None else read_array(p, "p"),
@@ -97,16 +98,14 @@ def spectrum(
         settings = model.arguments()
         if alpha is not None:
             restitutions = None if restitution is None else read_array(restitution, "restitution")
-            blocks = Blocks.grid(alpha=read_array(alpha, "alpha", read_tilt), restitution=restitutions, **axes)
-            axes = {}
+            alphas = read_array(alpha, "alpha", read_tilt)
+            settings["blocks"] = Blocks.grid(alpha=alphas, restitution=restitutions, **axes)
         elif ensemble is not None:
-            ensemble_arguments = read_ensemble_arguments(ensemble, model)
-            blocks = ensemble_arguments.pop("blocks")
-            settings |= ensemble_arguments
-        shares = read_array(fractiles, "fractiles").tolist()
+            settings |= axes | read_ensemble_arguments(ensemble, model)
+        settings["fractiles"] = read_array(fractiles, "fractiles").tolist()
         loaded = motion.read_all(names)
-        result = rocking_spectrum(blocks, [*loaded.motions.values()], **axes, fractiles=shares, **settings)
-        _deliver_with_records(result, "spectrum", loaded, folder=folder, as_json=output.as_json, against=against)
+        result = rocking_spectrum(motions=[*loaded.motions.values()], **settings)
+        _write_and_print(result, "spectrum", loaded, folder=folder, as_json=output.as_json, against=against)
 
 
 def map(
@@ -148,23 +147,15 @@ def map(
     rtol
         Width of the refined boundaries, relative to the amplitude.
     """
-    parameters: dict[str, Any] = {
-        "cycles": cycles,
-        "phase": None if phase is None else read_angle(phase, "phase"),
-        "gamma": gamma,
-        "kind": kind,
-    }
+    angle = None if phase is None else read_angle(phase, "phase")
+    options = {"cycles": cycles, "phase": angle, "gamma": gamma, "kind": kind}
+    parameters: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
     with output.folder() as folder:
-        result = overturning_map(
-            _create_slender_block(block),
-            pulse,
-            amplitudes=read_array(amplitudes, "amplitudes"),
-            frequencies=read_array(frequencies, "frequencies"),
-            model=model.model,
-            rtol=rtol,
-            **{name: value for name, value in parameters.items() if value is not None},
-        )
-        _deliver_with_records(result, "map", None, folder=folder, as_json=output.as_json)
+        slender_block = _create_slender_block(block)
+        texts = {"amplitudes": amplitudes, "frequencies": frequencies}
+        axes = {name: read_array(text, name) for name, text in texts.items()}
+        result = overturning_map(slender_block, pulse, **axes, model=model.model, rtol=rtol, **parameters)
+        _write_and_print(result, "map", None, folder=folder, as_json=output.as_json)
 
 
 def ida(
@@ -193,7 +184,7 @@ def ida(
         loaded = motion.read_all(names)
         motions = [*loaded.motions.values()]
         result = incremental_dynamic_analysis(body, motions, **measure.arguments(), model=model.model, rtol=rtol)
-        _deliver_with_records(result, "ida", loaded, folder=folder, as_json=output.as_json)
+        _write_and_print(result, "ida", loaded, folder=folder, as_json=output.as_json)
 
 
 def measures(
@@ -223,20 +214,15 @@ def measures(
         in one earthquake, as named in the files; or a label for each record, separated by commas. By default each
         record is a group.
     """
-    bodies = block.blocks(model)
+    settings = block.blocks(model)
     with output.folder() as folder:
         loaded = motion.read_all(names)
-        result = compare_measures(
-            motions=[*loaded.motions.values()],
-            periods=read_array(periods, "periods"),
-            damping=damping,
-            clusters=parse_labels(clusters),
-            **bodies,
-        )
-        _deliver_with_records(result, "measures", loaded, folder=folder, as_json=output.as_json)
+        settings |= {"periods": read_array(periods, "periods"), "clusters": parse_labels(clusters)}
+        result = compare_measures(motions=[*loaded.motions.values()], damping=damping, **settings)
+        _write_and_print(result, "measures", loaded, folder=folder, as_json=output.as_json)
 
 
-def _deliver_with_records(
+def _write_and_print(
     analysis: DatasetResult,
     stem: str,
     loaded: LoadedRecords | None,
@@ -245,22 +231,25 @@ def _deliver_with_records(
     as_json: bool,
     **figure: Any,
 ) -> None:
-    """Write and print an analysis, with the records of the motions."""
+    """Write an analysis into a folder, if any (figure, tables, dataset, result), and print it, with the records."""
     result = analysis.to_dict()
     if loaded is not None:
         result |= loaded.to_dict()
         analysis = replace(analysis, data=analysis.data.assign_coords(record=("motion", [*loaded.motions])))
-    deliver(analysis, stem, folder=folder, as_json=as_json, result=result, **figure)
+    if folder is not None:
+        write_tables(folder, analysis)
+        analysis.to_netcdf(folder / f"{stem}.nc")
+        write_results(folder, figures={stem: functools.partial(analysis.plot, **figure)}, result=result)
+    print_result(result, analysis.summary(), as_json=as_json)
 
 
 def _create_slender_block(options: BlockOptions) -> Block:
     """Return a block for which the slenderness alone suffices: p is then 1."""
     values = options.read_values()
     if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
-        raise BlockError(
-            "the restitution of two different sides depends on {} and {} of both; also set {}", "p", "alpha", "p"
-        )
-    block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_SHAPES)
+        message = "the restitution of two different sides depends on {} and {} of both; also set {}"
+        raise BlockError(message, "p", "alpha", "p")
+    block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_DESCRIPTIONS)
     note_likely_mistakes([block])
     return block
 

@@ -90,16 +90,12 @@ def calibrate(
     seed
         Seed of the random numbers. The same seed reproduces the result.
     """
-    ranges = {
-        "p": None if p is None else read_bounds(p, "p", read_number),
-        "alpha": None if alpha is None else read_bounds(alpha, "alpha", read_tilt),
-        "restitution": restitution
-        if restitution in (None, HOUSNER)
-        else read_bounds(restitution, "restitution", read_number),
-    }
+    texts = {"p": (p, read_number), "alpha": (alpha, read_tilt), "restitution": (restitution, read_number)}
+    arguments: dict[str, Any] = {"model": model} | ({} if two_sided is None else {"two_sided": two_sided})
+    for name, (text, quantity) in texts.items():
+        if text is not None:
+            arguments[name] = HOUSNER if text == HOUSNER else read_bounds(text, name, quantity)
     rotation = None if initial_rotation is None else read_tilt(initial_rotation, "initial_rotation")
-    settings: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
-    arguments = {name: value for name, value in settings.items() if value is not None}
     with output.folder() as folder:
         table = read_calibration(data, **file.metadata())
         conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
@@ -112,14 +108,10 @@ def calibrate(
         motions = _read_motions(records, file, "motion" if isinstance(table, MeasuredHistory) else "predict")
         if isinstance(table, MeasuredHistory):
             if len(motions) > 1:
-                raise OptionError(
-                    "a history requires a single motion of the base; use {}, or one {}", "motion", "pulse"
-                )
-            base_motion = next(iter(motions.values()), None)
-            arguments |= {"initial_rotation": rotation, "seed": seed}
-            result: Calibration | HistoryCalibration = calibrate_history(
-                table.times, table.rotation, base_motion, **arguments
-            )
+                message = "a history requires a single motion of the base; use {}, or one {}"
+                raise OptionError(message, "motion", "pulse")
+            arguments |= {"motion": next(iter(motions.values()), None), "initial_rotation": rotation, "seed": seed}
+            result: Calibration | HistoryCalibration = calibrate_history(table.times, table.rotation, **arguments)
             numbers, text = result.to_dict(), result.summary()
         else:
             # Invalid outcomes, and more folds than groups, are rejected before the computation.
@@ -190,9 +182,8 @@ def validate(
     """
     with output.folder() as folder:
         rows = read_tests(tests, **file.metadata())
-        validation = run_validation(
-            rows, **block.blocks(model), outlier_probability=outlier_probability, bins=bins, seed=seed
-        )
+        options: dict[str, Any] = {"outlier_probability": outlier_probability, "bins": bins, "seed": seed}
+        validation = run_validation(rows, **block.blocks(model), **options)
         result = validation.to_dict()
         if folder is not None:
             write_tables(folder, validation)

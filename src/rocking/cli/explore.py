@@ -61,8 +61,8 @@ def _open_study(folder: Path) -> StudyView:
     from rocking.studies.folder import contains_study
 
     if not contains_study(folder):
-        sentence = "this folder contains no study; pass one record, and drop the other files on the page"
-        raise OptionError(sentence, path=str(folder))
+        message = "this folder contains no study; pass one record, and drop the other files on the page"
+        raise OptionError(message, path=str(folder))
     return StudyView(folder)
 
 
@@ -72,9 +72,8 @@ def _describe_initial_motion(explorer: Explorer, motion: str) -> dict[str, str]:
     from rocking.records.formats.source import unreadable_file_error
 
     if is_pulse(motion):
-        create_pulse(motion)
-        return {"motion": motion}
-    if is_shipped(motion):
+        create_pulse(motion)  # raises for an invalid pulse
+    if is_pulse(motion) or is_shipped(motion):
         return {"motion": motion}
     file = Path(motion)
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -107,7 +107,9 @@ def fragility(
             "chattering": model.chattering != "certified", **block.supplied(),
             **motion.supplied("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
         }  # fmt: skip
-        _reject_options_beside_outcomes(conflicting)
+        for option in [option for option, value in conflicting.items() if value]:
+            message = "{} are observed, for their own block and motions: omit {}"
+            raise OptionError(message, "outcomes", option)
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", OptionError)
     curve = _read_hazard(hazard, site, years, measure.period)
@@ -120,7 +122,7 @@ def fragility(
         standing_limit = _find_standing_limit([*states])
     checks.fraction(confidence, "confidence", OptionError)
     with output.folder() as folder:
-        loaded = None
+        records: dict[str, Any] = {}
         if outcomes is not None:
             observed = read_observed(outcomes, measure.intensity_measure, **motion.metadata())
             _check_hazard(curve, observed["measure"])
@@ -128,17 +130,11 @@ def fragility(
         else:
             _check_hazard(curve, measure.intensity_measure)
             loaded = motion.read_all(names)
+            records, settings = loaded.to_dict(), measure.arguments() | model.arguments() | bodies
+            settings |= {"polarity": polarity, "clusters": parse_labels(clusters), "limit_states": states}
             with _save_outcomes_on_failure(folder):
-                fitted = fit_simulated(
-                    motions=list(loaded.motions.values()),
-                    **measure.arguments(),
-                    **model.arguments() | bodies,
-                    limit_states=states,
-                    polarity=polarity,
-                    clusters=parse_labels(clusters),
-                    confidence=confidence,
-                )
-        result, texts = fitted.to_dict() | ({} if loaded is None else loaded.to_dict()), [fitted.summary()]
+                fitted = fit_simulated(motions=[*loaded.motions.values()], **settings, confidence=confidence)
+        result, texts = fitted.to_dict() | records, [fitted.summary()]
         figures: dict[str, Callable[[], Figure]] = {"fragility": fitted.plot}
         if curve is not None:
             risk = fitted.annual_rate(curve)
@@ -158,12 +154,6 @@ def fragility(
         print_result(result, "\n\n".join(texts), as_json=output.as_json)
 
 
-def _reject_options_beside_outcomes(options: Mapping[str, object]) -> None:
-    for option in [option for option, value in options.items() if value]:
-        sentence = "{} are observed, for their own block and motions: omit {}"
-        raise OptionError(sentence, "outcomes", option)
-
-
 def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
     if curve is not None:
         check_measure(curve, measure)
@@ -172,8 +162,8 @@ def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
 def _find_standing_limit(names: list[str]) -> str:
     """Find the limit state that a standing block has not exceeded: overturning, or the only one."""
     if len(names) > 1 and "overturning" not in names:
-        sentence = f"{{}} requires overturning or a single limit state; got {' and '.join(names)}: choose one in {{}}"
-        raise OptionError(sentence, "standing", "limit_states", value=names)
+        message = f"{{}} requires overturning or a single limit state; got {' and '.join(names)}: choose one in {{}}"
+        raise OptionError(message, "standing", "limit_states", value=names)
     return "overturning" if "overturning" in names else names[0]
 
 

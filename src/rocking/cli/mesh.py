@@ -64,9 +64,8 @@ def mesh(
     """
     with output.folder() as folder:
         if restitution is not None and azimuth is None:
-            raise OptionError(
-                "{} applies only to blocks created by {}; add such a block, or omit it", "restitution", "azimuth"
-            )
+            message = "{} applies only to blocks created by {}; add such a block, or omit it"
+            raise OptionError(message, "restitution", "azimuth")
         solid = Solid.from_mesh(
             file,
             density=None if density is None else read_densities(density, "density"),
@@ -100,19 +99,16 @@ def _create_block_row(azimuth: float, block: Block) -> dict[str, float]:
     for sentence in block_notes(block):
         note(f"azimuth {azimuth:g}: {sentence}")
     plus, minus = block.sides
-    gyration_squared = block.gravity * plus.radius / plus.p**2 - plus.radius**2
-    return {
+    row = {
         "azimuth_deg": azimuth,
         "pivot_plus_m": plus.radius * math.sin(plus.alpha),
         "pivot_minus_m": minus.radius * math.sin(minus.alpha),
         "height_of_mass_m": plus.radius * math.cos(plus.alpha),
-        "gyration_m": math.sqrt(gyration_squared),
-        **{
-            f"{name}_{sign}{unit}": getattr(side, name)
-            for name, unit in (("p", "_rad_s"), ("alpha", "_rad"), ("restitution", ""))
-            for sign, side in (("plus", plus), ("minus", minus))
-        },
+        "gyration_m": math.sqrt(block.gravity * plus.radius / plus.p**2 - plus.radius**2),
     }
+    for name, unit in (("p", "_rad_s"), ("alpha", "_rad"), ("restitution", "")):
+        row |= {f"{name}_plus{unit}": getattr(plus, name), f"{name}_minus{unit}": getattr(minus, name)}
+    return row
 
 
 def _read_numbers(text: str, name: str) -> Sequence[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import math
 import re
@@ -15,7 +16,15 @@ from cyclopts import Group, Parameter, Token
 
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
-from rocking.errors import BlockError, MotionError, OptionError, RecordError, RockingError, escape_braces
+from rocking.errors import (
+    BlockError,
+    MotionError,
+    OptionError,
+    RecordError,
+    RockingError,
+    escape_braces,
+    join_placeholders,
+)
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes, vertical_notes
@@ -49,16 +58,6 @@ Names = Annotated[
         "standard input. A file's format is recognised by its content.",
     ),
 ]
-
-
-def describe_option(text: str) -> Parameter:
-    """Describe an option in the help."""
-    return Parameter(help=text)
-
-
-def describe_signed_option(text: str) -> Parameter:
-    """Describe a numeric option whose value may begin with a minus sign."""
-    return Parameter(help=text, allow_leading_hyphen=True)
 
 
 def _convert_integer(_: Any, tokens: Sequence[Token]) -> int:
@@ -126,11 +125,7 @@ class RestrainedOptions(BlockOptions):
     def body(self) -> Body:
         """Return the block, with its restraints if any."""
         texts, block = self.supplied(), bodies.create_block(self.read_values(*declared.BLOCK))
-        forces = [
-            _create_from_pairs(declared.FORCES[name], text, name)
-            for name in declared.FORCES
-            for text in texts.get(name, ())
-        ]
+        forces = [_create_from_pairs(declared.FORCES[k], text, k) for k in declared.FORCES for text in texts.get(k, ())]
         for name, couple in declared.COUPLES.items():
             if name in texts:
                 with _add_option_to_errors(name):
@@ -140,33 +135,28 @@ class RestrainedOptions(BlockOptions):
         except BlockError as error:
             if not forces or error.argument != "offset":
                 raise
-            raise BlockError(
-                escape_braces(str(error))
-            ) from error  # offset of a restraint, not the --offset of the block
+            raise BlockError(escape_braces(str(error))) from error  # of a restraint, not the --offset of the block
         bodies.note_likely_mistakes([block], [body])
         return body
+
+
+_ENSEMBLE_HELP: Final = "File ensemble.csv from rocking calibrate, instead of a block; includes weights and model."
 
 
 @dataclass(frozen=True)
 class EnsembleOptions(RestrainedOptions):
     """Block described by its sizes or parameters, or an ensemble from a calibration."""
 
-    ensemble: Annotated[
-        Path | None,
-        describe_option("File ensemble.csv from rocking calibrate, instead of a block; includes weights and model."),
-    ] = None
+    ensemble: Annotated[Path | None, Parameter(help=_ENSEMBLE_HELP)] = None
 
     def blocks(self, model: ModelOptions) -> dict[str, Any]:
         """Return blocks, weights and equation of motion as arguments."""
         if self.ensemble is None:
             return {"blocks": self.body(), "model": model.model}
-        if conflicting := self.block_options():
-            raise BlockError(f"{{}} replaces the block: omit {bodies.name_all(conflicting)}", "ensemble", *conflicting)
+        if conflicting := [name for name in self.supplied() if name != "ensemble"]:
+            message = f"{{}} replaces the block: omit {join_placeholders(conflicting)}"
+            raise BlockError(message, "ensemble", *conflicting)
         return read_ensemble_arguments(self.ensemble, model)
-
-    def block_options(self) -> list[str]:
-        """Return the supplied options of a block."""
-        return [name for name in self.supplied() if name != "ensemble"]
 
 
 def read_ensemble_arguments(file: Path, model: ModelOptions) -> dict[str, Any]:
@@ -189,15 +179,14 @@ def _add_option_to_errors(option: str) -> Iterator[None]:
 def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
     """Create an object from an option with NAME=VALUE pairs."""
     values: dict[str, Any] = {}
-    flags = {
-        name for name, parameter in inspect.signature(kind).parameters.items() if isinstance(parameter.default, bool)
-    }
+    parameters = inspect.signature(kind).parameters.values()
+    flags = {parameter.name for parameter in parameters if isinstance(parameter.default, bool)}
     for part in text.split(","):
         name, equals, value = (parameter.strip() for parameter in part.partition("="))
         name = name.replace("-", "_")
         if not equals or name in values:
-            sentence = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
-            raise OptionError(sentence + escape_braces(repr(text)), option, value=text)
+            message = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
+            raise OptionError(message + escape_braces(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
             raise OptionError(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
         values[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
@@ -206,21 +195,24 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
         return kind(**values)
 
 
-@_with_inputs("channel", "dt", "units")
+#: Options of `FileOptions`, by the names of arguments.
+_FILE_OPTIONS: Final = {name: write_option_name(name) for name in ("channel", "dt", "units")}
+
+
+@_with_inputs(*_FILE_OPTIONS)
 class FileOptions(InputOptions):
     """Metadata that a record file lacks."""
 
     def metadata(self) -> dict[str, Any]:
         """Return channel, step and units as arguments."""
-        return {"channel": None, "dt": None, "units": None} | self.read_values("channel", "dt", "units")
+        return dict.fromkeys(_FILE_OPTIONS) | self.read_values(*_FILE_OPTIONS)
 
     def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
         """Return the scaled motion of a record or pulse, with notes."""
         texts, vertical = self.supplied(), self.supplied().get("vertical")
         # Mistakes in the options are reported before a long file is read.
-        target = read_scaling(
-            {key: texts[key] for key in ("scale", "pga", "pgv", "sa") if key in texts}, read_positive_acceleration
-        )
+        scalings = {name: text for name, text in texts.items() if name in declared.SCALINGS}
+        target = read_scaling(scalings, read_positive_acceleration)
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
@@ -272,20 +264,12 @@ class LoadedRecords(NamedTuple):
         return {"records": create_record_columns([*self.motions], [*self.motions.values()]), "skipped": self.skipped}
 
 
-def describe_refusal(name: str, error: RockingError) -> str:
-    """Describe why a record cannot be read, for the command line."""
-    reason = error.text(
-        lambda argument: write_option_name(argument) if argument in ("channel", "dt", "units") else argument
-    )
-    return reason if error.path == name else f"{name}: {reason}"
-
-
 def read_records(
     names: Sequence[str], read: Callable[[str], Item], *, keep_going: bool
 ) -> tuple[dict[str, Item], dict[str, str]]:
     """Read records one by one; return the motions and, if reading continues after errors, the errors."""
     results: dict[str, Item] = {}
-    reasons: dict[str, str] = {}
+    messages: dict[str, str] = {}
     with Progress("reading records", total=len(names)) as progress:
         for name in names:
             try:
@@ -293,9 +277,10 @@ def read_records(
             except (RecordError, MotionError) as error:
                 if not keep_going:
                     raise
-                reasons[name] = describe_refusal(name, error)
+                message = error.text(lambda argument: _FILE_OPTIONS.get(argument, argument))
+                messages[name] = message if error.path == name else f"{name}: {message}"
             progress.advance()
-    return results, reasons
+    return results, messages
 
 
 @dataclass(frozen=True)
@@ -310,19 +295,16 @@ class _RecordOptions(FileOptions):
         """Return the motions by name."""
         records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
         if not records and not pulses:
-            raise OptionError(
-                "at least one record is required: file, folder, or name of a shipped record, or {}", "pulse"
-            )
+            message = "at least one record is required: file, folder, or name of a shipped record, or {}"
+            raise OptionError(message, "pulse")
         pulse_motions = self.pulses()
-        motions, skipped = read_records(
-            records, lambda name: self.motion(name, several=len(records) > 1), keep_going=self.keep_going
-        )
+        read = functools.partial(self.motion, several=len(records) > 1)
+        motions, skipped = read_records(records, read, keep_going=self.keep_going)
+        messages = [*skipped.values()]
         if records and not motions:
-            raise RecordError(
-                f"none of {len(records)} records could be read; the first: {next(iter(skipped.values()))}"
-            )
-        for reason in skipped.values():
-            note(f"skipped: {reason}")
+            raise RecordError(f"none of {len(records)} records could be read; the first: {messages[0]}")
+        for message in messages:
+            note(f"skipped: {message}")
         motions |= pulse_motions
         return LoadedRecords(motions, skipped, [*motions] == [*names, *pulses] and len(motions) == 1)
 
@@ -337,19 +319,22 @@ class MotionOptions(_RecordOptions):
     """Several records and pulses, scaled."""
 
 
+_MEASURE_HELP: Final = (
+    "Intensity: PGA, PGV, spectral acceleration, or PGA and p PGV divided by the uplift acceleration of the block."
+)
+_LEVELS_HELP: Final = (
+    "Levels to scale every motion to, as 0.1g,0.2g or 0.1g:1g:10 (velocities as 0.4 (m/s) or 40cm/s, ratios as plain "
+    "numbers); START:STOP:COUNT:log for equal ratios."
+)
+
+
 @dataclass(frozen=True)
 class IntensityOptions:
     """Intensity measure of motions."""
 
-    measure: Annotated[
-        IntensityName,
-        describe_option(
-            "Intensity: PGA, PGV, spectral acceleration, or PGA and p PGV divided by the uplift acceleration of the "
-            "block."
-        ),
-    ] = "pga"
-    period: Annotated[float | None, describe_option("Period of the spectral acceleration, s.")] = None
-    damping: Annotated[float, describe_option("Fraction of critical damping of the spectral acceleration.")] = 0.05
+    measure: Annotated[IntensityName, Parameter(help=_MEASURE_HELP)] = "pga"
+    period: Annotated[float | None, Parameter(help="Period of the spectral acceleration, s.")] = None
+    damping: Annotated[float, Parameter(help="Fraction of critical damping of the spectral acceleration.")] = 0.05
 
     @property
     def intensity_measure(self) -> Measure:
@@ -361,24 +346,14 @@ class IntensityOptions:
 class MeasureOptions(IntensityOptions):
     """Intensity measure of motions, and its levels."""
 
-    levels: Annotated[
-        str | None,
-        describe_signed_option(
-            "Levels to scale every motion to, as 0.1g,0.2g or 0.1g:1g:10 (velocities as 0.4 (m/s) or 40cm/s, ratios as "
-            "plain numbers); START:STOP:COUNT:log for equal ratios."
-        ),
-    ] = None
+    levels: Annotated[str | None, Parameter(help=_LEVELS_HELP, allow_leading_hyphen=True)] = None
 
     def arguments(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        readers: Mapping[str, Quantity] = {
-            "pga": read_positive_acceleration,
-            "sa": read_positive_acceleration,
-            "pgv": read_velocity,
-        }
-        levels = (
-            None if self.levels is None else read_array(self.levels, "levels", readers.get(self.measure, _read_ratio))
-        )
+        acceleration: Quantity = read_positive_acceleration
+        readers = {"pga": acceleration, "sa": acceleration, "pgv": read_velocity}
+        reader = readers.get(self.measure, _read_ratio)
+        levels = None if self.levels is None else read_array(self.levels, "levels", reader)
         return {"measure": self.intensity_measure, "levels": levels}
 
 
@@ -398,7 +373,7 @@ class ModelOptions:
 class SchemeOptions(ModelOptions):
     """Equation of motion and chattering scheme."""
 
-    chattering: Annotated[str, describe_option(INPUTS["chattering"].help)] = "certified"
+    chattering: Annotated[str, Parameter(help=INPUTS["chattering"].help)] = "certified"
 
     def arguments(self) -> dict[str, Any]:
         """Return model and scheme as arguments."""
@@ -422,9 +397,8 @@ def parse_labels(clusters: str | None) -> str | list[str] | None:
 def read_positive_acceleration(text: str, name: str) -> float:
     """Read a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
     if not read_acceleration(text, name) > 0.0:
-        raise OptionError(
-            f"{{}} must be positive; got {text.strip()}; use {{}} -1 to reverse a motion", name, "scale", value=text
-        )
+        message = f"{{}} must be positive; got {text.strip()}; use {{}} -1 to reverse a motion"
+        raise OptionError(message, name, "scale", value=text)
     return read_noted_acceleration(text, name)
 
 
@@ -433,8 +407,8 @@ def _read_ratio(text: str, name: str) -> float:
     try:
         return read_number(text, name)
     except OptionError:
-        sentence = "{} must be plain numbers with this {}, which is in units of the block; got "
-        raise OptionError(sentence + repr(text.strip()), name, "measure") from None
+        message = "{} must be plain numbers with this {}, which is in units of the block; got "
+        raise OptionError(message + repr(text.strip()), name, "measure") from None
 
 
 def parse_limit_states(text: str) -> dict[str, float]:
@@ -443,18 +417,14 @@ def parse_limit_states(text: str) -> dict[str, float]:
     for part in text.split(","):
         name, equals, value = part.strip().partition("=")
         if not equals and name != "overturning":
-            raise OptionError(
-                f"{{}} must be overturning or NAME=ROTATION divided by slenderness; got {part.strip()!r}",
-                "limit_states",
-                value=text,
-            )
+            message = f"{{}} must be overturning or NAME=ROTATION divided by slenderness; got {part.strip()!r}"
+            raise OptionError(message, "limit_states", value=text)
         if name in limits or (equals and name in ("", "overturning")):
-            fault = f"contains {name} twice" if name in limits else f"must not name a rotation {name!r}"
-            raise OptionError(f"{{}} {fault}; name each limit state once, as half=0.5", "limit_states")
+            message = f"contains {name} twice" if name in limits else f"must not name a rotation {name!r}"
+            raise OptionError(f"{{}} {message}; name each limit state once, as half=0.5", "limit_states")
         try:
             limits[name] = read_number(value, "limit_states") if equals else math.inf
         except OptionError:
-            raise OptionError(
-                f"{{}} {name} must be a number; got {value.strip()!r}", "limit_states", value=text
-            ) from None
+            message = f"{{}} {name} must be a number; got {value.strip()!r}"
+            raise OptionError(message, "limit_states", value=text) from None
     return limits

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -19,7 +18,7 @@ from rocking.errors import Message, OptionError, OutputError, escape_braces
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rocking.core.result import DatasetResult, Result
+    from rocking.core.result import Result
 
 
 OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))
@@ -47,7 +46,7 @@ class OutputOptions(PrintOptions):
 
     def folder(self) -> AbstractContextManager[Path | None]:
         """Create the folder, if any; on failure, remove it if empty."""
-        return nullcontext() if self.out is None else output_folder(self.out, listed=not self.as_json)
+        return nullcontext() if self.out is None else open_output_folder(self.out, listed=not self.as_json)
 
 
 def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
@@ -75,31 +74,13 @@ def skip_on_error(files: str, error_type: type[OptionError] = OptionError) -> It
         note(Message(f"{escape_braces(files)} left out: {error.message.template}", error.message.arguments))
 
 
-def deliver(
-    analysis: DatasetResult,
-    stem: str,
-    *,
-    folder: Path | None,
-    as_json: bool,
-    result: Mapping[str, Any] | None = None,
-    **figure: Any,
-) -> None:
-    """Write a result into a folder, if any (figure, tables, dataset, result), and print it."""
-    result = analysis.to_dict() if result is None else result
-    if folder is not None:
-        write_tables(folder, analysis)
-        analysis.to_netcdf(folder / f"{stem}.nc")
-        write_results(folder, figures={stem: functools.partial(analysis.plot, **figure)}, result=result)
-    print_result(result, analysis.summary(), as_json=as_json)
-
-
 def print_result(result: Mapping[str, Any], text: str, *, as_json: bool) -> None:
     """Print a result as JSON or as text."""
     print(to_json(result) if as_json else text)
 
 
 @contextmanager
-def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
+def open_output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
     """Create a folder for results and report the written files; on failure, remove new empty folders.
 
     Replaced files are noted. If `listed`, the written files are printed.
@@ -116,8 +97,8 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
             folder.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=folder).close()  # checks that the folder is writable
         except OSError as error:
-            sentence = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
-            raise OutputError(sentence, "out", path=str(folder)) from error
+            message = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
+            raise OutputError(message, "out", path=str(folder)) from error
         yield folder
         new_times = _read_modification_times(folder)
         written = [name for name, time in new_times.items() if old_times.get(name) != time]
@@ -132,7 +113,7 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
         raise
 
 
-def subfolder(folder: Path, name: str) -> Path:
+def create_subfolder(folder: Path, name: str) -> Path:
     """Create a folder in the folder of the results, unless it exists."""
     try:
         (folder / name).mkdir(exist_ok=True)

@@ -29,9 +29,9 @@ from rocking.cli.output import (
     OUTPUT,
     OutputOptions,
     PrintOptions,
+    create_subfolder,
     print_result,
     skip_on_error,
-    subfolder,
     write_results,
 )
 from rocking.core.progress import note
@@ -50,7 +50,7 @@ from rocking.records.named import (
 )
 from rocking.response import Response
 from rocking.response.mechanics import check_friction
-from rocking.response.perturbed import PRECISION, choose_steps
+from rocking.response.perturbed import MOTION_PRECISION, choose_steps
 from rocking.rules import compare_rules
 from rocking.simulation.simulate import simulate as run_simulation
 
@@ -64,7 +64,7 @@ class _ResponseOptions(StartOptions):
     ] = None
     precision: Annotated[
         float, Parameter(help="Relative precision of the record; 11 motions within it are also simulated.")
-    ] = PRECISION
+    ] = MOTION_PRECISION
 
 
 def simulate(
@@ -105,10 +105,8 @@ def simulate(
         if loaded.is_single:
             ((record, base_motion),) = loaded.motions.items()
             response = run_simulation(body, base_motion, **options)
-            result, text = (
-                _write_response(response, record, summary_options, folder, energy),
-                response.summary(**summary_options),
-            )
+            result = _write_response(response, record, summary_options, folder, energy)
+            text = response.summary(**summary_options)
         else:
             if energy and not each:
                 raise OptionError("{} draws single responses; with several records also use {}", "energy", "each")
@@ -118,10 +116,9 @@ def simulate(
                 results.to_json(folder / "summary.json")
                 with skip_on_error("summary.xlsx"):
                     results.to_excel(folder / "summary.xlsx")
-            if folder is not None and each:
-                folders = create_folder_names(results.records)
-                for name, record, response in zip(folders, results.records, results.responses, strict=True):
-                    _write_response(response, record, summary_options, subfolder(folder, name), energy)
+                folders = create_folder_names(results.records) if each else []
+                for name, record, response in zip(folders, results.records, results.responses, strict=False):
+                    _write_response(response, record, summary_options, create_subfolder(folder, name), energy)
             result, text = results.to_dict(), results.summary()
         print_result(result, text, as_json=output.as_json)
 
@@ -167,9 +164,8 @@ def check(
     rule_names = None if rules is None else [name.strip() for name in rules.split(",")]
     with output.folder() as folder:
         loaded = motion.read_all(names)
-        comparison = replace(
-            compare_rules(body, loaded.motions, rules=rule_names, model=model.model), skipped=loaded.skipped
-        )
+        comparison = compare_rules(body, loaded.motions, rules=rule_names, model=model.model)
+        comparison = replace(comparison, skipped=loaded.skipped)
         result = comparison.to_dict()
         if folder is not None:
             comparison.to_csv(folder / "check.csv")
@@ -188,18 +184,17 @@ def records(
     """
     files = expand_record_names(names)
     several = len(files) > 1
-    loaded, reasons = read_records(files, lambda name: _read_contents(name, file, several=several), keep_going=several)
+    loaded, messages = read_records(files, lambda name: _read_contents(name, file, several=several), keep_going=several)
     listings = [*loaded.values()] if files else [shipped()]
     if output.as_json:
-        entries = [listing.to_dict() for listing in listings] + [
-            {"file": name, "error": reasons[name]} for name in reasons
-        ]
+        entries = [listing.to_dict() for listing in listings]
+        entries += [{"file": name, "error": message} for name, message in messages.items()]
         print(to_json(entries[0] if len(entries) == 1 else {"files": entries}))
     else:
-        print("\n\n".join([listing.summary() for listing in listings] + [*reasons.values()]))
-    if reasons:
-        unreadable = ", ".join([*reasons][:5]) + (f" and {len(reasons) - 5} more" if len(reasons) > 5 else "")
-        raise RecordError(f"{len(reasons)} of {len(files)} files cannot be read: {unreadable}")
+        print("\n\n".join([listing.summary() for listing in listings] + [*messages.values()]))
+    if messages:
+        unreadable = ", ".join([*messages][:5]) + (f" and {len(messages) - 5} more" if len(messages) > 5 else "")
+        raise RecordError(f"{len(messages)} of {len(files)} files cannot be read: {unreadable}")
 
 
 def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:
@@ -219,22 +214,15 @@ def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
     """List the pulses that --pulse accepts, with their parameters and defaults."""
     families = FAMILIES.values()
     if output.as_json:
-        units = [{name: family.unit(name) for name in (*family.needed, *family.optional)} for family in families]
         entries = [{"name": family.name, "needs": family.needed, "takes": family.optional} for family in families]
-        print(
-            to_json(
-                {"pulses": [family | {"units": unit_names} for family, unit_names in zip(entries, units, strict=True)]}
-            )
-        )
+        for entry, family in zip(entries, families, strict=True):
+            entry["units"] = {name: family.unit(name) for name in (*family.needed, *family.optional)}
+        print(to_json({"pulses": entries}))
         return
-    rows = [
-        (
-            family.name,
-            _format_parameters(family, dict.fromkeys(family.needed)),
-            _format_parameters(family, family.optional),
-        )
-        for family in families
-    ]
+    rows = []
+    for family in families:
+        needed = _format_parameters(family, dict.fromkeys(family.needed))
+        rows.append((family.name, needed, _format_parameters(family, family.optional)))
     print(format_table(["pulse", "needs", "takes"], rows))
     print("\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:")
     print("rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1")
@@ -242,9 +230,9 @@ def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
 
 def _format_parameters(family: PulseFamily, parameters: Mapping[str, Any]) -> str:
     """Format the parameters of a pulse with units and defaults."""
-    units = {name: f" ({family.unit(name)})" if family.unit(name) else "" for name in parameters}
-    defaults = {
-        name: "" if value is None else f" = {value:g}" if isinstance(value, float) else f" = {value}"
-        for name, value in parameters.items()
-    }
-    return ", ".join(name + units[name] + defaults[name] for name in parameters)
+    texts = []
+    for name, default in parameters.items():
+        unit_text = f" ({family.unit(name)})" if family.unit(name) else ""
+        default_text = "" if default is None else f" = {default:g}" if isinstance(default, float) else f" = {default}"
+        texts.append(name + unit_text + default_text)
+    return ", ".join(texts)

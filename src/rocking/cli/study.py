@@ -15,7 +15,7 @@ from rocking.cli.output import (
     OUTPUT,
     PrintOptions,
     QuietOptions,
-    output_folder,
+    open_output_folder,
     print_result,
     skip_on_error,
     write_results,
@@ -31,7 +31,7 @@ from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.results import StudyOutcome, check_fractiles
 from rocking.studies.study import Study, open_or_create
 
-study = App(name="study")
+app = App(name="study")
 
 #: Maximum number of failed units that are named.
 _MAX_REPORTED: Final = 5
@@ -40,7 +40,7 @@ _MAX_REPORTED: Final = 5
 WRITERS: Final = {".nc": Study.to_netcdf, ".csv": Study.to_csv, ".parquet": Study.to_parquet}
 
 
-@study.command
+@app.command
 def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT] = QuietOptions()) -> None:
     """Write a commented template of a study file.
 
@@ -55,7 +55,7 @@ def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT] = QuietOptions())
     print(f"written to {file}; edit it, then: rocking study run {file}")
 
 
-@study.command
+@app.command
 def create(
     file: Path,
     folder: str,
@@ -78,7 +78,7 @@ def create(
     print(f"{folder}: {_create_study(file, folder, unit_blocks).status}; next: rocking study run {folder}")
 
 
-@study.command
+@app.command
 def run(
     folder: str,
     into: str | None = None,
@@ -103,19 +103,19 @@ def run(
     if into is not None and not folder.endswith(".toml"):
         raise OptionError(f"{into} is only allowed with a TOML file, which {folder} is not; pass one folder only")
     is_file = folder.endswith(".toml")
-    opened = _create_study(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
+    study = _create_study(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
     with set_options(threads=threads):
-        report = opened.run(part=part)
-    print(f"{report}\n{opened.folder}: {opened.status}")
-    for unit, reason in [*report.failed.items()][:_MAX_REPORTED]:
-        note(f"{unit} failed: {reason}")
+        report = study.run(part=part)
+    print(f"{report}\n{study.folder}: {study.status}")
+    for unit, message in [*report.failed.items()][:_MAX_REPORTED]:
+        note(f"{unit} failed: {message}")
     if report.failed:
         raise StudyError(f"{format_count(len(report.failed), 'unit')} failed; run the study again to repeat them")
     if report.stopped:
         sys.exit(128 + signal.SIGTERM)
 
 
-@study.command
+@app.command
 def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
     """Show the progress of a study, also while it runs.
 
@@ -128,7 +128,7 @@ def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOption
     print_result({"folder": folder, **asdict(state)}, f"{folder}: {state}", as_json=output.as_json)
 
 
-@study.command
+@app.command
 def verify(
     folder: str,
     *,
@@ -147,17 +147,17 @@ def verify(
     repair
         Recompute damaged units and store them.
     """
-    opened = Study(folder)
-    faults = opened.verify(recompute, repair=repair)
+    study = Study(folder)
+    faults = study.verify(recompute, repair=repair)
     for fault in faults:
         print(fault)
     if faults and not repair:
         raise StudyError(f"{format_count(len(faults), 'fault')} found; {{}} computes damaged units again", "repair")
-    status, repaired = opened.status, f"; {format_count(len(faults), 'fault')} repaired" if faults else ""
+    status, repaired = study.status, f"; {format_count(len(faults), 'fault')} repaired" if faults else ""
     print(f"{status.done} of {format_count(status.units, 'unit')} done and sound{repaired}")
 
 
-@study.command
+@app.command
 def export(
     folder: str,
     file: Path,
@@ -178,16 +178,13 @@ def export(
         Write the scales between which this outcome of a block changes instead.
     """
     if file.suffix not in WRITERS:
-        raise OptionError(
-            f"the name of an exported file must end with one of {', '.join(WRITERS)}; got {file.name}",
-            "file",
-            value=file,
-        )
+        message = f"the name of an exported file must end with one of {', '.join(WRITERS)}; got {file.name}"
+        raise OptionError(message, "file", value=file)
     WRITERS[file.suffix](Study(folder), file, critical=critical)
     print(f"written to {file}")
 
 
-@study.command
+@app.command
 def report(
     folder: str,
     out: Path | None = None,
@@ -219,12 +216,12 @@ def report(
     intensity_measure, limits = measure.intensity_measure, parse_limit_states(limit_states)
     fractions = check_fractiles(read_array(fractiles, "fractiles").tolist())
     checks.fraction(confidence, "confidence", OptionError)
-    opened, results = Study(folder), dict[str, Result]()
-    fit = opened.fragility if together else opened.block_fragilities
-    with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
+    study, results = Study(folder), dict[str, Result]()
+    fit = study.fragility if together else study.block_fragilities
+    with open_output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
         with skip_on_error("fragility", FitError):
             results["fragility"] = fit(measure=intensity_measure, limit_states=limits, confidence=confidence)
-        results["spectrum"] = opened.spectrum(fractions.tolist())
+        results["spectrum"] = study.spectrum(fractions.tolist())
         for name, analysis in results.items():
             analysis.to_csv(target / f"{name}.csv")
         result = {name: analysis.to_dict() for name, analysis in results.items()}

@@ -23,18 +23,18 @@ def bisect(
     return low, high
 
 
-def find_middles(low: Floats, high: Floats) -> Floats:
-    """Return the midpoints of brackets."""
+def compute_midpoints(low: Floats, high: Floats) -> Floats:
+    """Compute the midpoints of brackets."""
     return 0.5 * (low + high)
 
 
 def is_wide(low: Floats, high: Floats, tolerance: Floats | float) -> Flags:
     """Return which brackets are wider than this fraction of their upper end and contain a number between their ends."""
-    midpoints = find_middles(low, high)
+    midpoints = compute_midpoints(low, high)
     return np.asarray((high - low > tolerance * high) & (midpoints > low) & (midpoints < high))
 
 
 def halve(low: Floats, high: Floats, in_upper: Flags, in_lower: Flags) -> tuple[Floats, Floats]:
     """Return brackets cut at their middle, on the side that contains the change if known."""
-    midpoints = find_middles(low, high)
+    midpoints = compute_midpoints(low, high)
     return np.where(in_upper, midpoints, low), np.where(in_lower, midpoints, high)

@@ -6,9 +6,10 @@ although ``float`` accepts them, because a text such as "0.2" is usually a mista
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
@@ -33,55 +34,33 @@ class Error(Protocol):
 
 def real(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one real number (possibly not finite)."""
-    result = _convert_real(value)
-    if result is None:
-        raise error(f"{{}} must be a number, not {short_repr(value)}", name, value=value)
-    return result
+    return _check_number(value, name, error, "a number", lambda _: True)
 
 
 def finite(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one finite number."""
-    result = _convert_real(value)
-    if result is None or not math.isfinite(result):
-        raise error(f"{{}} must be a finite number, not {short_repr(value)}", name, value=value)
-    return result
+    return _check_number(value, name, error, "a finite number", math.isfinite)
 
 
 def positive(
     value: object, name: str, error: Error, unit: str = "", limits: tuple[float, float] = (0.0, math.inf)
 ) -> float:
     """Return `value` as a float, or raise `error` unless it is one positive finite number within its limits."""
-    result = _convert_real(value)
-    if result is None or not (math.isfinite(result) and result > 0.0):
-        raise error(f"{{}} must be a positive number{_format_unit(unit)}, not {short_repr(value)}", name, value=value)
-    low, high = limits
-    if not low <= result <= high:
-        raise error(
-            f"{{}} must be a number from {low:g} to {high:g}{_format_unit(unit)}, not {short_repr(result)}",
-            name,
-            value=result,
-        )
-    return result
+    requirement = f"a positive number{_format_unit(unit)}"
+    number = _check_number(value, name, error, requirement, lambda number: 0.0 < number < math.inf)
+    return between(number, name, error, *limits, unit)
 
 
 def between(value: object, name: str, error: Error, low: float, high: float, unit: str = "") -> float:
     """Return `value` as a float, or raise `error` unless it is a number from `low` to `high` inclusive."""
-    result = _convert_real(value)
-    if result is None or not low <= result <= high:
-        raise error(
-            f"{{}} must be a number from {low:g} to {high:g}{_format_unit(unit)}, not {short_repr(value)}",
-            name,
-            value=value,
-        )
-    return result
+    requirement = f"a number from {low:g} to {high:g}{_format_unit(unit)}"
+    return _check_number(value, name, error, requirement, lambda number: low <= number <= high)
 
 
 def fraction(value: object, name: str, error: Error, below: float = 1.0) -> float:
     """Return `value` as a float, or raise `error` unless it is a number above 0 and below `below`."""
-    result = _convert_real(value)
-    if result is None or not 0.0 < result < below:
-        raise error(f"{{}} must be a number between 0 and {below:g}, not {short_repr(value)}", name, value=value)
-    return result
+    requirement = f"a number between 0 and {below:g}"
+    return _check_number(value, name, error, requirement, lambda number: 0.0 < number < below)
 
 
 def boolean(value: object, name: str, error: Error) -> bool:
@@ -136,9 +115,8 @@ def choice(value: object, name: str, error: Error, choices: Sequence[str]) -> st
 def mapping(value: object, name: str, error: Error, example: str) -> Mapping[Any, Any]:
     """Return `value`, or raise `error` unless it is a nonempty mapping."""
     if not isinstance(value, Mapping) or not value:
-        raise error(
-            f"{{}} must be a mapping with at least one entry, as {example}, not {short_repr(value)}", name, value=value
-        )
+        requirement = f"a mapping with at least one entry, as {example}"
+        raise error(f"{{}} must be {requirement}, not {short_repr(value)}", name, value=value)
     return value
 
 
@@ -150,7 +128,7 @@ def items(value: object, name: str, error: Error) -> list[Any]:
 
 
 def grid_size(sizes: Mapping[str, int], error: Error, max_points: int = 10_000_000) -> None:
-    """Raise `error` if the product of the sizes of a grid's axes, by name, exceeds `most`."""
+    """Raise `error` if the product of the sizes of a grid's axes, by name, exceeds `max_points`."""
     points = math.prod(sizes.values())
     if points > max_points:
         axes = " x ".join(f"{size} {name}" for name, size in sizes.items())
@@ -161,25 +139,19 @@ def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return real numbers (possibly not finite) as an array of the same shape, or raise `error`."""
     if np.ma.is_masked(values):
         raise error("{} must not contain masked values", name, value=values)
-    try:
+    with contextlib.suppress(TypeError, ValueError):
         array = np.asarray(values)
         if array.dtype.kind == "O":
             array = np.reshape([real(value, name, error) for value in array.ravel()], array.shape)
-    except (TypeError, ValueError):
-        raise error(
-            f"{{}} must be a number or an array of numbers, not {short_repr(values)}", name, value=values
-        ) from None
-    if array.dtype.kind not in "iuf" and array.size:
-        raise error(f"{{}} must be a number or an array of numbers, not {short_repr(values)}", name, value=values)
-    return np.asarray(array, dtype=np.float64)
+        if array.dtype.kind in "iuf" or not array.size:
+            return np.asarray(array, dtype=np.float64)
+    raise error(f"{{}} must be a number or an array of numbers, not {short_repr(values)}", name, value=values)
 
 
 def booleans_or_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return real numbers, or truth values as 1 and 0, like `numbers`."""
-    if np.ma.is_masked(values):
-        raise error("{} must not contain masked values", name, value=values)
-    array = np.asarray(values)
-    return array.astype(np.float64) if array.dtype.kind == "b" else numbers(values, name, error)
+    is_boolean = np.asarray(values).dtype.kind == "b"
+    return numbers(np.multiply(values, 1.0) if is_boolean else values, name, error)
 
 
 def positive_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
@@ -212,25 +184,17 @@ def short_repr(value: object) -> str:
     return escape_braces(text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH - 10]}...{text[-7:]}")
 
 
-def find_similar(name: str, known: Iterable[str], similarity: float = 0.6) -> str | None:
-    """Return the known name that shares at least this fraction of its letters with `name`, or None."""
+def suggest(name: str, known: Collection[str], default: str | None = None, similarity: float = 0.6) -> str:
+    """Return the end of a message about an unknown name: a similar known name, or a default, or all known names."""
     matches = difflib.get_close_matches(name, [*known], n=1, cutoff=similarity)
-    return matches[0] if matches else None
-
-
-def suggest(name: str, known: Iterable[str], default: str = "", similarity: float = 0.6) -> str:
-    """Return the end of a message about an unknown name: a similar known name, or another hint."""
-    similar = find_similar(name, known, similarity)
-    if similar is None:
-        return default
-    return f"did you mean {known[similar] if isinstance(known, Mapping) else similar}?"
+    if not matches:
+        return f"there are {', '.join(known)}" if default is None else default
+    return f"did you mean {known[matches[0]] if isinstance(known, Mapping) else matches[0]}?"
 
 
 def hint_at_degrees(angle: float) -> str:
     """Return a hint for a message if a rejected angle, rad, is plausible in degrees, else an empty text."""
-    if not 0.5 * math.pi <= abs(angle) < 90.0:
-        return ""
-    return f"; if it is in degrees, give math.radians({angle:g})"
+    return f"; if it is in degrees, give math.radians({angle:g})" if 0.5 * math.pi <= abs(angle) < 90.0 else ""
 
 
 def hint_at_percent(factor: float) -> str:
@@ -238,15 +202,17 @@ def hint_at_percent(factor: float) -> str:
     return f"; if it is in per cent, give {factor / 100.0:g}" if 2.0 < factor <= 100.0 else ""
 
 
-def _convert_real(value: object) -> float | None:
-    """Return a float (infinite if too large), or None for anything but one real number."""
+def _check_number(value: object, name: str, error: Error, requirement: str, is_valid: Callable[[float], bool]) -> float:
+    """Return one real number (infinite if too large for a float), or raise `error` with what it must be."""
     item = _unwrap(value)
-    if not isinstance(item, Real) or isinstance(item, bool):
-        return None
-    try:
-        return float(item)
-    except OverflowError:
-        return math.inf
+    if isinstance(item, Real) and not isinstance(item, bool):
+        try:
+            number = float(item)
+        except OverflowError:
+            number = math.inf
+        if is_valid(number):
+            return number
+    raise error(f"{{}} must be {requirement}, not {short_repr(value)}", name, value=value)
 
 
 def _unwrap(value: object) -> Any:

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from rocking.core.threads import progress_option, set_options
-from rocking.errors import Message, OutsideFitWarning, Spelling, spell_argument
+from rocking.errors import Message, OutsideFitWarning, Spelling
 
 if TYPE_CHECKING:
     import rich.progress
@@ -30,7 +30,7 @@ class _Listener:
     """Audience of notes, spelling of argument names for it, and notes already shown."""
 
     audience: Audience = "terminal"
-    spelling: Spelling = spell_argument
+    spelling: Spelling = str
     seen: set[Message] | None = None
 
 
@@ -55,7 +55,7 @@ def note(message: Message | str) -> None:
 
 
 @contextlib.contextmanager
-def notes_for(audience: Audience, spelling: Spelling = spell_argument) -> Iterator[None]:
+def notes_for(audience: Audience, spelling: Spelling = str) -> Iterator[None]:
     """Set audience of notes and spelling of arguments while a command runs, and show each note once."""
     global _listener
 

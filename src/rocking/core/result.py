@@ -55,7 +55,7 @@ class Row(NamedTuple):
     See Also
     --------
     rocking.Response.summary_rows : Return the lines of a summary as rows.
-    rocking.Response.facts : Return the entries of a dictionary as rows.
+    rocking.Response.result_rows : Return the entries of a dictionary as rows.
 
     Examples
     --------
@@ -238,11 +238,8 @@ class DatasetResult(Result):
             If a dimension or label does not exist, or the result contains numbers aggregated over that dimension.
         """
         for name in labels.keys() & {*self.POOLED}:
-            raise OptionError(
-                f"this result contains numbers aggregated over {name}; repeat the analysis for a part, or select from "
-                "`data`",
-                value=labels,
-            )
+            message = f"this result contains numbers aggregated over {name}; repeat the analysis for a part, or select"
+            raise OptionError(f"{message} from `data`", value=labels)
         selection = {name: np.atleast_1d(values) for name, values in labels.items()}
         data = self.data
         try:
@@ -252,9 +249,8 @@ class DatasetResult(Result):
                 data = data.sel({name: coordinate}, method="nearest" if numeric else None)
         except (KeyError, TypeError, ValueError, IndexError):
             names = ", ".join(map(str, data.sizes))
-            raise OptionError(
-                f"no values match {checks.short_repr(labels)}; the dimensions are {names}", value=labels
-            ) from None
+            message = f"no values match {checks.short_repr(labels)}; the dimensions are {names}"
+            raise OptionError(message, value=labels) from None
         return type(self)(self._restrict(data))
 
     @staticmethod

@@ -122,9 +122,8 @@ def format_digits(
         digits = int(max(2, math.floor(math.log10(abs(number))) - last_digit + 1))
         return f"{float(f'{number:.{digits - 1}e}'):.{max(digits, 6)}g}"
 
-    return format_within(
-        value, bounds, text
-    ), f"{format_within(low, bounds, text)} to {format_within(high, bounds, text)}"
+    value_text, low_text, high_text = (format_within(number, bounds, text) for number in (value, low, high))
+    return value_text, f"{low_text} to {high_text}"
 
 
 def format_range(values: Floats) -> str:
@@ -253,9 +252,8 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
             return
         target = destination.resolve()  # a link remains, and its target is replaced
         if not target.parent.is_dir():
-            raise OutputError(
-                f"cannot be written: there is no folder {target.parent}; create it, or choose another", path=str(path)
-            )
+            message = f"cannot be written: there is no folder {target.parent}; create it, or choose another"
+            raise OutputError(message, path=str(path))
         temporary = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:_SUFFIX_LENGTH]}.part{target.suffix}")
         try:
             yield temporary
@@ -268,9 +266,8 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
-        raise OutputError(
-            f"cannot be written: {reason}; no partial file remains; choose another location", path=str(path)
-        ) from error
+        message = f"cannot be written: {reason}; no partial file remains; choose another location"
+        raise OutputError(message, path=str(path)) from error
 
 
 def write_text(path: str | Path, text: str) -> None:

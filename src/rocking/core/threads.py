@@ -67,14 +67,12 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
     """
 
     def __init__(self, *, threads: int | None = None, progress: bool | None = None) -> None:
-        before = _options.get(_DEFAULT)
+        options = _options.get(_DEFAULT)
         if threads is not None:
-            threads = checks.integer(threads, "threads", OptionError, minimum=1)
+            options = options._replace(threads=checks.integer(threads, "threads", OptionError, minimum=1))
         if progress is not None:
-            progress = checks.boolean(progress, "progress", OptionError)
-        self._token = _options.set(
-            _Options(before.threads if threads is None else threads, before.progress if progress is None else progress)
-        )
+            options = options._replace(progress=checks.boolean(progress, "progress", OptionError))
+        self._token = _options.set(options)
 
     def __enter__(self) -> None:
         return

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import rocking.response
-from rocking.block.body import KINDS, Coordinate
+from rocking.block.body import BODIES_TYPES, Coordinate
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
@@ -398,7 +398,7 @@ class _BodyFactory(NamedTuple):
         return LinearBodies([*bodies])
 
 
-KINDS.update({cls.kind: _BodyFactory(cls) for cls in (BouncingBall, ImpactOscillator, InvertedPendulum)})
+BODIES_TYPES.update({cls.kind: _BodyFactory(cls) for cls in (BouncingBall, ImpactOscillator, InvertedPendulum)})
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,7 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from rocking.block import Block
-from rocking.block.body import KINDS, Bodies, Body
+from rocking.block.body import BODIES_TYPES, Bodies, Body
 from rocking.block.single import require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
@@ -86,7 +86,7 @@ def gather_bodies(blocks: Bodies | Body | Iterable[Body]) -> Bodies:
     ]
     if len(bodies) == 1:
         return bodies[0].as_bodies()
-    return KINDS[bodies[0].as_bodies().kind if bodies else "blocks"].from_bodies(bodies)
+    return BODIES_TYPES[bodies[0].as_bodies().kind if bodies else "blocks"].from_bodies(bodies)
 
 
 def compute_slenderness(bodies: Bodies) -> Floats:

@@ -29,7 +29,7 @@ from rocking.explorer.simulated import (
     widen_empty_window,
 )
 from rocking.explorer.uploads import RecentCache, UploadStore
-from rocking.response.figure import find_active_span
+from rocking.response.figure import compute_active_span
 
 #: Number of stored responses, and maximum size of their steps and motions, some hundreds of MB.
 _MAX_RESPONSES: Final = 48
@@ -101,7 +101,7 @@ class Explorer:
         """Return all words on a case, and its arrays in a window (s; by default the time of its motion)."""
         simulated = self.simulate(texts)
         response = simulated.response
-        start, end = choose_window(window, response.duration, find_active_span(response))
+        start, end = choose_window(window, response.duration, compute_active_span(response))
         header = {**describe_case(simulated), "window": describe_window(simulated, start, end)}
         profile = {} if simulated.outline is None else {"profile": simulated.outline.ravel()}
         return Payload(header, {**sample_window(simulated, start, end), **sample_events(response), **profile})
@@ -127,7 +127,7 @@ class Explorer:
             "second": self.simulate(changed if complete else _replace_texts(first.case.texts, changed)),
         }
         longest = max(simulated.response.duration for simulated in cases.values())
-        starts, ends = zip(*(find_active_span(simulated.response) for simulated in cases.values()), strict=True)
+        starts, ends = zip(*(compute_active_span(simulated.response) for simulated in cases.values()), strict=True)
         start, end = choose_window(window, longest, (min(starts), max(ends)))
         header = {
             "window": widen_empty_window(start, end),

@@ -15,8 +15,7 @@ from rocking.core.constants import VERSION
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import OptionError
 from rocking.explorer.payload import load_english_texts
-from rocking.inputs.declared import INPUTS, SCALINGS, Input, index_by_name
-from rocking.inputs.declared import SHAPES as ALL_SHAPES
+from rocking.inputs.declared import BLOCK_DESCRIPTIONS, INPUTS, SCALINGS, Input, index_by_name
 from rocking.inputs.pulses import FAMILIES
 from rocking.records.units import UNIT_NAMES
 from rocking.solid.mesh import LENGTH_UNITS as MESH_UNITS
@@ -95,7 +94,7 @@ class PageShape(NamedTuple):
 SHAPES: Final = (
     *(
         PageShape(shape.name, shape.needed, tuple(name for name in shape.optional if name in PARAMETERS))
-        for shape in ALL_SHAPES
+        for shape in BLOCK_DESCRIPTIONS
         if PARAMETERS.keys() >= {*shape.needed}
     ),
     PageShape("mesh", ("mesh", "azimuth"), ("up", "unit", "density", "tolerance")),

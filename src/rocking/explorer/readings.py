@@ -15,7 +15,7 @@ from rocking.explorer.parameters import READING, Texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.simulated import SimulatedCase, check_window, describe_outcome, thin_line
 from rocking.response import Response
-from rocking.response.figure import compute_boundary, compute_course, find_active_span, find_event_times
+from rocking.response.figure import compute_active_span, compute_boundary, compute_course, find_event_times
 
 
 def sample_phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payload:
@@ -120,7 +120,7 @@ def create_thumbnail(explorer: Explorer, texts: Texts) -> Payload:
     """
     simulated = explorer.simulate(texts)
     response = simulated.response
-    start, end = find_active_span(response)
+    start, end = compute_active_span(response)
     times = np.linspace(start, end, 2_000)
     rotation = response.rotation(times)
     plus, minus = (side.alpha for side in require_block(response.block).sides)

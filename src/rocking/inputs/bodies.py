@@ -11,9 +11,9 @@ from rocking.block import Block, RestrainedBlock, Restraint
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.progress import note
-from rocking.errors import BlockError, OptionError, escape_braces
+from rocking.errors import BlockError, OptionError, escape_braces, join_placeholders
 from rocking.inputs import texts
-from rocking.inputs.declared import BLOCK, INPUTS, READERS, SHAPES, Shape
+from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, INPUTS, READERS, BlockDescription
 from rocking.inputs.notes import block_notes, restraint_notes
 from rocking.inputs.quantities import Quantity
 
@@ -28,31 +28,31 @@ _FREQUENCY_PARAMETER: Final = (
 )
 
 
-def find_shape(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
+def find_description(
+    names: Iterable[str], descriptions: Sequence[BlockDescription] = BLOCK_DESCRIPTIONS
+) -> BlockDescription:
     """Return the description that contains the named inputs, or raise `BlockError` if there is not exactly one."""
     provided = [name for name in BLOCK if name in {*names} and name != "restitution"]
-    for shape in shapes:
-        if {*shape.needed} <= {*provided} <= {*shape.needed, *shape.optional}:
-            return shape
-    candidates = {shape.needed: {*shape.needed, *shape.optional} for shape in shapes}
+    for description in descriptions:
+        if {*description.needed} <= {*provided} <= {*description.needed, *description.optional}:
+            return description
+    candidates = {description.needed: {*description.needed, *description.optional} for description in descriptions}
     candidates = {needed: allowed for needed, allowed in candidates.items() if allowed & {*provided}} or candidates
-    started = [needed for needed in candidates if {*needed} & {*provided}] or [*candidates]
+    partly_given = [needed for needed in candidates if {*needed} & {*provided}] or [*candidates]
+    placeholders = join_placeholders(provided)
     if not provided:
-        raise BlockError(f"a block is required; give {name_either(candidates)}", *itertools.chain(*candidates))
-    if any(not {*provided} <= candidates[needed] for needed in started):
-        sentence = (
-            f"{name_all(provided)} are from different descriptions of a block; give only {name_either(candidates)}"
-        )
-        raise BlockError(sentence, *provided, *itertools.chain(*candidates))
-    hint = f"; {_FREQUENCY_PARAMETER}" if provided == ["alpha"] and "p" in started[0] else ""
-    raise BlockError(
-        f"a block requires more than {name_all(provided)}; give {name_either(started)}{hint}",
-        *provided,
-        *itertools.chain(*started),
-    )
+        message, alternatives = "a block is required; give ", [*candidates]
+    elif any(not {*provided} <= candidates[needed] for needed in partly_given):
+        message = f"{placeholders} are from different descriptions of a block; give only "
+        alternatives = [*candidates]
+    else:
+        message, alternatives = f"a block requires more than {placeholders}; give ", partly_given
+    hint = f"; {_FREQUENCY_PARAMETER}" if provided == ["alpha"] and "p" in partly_given[0] else ""
+    message += ", or ".join(map(join_placeholders, alternatives)) + hint
+    raise BlockError(message, *provided, *itertools.chain(*alternatives))
 
 
-def create_block(values: Mapping[str, Any], shapes: Sequence[Shape] = SHAPES) -> Block:
+def create_block(values: Mapping[str, Any], descriptions: Sequence[BlockDescription] = BLOCK_DESCRIPTIONS) -> Block:
     """Create the block that the values describe.
 
     Examples
@@ -61,12 +61,12 @@ def create_block(values: Mapping[str, Any], shapes: Sequence[Shape] = SHAPES) ->
     (0.12, 'Block.from_parameters(p=2.0, alpha=0.2)')
     """
     block_values = {name: value for name, value in values.items() if name in BLOCK or name == "gravity"}
-    return find_shape(block_values, shapes).make(**_find_arguments(block_values))
+    return find_description(block_values, descriptions).make(**_convert_arguments(block_values))
 
 
 def write_block_call(values: Mapping[str, Any]) -> str:
     """Return the Python call that creates the block."""
-    return f"{find_shape(values).make.__qualname__}({texts.write_arguments(_find_arguments(values))})"
+    return f"{find_description(values).make.__qualname__}({texts.write_arguments(_convert_arguments(values))})"
 
 
 def create_body(block: Block, values: Mapping[str, Any], restraints: Sequence[Restraint] = ()) -> Body:
@@ -93,26 +93,16 @@ def find_reader(parameter: str) -> Quantity:
 
 
 def check_parameters(factory: Callable[..., object], provided: Iterable[str], owner: str, *names: str) -> None:
-    """Check that names are parameters of a kind and that none is missing; ``names`` are the parameters in ``of``."""
+    """Check that names are parameters of a kind and that none is missing; ``names`` are the parameters in ``owner``."""
     parameters = inspect.signature(factory).parameters
     for name in provided:
         if name not in parameters:
-            hint = checks.suggest(name, [*parameters], f"there are {', '.join(parameters)}")
-            raise OptionError(f"{owner} has no {escape_braces(name)}; {hint}", *names, name)
+            message = f"{owner} has no {escape_braces(name)}; {checks.suggest(name, [*parameters])}"
+            raise OptionError(message, *names, name)
     missing = [name for name, item in parameters.items() if item.default is item.empty and name not in {*provided}]
     if missing:
         raise OptionError(f"{owner} also requires {' and '.join(missing)}", *names)
 
 
-def name_all(names: Sequence[str]) -> str:
-    """Return placeholders of a message for all names."""
-    return " and ".join(["{}"] * len(names))
-
-
-def name_either(descriptions: Iterable[Sequence[str]]) -> str:
-    """Return placeholders of a message for the names of alternative descriptions."""
-    return ", or ".join(map(name_all, descriptions))
-
-
-def _find_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
+def _convert_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
     return {declared_input.argument or name: values[name] for name, declared_input in INPUTS.items() if name in values}

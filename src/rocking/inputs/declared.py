@@ -88,16 +88,13 @@ class Input:
             return quantities.read_level_at_period(text, self.name)
         if self.kind not in READERS:
             return text
+        reader = READERS[self.kind][0]
         if self.values == "one":
-            return self.read_one(text)
-        sides_read = quantities.read_sides(text, self.name, READERS[self.kind][0])
-        if self.values == "two" and not isinstance(sides_read, list):
-            sides_read = [sides_read, sides_read]
-        return tuple(sides_read) if isinstance(sides_read, list) else sides_read
-
-    def read_one(self, text: str) -> float:
-        """Return a number for one side, or for both."""
-        return READERS[self.kind][0](text, self.name)
+            return reader(text, self.name)
+        numbers = quantities.read_sides(text, self.name, reader)
+        if isinstance(numbers, list):
+            return tuple(numbers)
+        return (numbers, numbers) if self.values == "two" else numbers
 
     def axis(self, value: Any) -> list[Any]:
         """Return the values of an entry of a study file: a number, a list, or a range (for pivots, of pairs)."""
@@ -109,9 +106,8 @@ class Input:
         pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
         pairs_read = [tuple(map(float, quantities.read_axis(pair, self.name, reader))) for pair in pairs]
         if any(len(pair) != 2 for pair in pairs_read):
-            raise OptionError(
-                "{} must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs", self.name, value=value
-            )
+            message = "{} must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs"
+            raise OptionError(message, self.name, value=value)
         return [*pairs_read]
 
     def describe(self) -> dict[str, Any]:
@@ -221,7 +217,7 @@ INPUTS: Final = index_by_name(
 SCALINGS: Final = ("pga", "pgv", "sa", "scale")
 
 
-class Shape(NamedTuple):
+class BlockDescription(NamedTuple):
     """Description of a block: required and optional inputs, and the function of `rocking` that creates the block."""
 
     name: str
@@ -231,14 +227,17 @@ class Shape(NamedTuple):
 
 
 #: Each also accepts a restitution.
-SHAPES: Final = (
-    Shape("sizes", ("width", "height"), ("offset", "mass"), Block),
-    Shape("half sizes", ("half_width", "half_height"), ("offset", "mass"), Block),
-    Shape("parameters", ("p", "alpha"), (), Block.from_parameters),
-    Shape("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
+BLOCK_DESCRIPTIONS: Final = (
+    BlockDescription("sizes", ("width", "height"), ("offset", "mass"), Block),
+    BlockDescription("half sizes", ("half_width", "half_height"), ("offset", "mass"), Block),
+    BlockDescription("parameters", ("p", "alpha"), (), Block.from_parameters),
+    BlockDescription("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
 )
 
-BLOCK: Final = (*dict.fromkeys(name for shape in SHAPES for name in (*shape.needed, *shape.optional)), "restitution")
+BLOCK: Final = (
+    *dict.fromkeys(name for shape in BLOCK_DESCRIPTIONS for name in (*shape.needed, *shape.optional)),
+    "restitution",
+)
 
 #: Restraints by the names of their inputs. Couples are numbers, the others have parameters.
 COUPLES: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}

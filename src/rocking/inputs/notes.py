@@ -13,7 +13,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
 from rocking.motion.description import Origin, compute_start_delay
-from rocking.motion.measures import find_significant_span
+from rocking.motion.measures import compute_significant_span
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
@@ -116,15 +116,12 @@ def _gap_notes(motion: Motion) -> list[str]:
     step = float(np.median(steps))
     gaps = np.flatnonzero(np.abs(steps - step) > _TOLERANCE * step)
     multiples = np.round(steps[gaps] / step)
-    if not 0 < len(gaps) <= _MAX_GAPS * len(steps) or np.any(
-        np.abs(steps[gaps] - multiples * step) > _TOLERANCE * step
-    ):
+    are_multiples = np.all(np.abs(steps[gaps] - multiples * step) <= _TOLERANCE * step)
+    if not 0 < len(gaps) <= _MAX_GAPS * len(steps) or not are_multiples:
         return []
-    first = float(motion.breakpoints[gaps[0]])
-    return [
-        f"the times go on by {step:g} s, but by {steps[gaps[0]]:.3g} s after {first:.6g} s"
-        f"{' and elsewhere' if len(gaps) > 1 else ''}: are rows missing? A straight line joins the samples"
-    ]
+    others = " and elsewhere" if len(gaps) > 1 else ""
+    gap_text = f"by {steps[gaps[0]]:.3g} s after {motion.breakpoints[gaps[0]]:.6g} s{others}"
+    return [f"the times go on by {step:g} s, but {gap_text}: are rows missing? A straight line joins the samples"]
 
 
 def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
@@ -138,15 +135,12 @@ def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
 def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
     """Return likely mistakes in the units of the intensities of a hazard curve; empty if there are none."""
     weakest, strongest = float(intensity[0]), float(intensity[-1])
-    lowest, highest = (
-        (_MIN_PGA * STANDARD_GRAVITY, _MAX_PGA * STANDARD_GRAVITY) if measure.units == "m/s^2" else _PGV_RANGE
-    )
-    for kind, value, is_odd in (("weakest", weakest, weakest > highest), ("strongest", strongest, strongest < lowest)):
-        if is_odd:
-            return (
-                f"even the {kind} motions of the hazard curve have {measure.format_value(value)}: are its units right?",
-            )
-    return ()
+    is_acceleration = measure.units == "m/s^2"
+    lowest, highest = np.array((_MIN_PGA, _MAX_PGA)) * STANDARD_GRAVITY if is_acceleration else _PGV_RANGE
+    if lowest <= strongest and weakest <= highest:
+        return ()
+    kind, value = ("weakest", weakest) if weakest > highest else ("strongest", strongest)
+    return (f"even the {kind} motions of the hazard curve have {measure.format_value(value)}: are its units right?",)
 
 
 def block_notes(block: Block) -> tuple[str, ...]:
@@ -165,11 +159,10 @@ def block_notes(block: Block) -> tuple[str, ...]:
     ('the block is wider, 2 m, than it is high, 1 m: are the sizes swapped?',)
     """
     notes = []
-    largest = max(2.0 * side.radius for side in block.sides)
-    if largest > _MAX_LENGTH:
-        notes.append(
-            f"the diagonal of the block is {largest:.0f} m, more than {_MAX_LENGTH:g} m: are its sizes in metres?"
-        )
+    diagonal = max(2.0 * side.radius for side in block.sides)
+    if diagonal > _MAX_LENGTH:
+        length_text = f"{diagonal:.0f} m, more than {_MAX_LENGTH:g} m"
+        notes.append(f"the diagonal of the block is {length_text}: are its sizes in metres?")
     if block.width is not None and block.height is not None and block.width > block.height:
         wider = f"wider, {block.width:g} m, than it is high, {block.height:g} m"
         notes.append(f"the block is {wider}: are the sizes swapped?")
@@ -184,20 +177,16 @@ def block_notes(block: Block) -> tuple[str, ...]:
 
 def height_notes(height: float) -> tuple[str, ...]:
     """Return likely mistakes in the height, m, of a body from a mesh; empty if there are none."""
-    return (
-        ()
-        if _MIN_HEIGHT <= height <= _MAX_LENGTH
-        else (f"the body is {height:.4g} m high: are its coordinates in metres?",)
-    )
+    sentence = f"the body is {height:.4g} m high: are its coordinates in metres?"
+    return () if _MIN_HEIGHT <= height <= _MAX_LENGTH else (sentence,)
 
 
 def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
     """Return likely mistakes in densities, kg/m^3, of parts of a body; empty if there are none."""
-    unlikely = [density for density in densities if density is not None and not _MIN_DENSITY <= density <= _MAX_DENSITY]
-    return tuple(
-        f"a density is {density:g} kg/m^3, and no solid is so light or so heavy: is it in kg/m^3?"
-        for density in unlikely[:1]
-    )
+    for density in densities:
+        if density is not None and not _MIN_DENSITY <= density <= _MAX_DENSITY:
+            return (f"a density is {density:g} kg/m^3, and no solid is so light or so heavy: is it in kg/m^3?",)
+    return ()
 
 
 def restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
@@ -232,7 +221,7 @@ def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
             "horizontal one, but both are taken to start together: cut what comes first"
         )
         return
-    (start, end), (first, last) = (find_significant_span(component) for component in (motion, vertical))
+    (start, end), (first, last) = (compute_significant_span(component) for component in (motion, vertical))
     if last < start or first > end:
         yield (
             f"the horizontal motion is strong from {start:.4g} s to {end:.4g} s, the vertical one from {first:.4g} s "

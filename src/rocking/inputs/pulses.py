@@ -85,7 +85,9 @@ class PulseFamily:
         missing = [name for name in self.needed if name not in values]
         if missing:
             raise OptionError(f"the pulse {self.name} also requires {_join_names(missing)}")
-        return self.make(**{name: _round_count(value) if name == "lobes" else value for name, value in values.items()})
+        lobes = values.get("lobes")  # other values than whole numbers are rejected by the pulse
+        count = {"lobes": int(lobes)} if isinstance(lobes, float) and lobes.is_integer() else {}
+        return self.make(**{**values, **count})
 
     @cached_property
     def _defaults(self) -> Mapping[str, Any]:
@@ -157,9 +159,8 @@ def split_pulse(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
         elif texts:
             [*texts.values()][-1].append(name)  # another value of the previous parameter
         else:
-            raise OptionError(
-                f"a pulse must have the form NAME:PARAMETER=VALUE,PARAMETER=VALUE, but {part!r} has no name"
-            )
+            form = "NAME:PARAMETER=VALUE,PARAMETER=VALUE"
+            raise OptionError(f"a pulse must have the form {form}, but {part!r} has no name")
     return family, texts
 
 
@@ -168,15 +169,8 @@ def _read_value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:
     label = f"the {parameter} of a {family.name} pulse"
     if len(texts) > 1 and not (family.make is pulses.n_lobe and parameter == "amplitude"):
         raise OptionError(f"{label} must be one value, not {', '.join(texts)}")
-    if quantity is None:
-        return texts[0]
-    values = [quantity(text, label) for text in texts]
+    values = texts if quantity is None else [quantity(text, label) for text in texts]
     return values if len(values) > 1 else values[0]
-
-
-def _round_count(value: Any) -> Any:
-    """Return a whole float as an int, and other values unchanged, because the pulse rejects them."""
-    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _join_names(names: Iterable[str]) -> str:

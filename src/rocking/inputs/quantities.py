@@ -12,7 +12,7 @@ import numpy as np
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import round_decimal
-from rocking.errors import OptionError, escape_braces
+from rocking.errors import OptionError, escape_braces, join_placeholders
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import ACCELERATION_UNITS, TIME_UNITS, Unit, normalise_spelling
 
@@ -33,20 +33,12 @@ _DEGREE: Final = Unit("deg", math.pi / 180.0, 1.0)
 def _index_units(*units: Unit, **spellings: str) -> dict[str, Unit]:
     """Return units by their plain spellings, with the unit of a number without one, and further spellings."""
     known = {normalise_spelling(unit.name): unit for unit in units}
-    return {
-        "": _SI,
-        **known,
-        **{spelling: known[name] for name, line in spellings.items() for spelling in line.split()},
-    }
+    further = {spelling: known[name] for name, line in spellings.items() for spelling in line.split()}
+    return {"": _SI, **known, **further}
 
 
-_LENGTHS: Final = _index_units(
-    _SI._replace(name="m"),
-    Unit("cm", 1.0, 100.0),
-    Unit("mm", 1.0, 1000.0),
-    Unit("ft", 3048.0, 1e4),
-    Unit("in", 254.0, 1e4),
-)
+_METRIC_LENGTHS: Final = (_SI._replace(name="m"), Unit("cm", 1.0, 100.0), Unit("mm", 1.0, 1000.0))
+_LENGTHS: Final = _index_units(*_METRIC_LENGTHS, Unit("ft", 3048.0, 1e4), Unit("in", 254.0, 1e4))
 _ANGLES: Final = _index_units(_SI._replace(name="rad"), _DEGREE, deg="° º degree degrees", rad="radian radians")
 _VELOCITIES: Final = _index_units(*(unit._replace(name=f"{name}/s") for name, unit in _LENGTHS.items() if name))
 _RATES: Final = _index_units(_SI._replace(name="rad/s"), _DEGREE._replace(name="deg/s"), degs="°s")
@@ -108,13 +100,11 @@ def read_tilt(text: str, name: str) -> float:
     value = read_angle(text, name)
     if abs(value) < 0.5 * math.pi:
         return value
+    number = text.strip()
+    message = f"{{}} must be below 90deg in size, not {number}"
     if abs(value) < 90.0 and not _split_unit(text)[1]:
-        raise OptionError(
-            f"{{}} must be below pi/2 rad; got {text.strip()}, which is read as rad; did you mean {text.strip()}deg?",
-            name,
-            value=text,
-        )
-    raise OptionError(f"{{}} must be below 90deg in size, not {text.strip()}", name, value=text)
+        message = f"{{}} must be below pi/2 rad; got {number}, which is read as rad; did you mean {number}deg?"
+    raise OptionError(message, name, value=text)
 
 
 def read_sides(text: str, name: str, quantity: Quantity = read_number) -> float | list[float]:
@@ -149,21 +139,19 @@ def read_array(text: str, name: str, quantity: Quantity = read_number) -> Floats
     parts = text.split(":")
     if len(parts) == 1:
         return np.array([quantity(part, name) for part in text.split(",")])
-    if len(parts) not in (3, 4) or not parts[2].strip().isdecimal() or (len(parts) == 4 and parts[3] != "log"):
-        raise OptionError(
-            f"{{}} must be numbers, as 1,2,5, or a range START:STOP:COUNT[:log], not {text!r}", name, value=text
-        )
-    start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
-    if not 2 <= count <= _MAX_COUNT:
-        sentence = f"{{}} must be a range START:STOP:COUNT with a COUNT from 2 to {_MAX_COUNT}, not {text!r}"
-        raise OptionError(sentence, name, value=text)
-    if not math.isfinite(stop - start):
-        raise OptionError(f"{{}} must be a range with finite ends, not {text!r}", name, value=text)
-    if len(parts) == 3:
-        return _round_decimals(np.linspace(start, stop, count))
-    if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
-        raise OptionError(f"{{}} must be a range with positive ends because of :log, not {text!r}", name, value=text)
-    return _round_decimals(np.geomspace(start, stop, count))
+    requirement, is_logarithmic = "numbers, as 1,2,5, or a range START:STOP:COUNT[:log]", parts[3:] == ["log"]
+    if len(parts) in (3, 4) and parts[2].strip().isdecimal() and (len(parts) == 3 or is_logarithmic):
+        start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
+        if not 2 <= count <= _MAX_COUNT:
+            requirement = f"a range START:STOP:COUNT with a COUNT from 2 to {_MAX_COUNT}"
+        elif not math.isfinite(stop - start):
+            requirement = "a range with finite ends"
+        elif is_logarithmic and not min(start, stop) > 0.0:
+            requirement = "a range with positive ends because of :log"
+        else:
+            numbers = np.geomspace(start, stop, count) if is_logarithmic else np.linspace(start, stop, count)
+            return np.array([round_decimal(number) for number in numbers])  # 0.3, not 0.30000000000000004
+    raise OptionError(f"{{}} must be {requirement}, not {text!r}", name, value=text)
 
 
 def read_level_at_period(text: str, name: str, quantity: Quantity = read_acceleration) -> tuple[float, float]:
@@ -182,27 +170,19 @@ def read_scaling(
     if not options:
         return None
     if len(options) > 1:
-        raise OptionError(
-            f"{' and '.join(['{}'] * len(options))} scale the same motion; use only one of them", *options
-        )
+        raise OptionError(f"{join_placeholders(options)} scale the same motion; use only one of them", *options)
     ((name, value),) = options.items()
     if name == "pga":
         return checks.finite(quantity(str(value), name), name, OptionError), Measure("pga")
     if name == "sa":
-        read_level, read_period = (
-            checks.finite(number, name, OptionError) for number in read_level_at_period(str(value), name, quantity)
-        )
-        return read_level, Measure("sa", read_period)
+        numbers = read_level_at_period(str(value), name, quantity)
+        level, period = (checks.finite(number, name, OptionError) for number in numbers)
+        return level, Measure("sa", period)
     read = read_number if name == "scale" else read_velocity
-    value_read = read(value, name) if isinstance(value, str) else float(value)
+    number = read(value, name) if isinstance(value, str) else float(value)
     if name == "scale":
-        return checks.finite(value_read, name, OptionError), FACTOR
-    return checks.positive(value_read, name, OptionError, "m/s"), Measure("pgv")
-
-
-def _round_decimals(numbers: Floats) -> Floats:
-    """Round numbers to their usual decimals: 0.3, not 0.30000000000000004."""
-    return np.array([round_decimal(value) for value in numbers])
+        return checks.finite(number, name, OptionError), FACTOR
+    return checks.positive(number, name, OptionError, "m/s"), Measure("pgv")
 
 
 def _split_unit(text: str) -> tuple[float | None, str]:
@@ -215,14 +195,11 @@ def read_densities(text: str, name: str) -> float | dict[str, float]:
     """Return one density, kg/m^3, or densities of parts by name from entries PART=NUMBER."""
     if "=" not in text:
         return read_number(text, name)
-    densities_read = {}
+    densities = {}
     for entry in text.split(","):
         part, equals, value = entry.rpartition("=")
         if not equals:
-            raise OptionError(
-                f"{{}} must be a number, or PART=NUMBER separated by commas, not {escape_braces(repr(text))}",
-                name,
-                value=text,
-            )
-        densities_read[part.strip()] = read_number(value, name)
-    return densities_read
+            message = f"{{}} must be a number, or PART=NUMBER separated by commas, not {escape_braces(repr(text))}"
+            raise OptionError(message, name, value=text)
+        densities[part.strip()] = read_number(value, name)
+    return densities

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -92,15 +92,7 @@ def locate_errors(file: Path, line: int) -> Iterator[None]:
         raise relocate_error(error, StudyError, file, line) from None
 
 
-def relocate_error(error: RockingError, error_type: type[_Error], file: Path, line: int, location: str = "") -> _Error:
+def relocate_error(error: RockingError, error_type: type[_Error], file: Path, line: int) -> _Error:
     """Return an error with the same data, and with a line of a file before its own location."""
-    location += error.text().removesuffix(error.message.text())
-    return error_type(
-        location + error.message.template, *error.message.arguments, path=str(file), line=line, value=error.value
-    )
-
-
-def suggest_key(name: str, known: Iterable[str]) -> str:
-    """Return the closest known name, or the list of known names."""
-    names = [*known]
-    return checks.suggest(name, names, f"there are {', '.join(names)}")
+    message = error.text().removesuffix(error.message.text()) + error.message.template
+    return error_type(message, *error.message.arguments, path=str(file), line=line, value=error.value)

@@ -148,7 +148,7 @@ def compute_start_delay(first: Description, second: Description, step: float | N
     return delay if abs(delay) > 0.5 * (step or 0.0) + 1e-6 else 0.0
 
 
-def compose_label(name: str, history: Sequence[str], vertical: str = "") -> str:
+def create_label(name: str, history: Sequence[str], vertical: str = "") -> str:
     """Return the name of a motion and its vertical component with processing but without scaling."""
     full_name = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((full_name, *(_SCALED_TO_LEVEL.sub(r"\1", entry) for entry in history)))

@@ -70,43 +70,39 @@ class MotionMeasures:
         """Return the ground acceleration at times (s), m/s^2, shaped like `time` and zero outside the motion."""
         times = checks.numbers(time, "time", MotionError)
         result = piecewise.evaluate_at(self.breakpoints, self.coefficients, times)
-        result = np.where((times < 0.0) | (times > self.duration), 0.0, result)
-        return result if result.ndim else float(result)
+        return _unwrap_float(np.where((times < 0.0) | (times > self.duration), 0.0, result))
 
     def velocity(self, time: ArrayLike) -> Any:
         """Return the ground velocity at times (s), m/s, from rest, constant after the end of the motion."""
         times = checks.numbers(time, "time", MotionError)
-        result = piecewise.evaluate_at(self.breakpoints, self._compute_velocity(), times)
-        return result if result.ndim else float(result)
+        return _unwrap_float(piecewise.evaluate_at(self.breakpoints, self._compute_velocity(), times))
 
     def displacement(self, time: ArrayLike) -> Any:
         """Return the ground displacement at times (s), m, from rest, with the last velocity after the end."""
         times = checks.numbers(time, "time", MotionError)
         result = piecewise.evaluate_at(self.breakpoints, self._compute_displacement(), times)
-        result = result + self.velocity(self.duration) * np.maximum(times - self.duration, 0.0)
-        return result if result.ndim else float(result)
+        return _unwrap_float(result + self.velocity(self.duration) * np.maximum(times - self.duration, 0.0))
 
     @property
     def extremes(self) -> tuple[float, float]:
         """Exact lowest and highest acceleration with their signs, m/s^2."""
-        return -piecewise.find_maximum(self._widths(), -self.coefficients), piecewise.find_maximum(
-            self._widths(), self.coefficients
-        )
+        widths, maximum = self._widths(), piecewise.compute_maximum
+        return -maximum(widths, -self.coefficients), maximum(widths, self.coefficients)
 
     @property
     def pga(self) -> float:
         """Exact peak ground acceleration, m/s^2."""
-        return piecewise.find_peak_magnitude(self._widths(), self.coefficients)
+        return piecewise.compute_peak_magnitude(self._widths(), self.coefficients)
 
     @property
     def pgv(self) -> float:
         """Exact peak ground velocity from rest, m/s."""
-        return piecewise.find_peak_magnitude(self._widths(), self._compute_velocity())
+        return piecewise.compute_peak_magnitude(self._widths(), self._compute_velocity())
 
     @property
     def pgd(self) -> float:
         """Exact peak ground displacement until the end of the motion, m."""
-        return piecewise.find_peak_magnitude(self._widths(), self._compute_displacement())
+        return piecewise.compute_peak_magnitude(self._widths(), self._compute_displacement())
 
     @property
     def arias_intensity(self) -> float:
@@ -131,9 +127,9 @@ class MotionMeasures:
         """
         start, end = (checks.finite(value, "ends of a significant duration", MotionError) for value in (start, end))
         if not 0.0 <= start < end <= 1.0:
-            sentence = f"a significant duration requires 0 <= {{}} < {{}} <= 1; got {start:g} and {end:g}"
-            raise MotionError(sentence, "start", "end", value=(start, end))
-        start_time, end_time = find_significant_span(self, start, end)
+            message = f"a significant duration requires 0 <= {{}} < {{}} <= 1; got {start:g} and {end:g}"
+            raise MotionError(message, "start", "end", value=(start, end))
+        start_time, end_time = compute_significant_span(self, start, end)
         return end_time - start_time
 
     def spectral_acceleration(self, period: ArrayLike, damping: float = DAMPING) -> Any:
@@ -167,47 +163,43 @@ class MotionMeasures:
             raise MotionError("the {} of a spectral acceleration must be a positive number of seconds", "period")
         duration_text = f"the duration, {self.duration:.6g} s"
         if np.any(periods < 1e-6 * self.duration):
-            sentence = f"a {{}} shorter than one millionth of {duration_text}, would take too long to compute; use pga"
-            raise MotionError(sentence, "period")
+            message = f"a {{}} shorter than one millionth of {duration_text}, would take too long to compute; use pga"
+            raise MotionError(message, "period")
         if np.any(periods > 1e6 * self.duration):
-            sentence = f"a {{}} longer than one million times {duration_text}, gives only the displacement; use pgd"
-            raise MotionError(sentence, "period")
-        damping_ratio = check_damping(damping, MotionError)
-        frequencies = np.ravel(2.0 * np.pi / periods)
-        peaks = np.empty_like(frequencies)
-        workspace = np.empty(2 * self.coefficients.shape[1] + oscillator.TERMS)
-        oscillator.write_peak_displacements(
-            self.breakpoints, self.coefficients, frequencies, damping_ratio, workspace, peaks
-        )
-        result = (frequencies**2 * peaks).reshape(periods.shape)
-        return result if result.ndim else float(result)
+            message = f"a {{}} longer than one million times {duration_text}, gives only the displacement; use pgd"
+            raise MotionError(message, "period")
+        ratio, frequencies = check_damping(damping, MotionError), np.ravel(2.0 * np.pi / periods)
+        peaks, workspace = np.empty_like(frequencies), np.empty(2 * self.coefficients.shape[1] + oscillator.TERMS)
+        oscillator.write_peak_displacements(self.breakpoints, self.coefficients, frequencies, ratio, workspace, peaks)
+        return _unwrap_float((frequencies**2 * peaks).reshape(periods.shape))
 
     def measures(self, periods: Sequence[float] = ()) -> dict[str, float]:
         """Return intensity measures in SI units by name, which ends in the unit.
 
         Spectral accelerations (5 % damping) are added for `periods`, s.
         """
-        values = {
-            add_unit("duration", "s"): self.duration,
-            add_unit("pga", "m/s^2"): self.pga,
-            add_unit("pgv", "m/s"): self.pgv,
-            add_unit("pgd", "m"): self.pgd,
-            add_unit("arias_intensity", "m/s"): self.arias_intensity,
-            add_unit("cumulative_absolute_velocity", "m/s"): self.cumulative_absolute_velocity,
-            add_unit("significant_duration_5_75", "s"): self.significant_duration(0.05, 0.75),
-            add_unit("significant_duration_5_95", "s"): self.significant_duration(0.05, 0.95),
-        }
+        units = {"duration": "s", "pga": "m/s^2", "pgv": "m/s", "pgd": "m", "arias_intensity": "m/s"}
+        units["cumulative_absolute_velocity"] = "m/s"
+        values = {add_unit(name, unit): getattr(self, name) for name, unit in units.items()}
+        for percent in (75, 95):
+            duration = self.significant_duration(0.05, percent / 100.0)
+            values[add_unit(f"significant_duration_5_{percent}", "s")] = duration
         for period in np.ravel(checks.numbers(periods, "periods of a spectral acceleration", MotionError)).tolist():
             values[add_unit(f"spectral_acceleration_{period:g}s", "m/s^2")] = self.spectral_acceleration(period)
         return values
 
 
-def find_significant_span(motion: MotionMeasures, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
+def _unwrap_float(values: Floats) -> Any:
+    """Return a float for an array without dimensions, else the array."""
+    return values if values.ndim else float(values)
+
+
+def compute_significant_span(motion: MotionMeasures, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
     """Return the times, s, at two fractions of the total Arias intensity, or NaN if zero."""
     energy = np.append(0.0, np.cumsum(_integrate_square(motion.coefficients, np.diff(motion.breakpoints))))
     if energy[-1] == 0.0:
         return math.nan, math.nan
-    return _find_time_at_energy(motion, energy, start), _find_time_at_energy(motion, energy, end)
+    return _compute_time_at_energy(motion, energy, start), _compute_time_at_energy(motion, energy, end)
 
 
 def _integrate_square(coefficients: Floats, widths: Floats) -> Floats:
@@ -218,7 +210,7 @@ def _integrate_square(coefficients: Floats, widths: Floats) -> Floats:
     return energy
 
 
-def _find_time_at_energy(motion: MotionMeasures, energy: Floats, fraction: float) -> float:
+def _compute_time_at_energy(motion: MotionMeasures, energy: Floats, fraction: float) -> float:
     """Find the first time at a fraction of the total of the cumulative energy, by bisection within a piece."""
     target = fraction * energy[-1]
     piece = max(int(np.searchsorted(energy, target, side="left")) - 1, 0)

@@ -15,8 +15,8 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
 from rocking.errors import MotionError
 from rocking.motion import piecewise
-from rocking.motion.description import Description, compose_label
-from rocking.motion.processing import Processable
+from rocking.motion.description import Description, create_label
+from rocking.motion.processing import ProcessingMethods
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(Processable):
+class Motion(ProcessingMethods):
     """Piecewise polynomial ground acceleration, zero outside ``[0, duration]``.
 
     Pieces may jump. Records are exactly piecewise linear, and pulses are approximated to 1e-15 of their amplitude.
@@ -88,19 +88,18 @@ class Motion(Processable):
         checks.text(self.name, "name of a motion", MotionError)
         if not isinstance(self.description, Description):
             type_name = type(self.description).__name__
-            sentence = f"the description of a motion must be a Description(family, parameters, text), not a {type_name}"
-            raise MotionError(sentence, value=self.description)
+            message = f"the description of a motion must be a Description(family, parameters, text), not a {type_name}"
+            raise MotionError(message, value=self.description)
         if isinstance(self.history, str) or not isinstance(self.history, Iterable):
-            sentence = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
-            raise MotionError(sentence, value=self.history)
+            message = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
+            raise MotionError(message, value=self.history)
         history = tuple(checks.text(entry, "sentence of a motion's history", MotionError) for entry in self.history)
-        error = checks.between(
-            self.error, "approximation error of a motion", MotionError, 0.0, piecewise.MAX_ACCELERATION
-        )
+        error_name = "approximation error of a motion"
+        error = checks.between(self.error, error_name, MotionError, 0.0, piecewise.MAX_ACCELERATION)
         if self.vertical is not None and not isinstance(self.vertical, Motion):
             type_name = type(self.vertical).__name__
-            sentence = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type_name}"
-            raise MotionError(sentence, "vertical", value=self.vertical)
+            message = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type_name}"
+            raise MotionError(message, "vertical", value=self.vertical)
         if self.vertical is not None and self.vertical.vertical is not None:
             raise MotionError("{} must be a motion without a vertical component of its own", "vertical")
         checked_fields = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
@@ -148,7 +147,7 @@ class Motion(Processable):
         (0.06, 2.0)
         """
         samples, step = piecewise.check_samples(acceleration), piecewise.check_step(dt)
-        times = piecewise.make_even_times(len(samples), step)
+        times = piecewise.create_even_times(len(samples), step)
         description = description or Description("samples", text="linear between even samples")
         return cls(times, piecewise.join_linearly(times, samples), name=name, description=description)
 
@@ -175,7 +174,7 @@ class Motion(Processable):
     @property
     def label(self) -> str:
         """Name with brief processing and vertical component, for titles."""
-        return compose_label(self.name, self.history, "" if self.vertical is None else self.vertical.name)
+        return create_label(self.name, self.history, "" if self.vertical is None else self.vertical.name)
 
     def scaled(self, factor: float) -> Motion:
         """Return the motion times a factor.
@@ -241,15 +240,11 @@ class Motion(Processable):
         """
         from rocking.plot.curves import draw_motion
 
-        times = self.drawing_times(0.0, self.end)
-        return draw_motion(
-            time=times,
-            acceleration_g=self.acceleration(times) / STANDARD_GRAVITY,
-            vertical_g=None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY,
-            title=title or escape_dollars(self.label),
-            ax=ax,
-            figsize=figsize,
-        )
+        times, title = self.drawing_times(0.0, self.end), title or escape_dollars(self.label)
+        acceleration = self.acceleration(times) / STANDARD_GRAVITY
+        vertical = None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY
+        traces = {"acceleration_g": acceleration, "vertical_g": vertical}
+        return draw_motion(time=times, **traces, title=title, ax=ax, figsize=figsize)
 
     def drawing_times(self, start: float, end: float) -> Floats:
         """Return times (s) for drawing an interval: its ends, breakpoints, and additional points on curved pieces.
@@ -295,14 +290,9 @@ class Motion(Processable):
         vertical = self.vertical or other.vertical
         if self.vertical is not None and other.vertical is not None:
             vertical = self.vertical + other.vertical
-        return Motion(
-            breakpoints,
-            first + second,
-            name=f"{self.name} + {other.name}",
-            description=Description("sum", text=f"{self._describe_origin()}; plus {other._describe_origin()}"),
-            error=self.error + other.error,
-            vertical=vertical,
-        )
+        name, error = f"{self.name} + {other.name}", self.error + other.error
+        description = Description("sum", text=f"{self._describe_origin()}; plus {other._describe_origin()}")
+        return Motion(breakpoints, first + second, name, description, error=error, vertical=vertical)
 
     def _multiply(self, factor: float, history_entry: str) -> Motion:
         """Return both components times a factor, the vertical one times its absolute value."""
@@ -313,14 +303,9 @@ class Motion(Processable):
             coefficients = self.coefficients * factor
         if not np.all(np.abs(coefficients[:, 0]) <= piecewise.MAX_ACCELERATION) or not np.isfinite(coefficients).all():
             raise MotionError(piecewise.TOO_STRONG)
-        return replace(
-            self,
-            coefficients=coefficients,
-            description=self.description.scaled(factor),
-            history=(*self.history, history_entry),
-            error=self.error * abs(factor),
-            vertical=vertical,
-        )
+        description, history = self.description.scaled(factor), (*self.history, history_entry)
+        fields: dict[str, Any] = {"description": description, "history": history, "error": self.error * abs(factor)}
+        return replace(self, coefficients=coefficients, vertical=vertical, **fields)
 
 
 def _describe_peak(motion: Motion) -> str:
@@ -356,7 +341,7 @@ def compute_uplift_factors(
     weight_pairs = threshold_pairs if weight_thresholds is None else np.asarray(weight_thresholds, dtype=np.float64)
     if motion.vertical is None:
         widths = np.diff(motion.breakpoints)
-        peaks = np.array([[piecewise.find_maximum(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
+        peaks = np.array([[piecewise.compute_maximum(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
     else:
         breakpoints, (push, vertical) = piecewise.align_pieces(motion, motion.vertical)
         widths = np.diff(breakpoints)
@@ -364,7 +349,7 @@ def compute_uplift_factors(
         def find_peak(sign: float, threshold: float) -> float:
             if np.isinf(threshold):
                 return 0.0
-            return piecewise.find_maximum(widths, sign * push - threshold / gravity * vertical)
+            return piecewise.compute_maximum(widths, sign * push - threshold / gravity * vertical)
 
         peaks = np.array([[find_peak(-1.0, plus), find_peak(1.0, minus)] for plus, minus in weight_pairs])
     with np.errstate(divide="ignore"):

@@ -56,7 +56,7 @@ def find_even_step(pieces: Piecewise) -> float | None:
     if coefficients.shape[1] < 2 or np.any(coefficients[:, 2:]):
         return None
     step = float(breakpoints[1])
-    deviations = np.abs(breakpoints - make_even_times(len(breakpoints), step))
+    deviations = np.abs(breakpoints - create_even_times(len(breakpoints), step))
     return step if np.all(deviations <= _STEP_ROUNDING * breakpoints[-1]) else None
 
 
@@ -69,7 +69,7 @@ def find_jumps(pieces: Piecewise) -> Flags:
     """Return which pieces end in a jump, beyond rounding (the last one to zero)."""
     widths, coefficients = np.diff(pieces.breakpoints), pieces.coefficients
     gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - evaluate_pieces(coefficients, widths))
-    return gaps > _JUMP_TOLERANCE * find_peak_magnitude(widths, coefficients)
+    return gaps > _JUMP_TOLERANCE * compute_peak_magnitude(widths, coefficients)
 
 
 def sample_breakpoints(pieces: Piecewise) -> tuple[Floats, Floats]:
@@ -94,7 +94,7 @@ def evaluate_at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floa
     return evaluate_pieces(coefficients[piece], clipped - breakpoints[piece])
 
 
-def make_even_times(count: int, step: float) -> Floats:
+def create_even_times(count: int, step: float) -> Floats:
     """Return the times of even samples (infinite on overflow)."""
     with np.errstate(over="ignore"):
         return np.arange(count, dtype=np.float64) * step
@@ -161,10 +161,8 @@ def align_pieces(first: Piecewise, second: Piecewise) -> tuple[Floats, tuple[Flo
         breakpoints = first.breakpoints
     else:
         breakpoints = np.union1d(first.breakpoints, second.breakpoints)
-    first_rows, second_rows = (
-        refine_pieces(pieces.breakpoints, pieces.coefficients, breakpoints, columns) for pieces in (first, second)
-    )
-    return breakpoints, (first_rows, second_rows)
+    first_rows = refine_pieces(first.breakpoints, first.coefficients, breakpoints, columns)
+    return breakpoints, (first_rows, refine_pieces(second.breakpoints, second.coefficients, breakpoints, columns))
 
 
 def find_root_candidates(widths: Floats, coefficients: Floats) -> Floats:
@@ -194,13 +192,13 @@ def _find_numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
     control = _compute_control_points(widths, coefficients)
     rounding = 1e-14 * np.sum(np.abs(scaled), axis=1)
     may_vanish = (np.min(control, axis=1) <= rounding) & (np.max(control, axis=1) >= -rounding)
-    degrees = np.where(may_vanish, _find_significant_degrees(scaled), 0)
+    degrees = np.where(may_vanish, _compute_significant_degrees(scaled), 0)
     for k in np.flatnonzero(degrees):
         roots[k, : degrees[k]] = np.polynomial.polynomial.polyroots(scaled[k, : degrees[k] + 1]).real
     return roots * widths[:, np.newaxis]
 
 
-def _find_significant_degrees(pieces: Floats) -> Integers:
+def _compute_significant_degrees(pieces: Floats) -> Integers:
     """Return the degree of each piece without leading coefficients far below rounding, which distort the roots."""
     sizes = np.abs(pieces)
     significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
@@ -229,7 +227,7 @@ def bound_magnitudes(widths: Floats, coefficients: Floats) -> Floats:
     return result
 
 
-def find_maximum(widths: Floats, coefficients: Floats) -> float:
+def compute_maximum(widths: Floats, coefficients: Floats) -> float:
     """Return the highest value over all pieces."""
     maximum = max(float(np.max(coefficients[:, 0])), float(np.max(evaluate_pieces(coefficients, widths))))
     if coefficients.shape[1] <= 2:
@@ -242,9 +240,9 @@ def find_maximum(widths: Floats, coefficients: Floats) -> float:
     return max(maximum, float(np.max(evaluate_pieces(pieces[:, np.newaxis, :], extrema))))
 
 
-def find_peak_magnitude(widths: Floats, coefficients: Floats) -> float:
+def compute_peak_magnitude(widths: Floats, coefficients: Floats) -> float:
     """Return the largest absolute value over all pieces."""
-    return max(find_maximum(widths, coefficients), find_maximum(widths, -coefficients))
+    return max(compute_maximum(widths, coefficients), compute_maximum(widths, -coefficients))
 
 
 def sine_cosine_from_quarters(quarters: Floats, rest: Floats) -> tuple[Floats, Floats]:
@@ -263,33 +261,24 @@ def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Float
         if not np.all(np.isfinite(array)):
             raise MotionError("the {} of a motion must be finite numbers", name)
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
-        raise MotionError(
-            "a motion of n pieces requires n + 1 {} and {} of shape (n, degree + 1); got "
-            f"{ends.shape} and {rows.shape}",
-            "breakpoints",
-            "coefficients",
-            value=breakpoints,
-        )
+        message = "a motion of n pieces requires n + 1 {} and {} of shape (n, degree + 1); got "
+        shapes = f"{ends.shape} and {rows.shape}"
+        raise MotionError(message + shapes, "breakpoints", "coefficients", value=breakpoints)
     widths = np.diff(ends)
     if ends[0] != 0.0 or not np.all(widths > 0.0):
         raise MotionError("the {} of a motion must start at 0 and increase strictly", "breakpoints")
     if rows.shape[1] > HIGHEST_DEGREE + 1:
-        raise MotionError(
-            f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}: "
-            "split them into shorter ones of a lower degree"
-        )
+        message = f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}"
+        raise MotionError(f"{message}: split them into shorter ones of a lower degree")
     if not MIN_DURATION <= ends[-1] <= _MAX_DURATION:
-        raise MotionError(
-            f"a motion must last from {MIN_DURATION:g} to {_MAX_DURATION:g} s, not {ends[-1]:g} s: check its units"
-        )
+        message = f"a motion must last from {MIN_DURATION:g} to {_MAX_DURATION:g} s, not {ends[-1]:g} s"
+        raise MotionError(f"{message}: check its units")
     with np.errstate(over="ignore"):
         if not np.all(evaluate_pieces(np.abs(rows), widths) <= MAX_ACCELERATION):
             raise MotionError(TOO_STRONG)
         if not np.all(evaluate_pieces(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
-            raise MotionError(
-                f"a piece of a motion is too steep: it would exceed {MAX_ACCELERATION:g} m/s^2 within "
-                f"{MIN_DURATION:g} s; check units and times"
-            )
+            excess = f"it would exceed {MAX_ACCELERATION:g} m/s^2 within {MIN_DURATION:g} s"
+            raise MotionError(f"a piece of a motion is too steep: {excess}; check units and times")
     for array in (ends, rows):
         array.setflags(write=False)
     return ends, rows
@@ -302,7 +291,8 @@ def check_samples(acceleration: ArrayLike) -> Floats:
         raise MotionError(f"a motion requires at least two samples; got {len(values)}")
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad):
-        raise MotionError(f"every sample of a motion must be a finite number; got {values[bad[0]]} at sample {bad[0]}")
+        place = f"{values[bad[0]]} at sample {bad[0]}"
+        raise MotionError(f"every sample of a motion must be a finite number; got {place}")
     return values
 
 
@@ -318,11 +308,8 @@ def check_times(times: ArrayLike, count: int) -> Floats:
     """Return the times of this many samples, s."""
     values = _convert_array(times, "times", 1)
     if len(values) != count:
-        raise MotionError(
-            f"{{}} must contain one value for each of the {count} accelerations; got {len(values)}",
-            "times",
-            value=times,
-        )
+        message = f"{{}} must contain one value for each of the {count} accelerations; got {len(values)}"
+        raise MotionError(message, "times", value=times)
     if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
         raise MotionError("the {} of a motion must be finite and increase strictly", "times")
     return values
@@ -331,8 +318,8 @@ def check_times(times: ArrayLike, count: int) -> Floats:
 def _convert_array(values: ArrayLike, name: str, dimensions: int, hint: str = "") -> Floats:
     array = np.array(checks.numbers(values, f"{name} of a motion", MotionError), order="C")
     if array.ndim != dimensions:
-        sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
-        raise MotionError(sentence, name, value=values)
+        message = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
+        raise MotionError(message, name, value=values)
     return array
 
 

@@ -39,7 +39,7 @@ class ProcessedPieces(NamedTuple):
 _ProcessingStep = Callable[[Piecewise], ProcessedPieces]
 
 
-class Processable(MotionMeasures):
+class ProcessingMethods(MotionMeasures):
     """Methods of `Motion` that derive other motions."""
 
     name: str
@@ -86,50 +86,43 @@ class Processable(MotionMeasures):
         -----
         a(phi) = (a_1 sin(phi_2 - phi) + a_2 sin(phi - phi_1))/sin(phi_2 - phi_1), exactly, piece by piece.
         """
-        if not isinstance(other, Processable):
-            sentence = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
-            raise MotionError(sentence, "other", value=other)
-        first_azimuth, second_azimuth = _resolve_azimuths(self, other, recorded)
+        if not isinstance(other, ProcessingMethods):
+            message = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
+            raise MotionError(message, "other", value=other)
+        azimuths = _resolve_azimuths(self, other, recorded)
         if delay := compute_start_delay(self.description, other.description, self.dt):
             early, late = (self, other) if delay > 0.0 else (other, self)
             first, second = checks.short_repr(early.name), checks.short_repr(late.name)
-            raise MotionError(
-                f"according to their files, {second} begins {abs(delay):.6g} s after {first}; remove the start of the "
-                f"latter with processed(trim=({abs(delay):.6g}, {early.duration:.6g}))"
-            )
+            message = f"according to their files, {second} begins {abs(delay):.6g} s after {first}"
+            call = f"processed(trim=({abs(delay):.6g}, {early.duration:.6g}))"
+            raise MotionError(f"{message}; remove the start of the latter with {call}")
         target = checks.finite(azimuth, "azimuth", MotionError)
         if self.vertical is not None and other.vertical not in (None, self.vertical):
-            raise MotionError(
-                "the components have different vertical components; use with_vertical to add only one of them"
-            )
-        first_factor, second_factor = compute_rotation_factors((first_azimuth, second_azimuth), target)
-        breakpoints, (first_rows, second_rows) = piecewise.align_pieces(self, other)
+            message = "the components have different vertical components; use with_vertical to add only one of them"
+            raise MotionError(message)
+        factors = compute_rotation_factors(azimuths, target)
+        breakpoints, rows = piecewise.align_pieces(self, other)
         fields: dict[str, Any] = {"channel": f"{target:g} deg", "number": None, "azimuth": target, "reversed": False}
         origin = replace(self.description.origin or Origin(), **fields)
-        text = (
-            f"at {target:g} deg, from {first_azimuth:g} deg: {self._describe_origin()}; "
-            f"and {second_azimuth:g} deg: {other._describe_origin()}"
-        )
+        first, second = (f"{azimuths[k]:g} deg: {part._describe_origin()}" for k, part in enumerate((self, other)))
+        text = f"at {target:g} deg, from {first}; and {second}"
         return self._derive(
             "rotated",
             f"with {other.name} rotated to {target:g} deg",
             breakpoints=breakpoints,
-            coefficients=first_factor * first_rows + second_factor * second_rows,
+            coefficients=factors[0] * rows[0] + factors[1] * rows[1],
             description=replace(self.description.changed("rotated"), parameters={}, text=text, origin=origin),
-            error=abs(first_factor) * self.error + abs(second_factor) * other.error,
+            error=abs(factors[0]) * self.error + abs(factors[1]) * other.error,
             vertical=self.vertical or other.vertical,
         )
 
     def delayed(self, delay: float) -> Self:
         """Return the motion after a time of zero acceleration, s. ``processed(trim=...)`` removes an early part."""
         wait = checks.positive(delay, "delay", MotionError, "s")
-        return self._derive(
-            "delayed",
-            f"delayed by {wait:.6g} s",
-            breakpoints=np.concatenate([[0.0], self.breakpoints + wait]),
-            coefficients=np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients]),
-            vertical=None if self.vertical is None else self.vertical.delayed(wait),
-        )
+        rows = np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients])
+        pieces = {"breakpoints": np.append(0.0, self.breakpoints + wait), "coefficients": rows}
+        vertical = None if self.vertical is None else self.vertical.delayed(wait)
+        return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, vertical=vertical)
 
     def floor(self, period: float, damping: float = DAMPING, *, ringing: float | None = None) -> Self:
         """Return the motion of a floor: the absolute acceleration of a linear oscillator under the motion.
@@ -252,11 +245,9 @@ def _find_window(motion: Piecewise, start: float, end: float) -> tuple[float, fl
     last = checks.finite(end, "end of the part to keep", MotionError)
     duration = float(motion.breakpoints[-1])
     if not 0.0 <= first < last <= duration * (1.0 + 1e-12):
-        raise MotionError(
-            f"{{}} requires 0 <= start < end <= {duration:.6g} s, the duration; got {first:.6g} and {last:.6g}",
-            "trim",
-            value=(start, end),
-        )
+        requirement = f"0 <= start < end <= {duration:.6g} s, the duration"
+        message = f"{{}} requires {requirement}; got {first:.6g} and {last:.6g}"
+        raise MotionError(message, "trim", value=(start, end))
     step = piecewise.find_even_step(motion)
     if step is None:
         return first, min(last, duration)
@@ -275,13 +266,11 @@ def _trim(motion: Piecewise, start: float, end: float, fine_step: float | None =
             if first is not None and last is not None and subdivisions:
                 sample, subdivision = np.divmod(np.arange(first, last), subdivisions)
                 coefficients = piecewise.shift_origin(motion.coefficients[sample], subdivision * new_step)
-                return ProcessedPieces(piecewise.make_even_times(last - first + 1, new_step), coefficients, entry)
-    breakpoints = motion.breakpoints
+                return ProcessedPieces(piecewise.create_even_times(last - first + 1, new_step), coefficients, entry)
+    breakpoints, rows = motion.breakpoints, motion.coefficients
     inner_breakpoints = breakpoints[(breakpoints > start) & (breakpoints < end)]
     new_breakpoints = np.concatenate([[start], inner_breakpoints, [end]])
-    coefficients = piecewise.refine_pieces(
-        breakpoints, motion.coefficients, new_breakpoints, motion.coefficients.shape[1]
-    )
+    coefficients = piecewise.refine_pieces(breakpoints, rows, new_breakpoints, rows.shape[1])
     return ProcessedPieces(new_breakpoints - start, coefficients, entry)
 
 
@@ -305,20 +294,14 @@ def _apply_band_pass(motion: Piecewise, low: float | None, high: float | None, o
 
     step = _require_even_step(motion, "band_pass")
     nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
-    corners = [
-        checks.positive(corner, "corner frequency", MotionError, "Hz") for corner in (low, high) if corner is not None
-    ]
+    given = [corner for corner in (low, high) if corner is not None]
+    corners = [checks.positive(corner, "corner frequency", MotionError, "Hz") for corner in given]
     if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
-        sentence = (
-            f"{{}} must be (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one may be None"
-        )
-        raise MotionError(sentence, "band_pass", value=(low, high))
+        message = f"{{}} must be (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one may be None"
+        raise MotionError(message, "band_pass", value=(low, high))
     if corners[0] * duration < 0.1:
-        sentence = (
-            f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s; use at least"
-        )
-        sentence += f" {0.1 / duration:.6g} Hz"
-        raise MotionError(sentence, value=(low, high))
+        message = f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s"
+        raise MotionError(f"{message}; use at least {0.1 / duration:.6g} Hz", value=(low, high))
     order = checks.integer(order, "order of a filter", MotionError, 1, 12)
     kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     frequencies = corners if kind == "bandpass" else corners[0]
@@ -336,8 +319,8 @@ def _resample(motion: Piecewise, step: float) -> ProcessedPieces:
     duration = float(motion.breakpoints[-1])
     count = math.floor(duration / new_dt * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MAX_SAMPLES:
-        sentence = f"a step of {new_dt:.6g} s gives {count} samples of a motion of {duration:.6g} s; use a step that"
-        raise MotionError(f"{sentence} gives 2 to {_MAX_SAMPLES}", value=step)
+        message = f"a step of {new_dt:.6g} s gives {count} samples of a motion of {duration:.6g} s; use a step that"
+        raise MotionError(f"{message} gives 2 to {_MAX_SAMPLES}", value=step)
     times = np.minimum(new_dt * np.arange(count), duration)
     samples = piecewise.evaluate_at(motion.breakpoints, motion.coefficients, times)
     return _join_samples(samples, new_dt, f"resampled to a step of {new_dt:.6g} s")
@@ -348,14 +331,13 @@ def _require_even_step(motion: Piecewise, argument: str) -> float:
     if step is None:
         raise MotionError("{} requires samples at even steps; call processed(resample=...) first", argument)
     if piecewise.has_jumps(motion):
-        raise MotionError(
-            "{} requires a motion that is linear between samples; call processed(resample=...) first", argument
-        )
+        message = "{} requires a motion that is linear between samples; call processed(resample=...) first"
+        raise MotionError(message, argument)
     return step
 
 
 def _join_samples(samples: Floats, step: float, history_entry: str) -> ProcessedPieces:
-    times = piecewise.make_even_times(len(samples), step)
+    times = piecewise.create_even_times(len(samples), step)
     return ProcessedPieces(times, piecewise.join_linearly(times, samples), history_entry)
 
 
@@ -373,16 +355,14 @@ def _compute_floor_motion(
     if ringing is None and damping_ratio == 0.0:
         raise MotionError("the motion of a floor without {} does not decay; give {}, in s", "damping", "ringing")
     # By default a free oscillation continues until it has decayed to a thousandth.
-    tail = -math.log(1e-3) / (damping_ratio * rate) if ringing is None else ringing
-    tail = tail if ringing is None else checks.between(ringing, "ringing", MotionError, 0.0, 1e15, "s")
+    if ringing is None:
+        tail = -math.log(1e-3) / (damping_ratio * rate)
+    else:
+        tail = checks.between(ringing, "ringing", MotionError, 0.0, 1e15, "s")
     step = _MAX_ANGLE / rate
     if not (end + tail) / step <= 1e6:
-        raise MotionError(
-            f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s; use a longer one, or "
-            "a shorter {}",
-            *("period", "ringing"),
-            value=period,
-        )
+        message = f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s"
+        raise MotionError(f"{message}; use a longer one, or a shorter {{}}", "period", "ringing", value=period)
     nodes = np.append(motion.breakpoints, end + tail) if tail > 0.0 else motion.breakpoints
     subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / step)).astype(np.int64)
     start, width = np.repeat(nodes[:-1], subdivisions), np.repeat(np.diff(nodes) / subdivisions, subdivisions)
@@ -392,10 +372,9 @@ def _compute_floor_motion(
     columns = max(motion.coefficients.shape[1], _SERIES_DEGREE + 1)
     forcing = piecewise.refine_pieces(motion.breakpoints, motion.coefficients, breakpoints, columns)
     series = _compute_oscillator_series(forcing, rate, damping_ratio, columns + 2)
-    end_states = np.stack(
-        [_evaluate_series(series, width), _evaluate_series(series[..., 1:] * np.arange(1, columns + 2), width)]
-    )
-    states = _propagate_states(end_states)
+    rates = series[..., 1:] * np.arange(1, columns + 2)
+    end_states = [piecewise.evaluate_pieces(s, np.broadcast_to(width, s.shape[:-1])) for s in (series, rates)]
+    states = _propagate_states(np.stack(end_states))
     solution = series[2] + np.einsum("jn,jnk->nk", states, series[:2])
     velocity = solution[:, 1:] * np.arange(1, columns + 2)
     acceleration = -(2.0 * damping_ratio * rate * velocity[:, :columns] + rate**2 * solution[:, :columns])
@@ -417,10 +396,6 @@ def _compute_oscillator_series(forcing: Floats, rate: float, damping_ratio: floa
     return series
 
 
-def _evaluate_series(series: Floats, x: Floats) -> Floats:
-    return piecewise.evaluate_pieces(series, np.broadcast_to(x, series.shape[:-1]))
-
-
 def _propagate_states(end_states: Floats) -> Floats:
     """Compute displacement and velocity at the start of every piece, shape (2, pieces)."""
     states = np.empty((2, end_states.shape[2]))
@@ -439,29 +414,25 @@ def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
     return sine + 0.0, cosine + 0.0  # avoids negative zeros
 
 
-def _resolve_azimuths(first_motion: Processable, second_motion: Processable, recorded: Any) -> tuple[float, float]:
+def _resolve_azimuths(
+    first_motion: ProcessingMethods, second_motion: ProcessingMethods, recorded: Any
+) -> tuple[float, float]:
     """Return the azimuths of two components, specified or from their records."""
     if recorded is None:
         recorded = [(motion.description.origin or Origin()).azimuth for motion in (first_motion, second_motion)]
         if None in recorded:
             name = checks.short_repr((first_motion, second_motion)[recorded.index(None)].name)
-            raise MotionError(
-                f"the azimuth of {name} is unknown; give {{}}=(first, second), "
-                "the directions of both components in degrees clockwise from north",
-                "recorded",
-            )
+            remedy = "give {}=(first, second), the directions of both components in degrees clockwise from north"
+            raise MotionError(f"the azimuth of {name} is unknown; {remedy}", "recorded")
     azimuths = checks.numbers(recorded, "recorded", MotionError)
     if azimuths.shape != (2,) or not np.all(np.isfinite(azimuths)):
-        raise MotionError(
-            "{} must be the azimuths of both components, two numbers in degrees", "recorded", value=recorded
-        )
+        message = "{} must be the azimuths of both components, two numbers in degrees"
+        raise MotionError(message, "recorded", value=recorded)
     first, second = azimuths.tolist()
     angle = abs((second - first + 90.0) % 180.0 - 90.0)
     if angle < 15.0:
-        raise MotionError(
-            f"the components have azimuths of {first:g} and {second:g} deg, along one line within {angle:g} deg; use "
-            "two perpendicular components"
-        )
+        message = f"the components have azimuths of {first:g} and {second:g} deg, along one line within {angle:g} deg"
+        raise MotionError(f"{message}; use two perpendicular components")
     return first, second
 
 

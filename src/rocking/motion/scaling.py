@@ -150,11 +150,8 @@ class Measure:
     @property
     def motion_measure(self) -> Measure:
         """Underlying measure of the motion alone."""
-        return (
-            self
-            if self.motion_measure_name == self.name
-            else Measure(self.motion_measure_name, self.period, self.damping)
-        )
+        name = self.motion_measure_name
+        return self if name == self.name else Measure(name, self.period, self.damping)
 
     def value(self, motion: MotionMeasures) -> float:
         """Return the measure of a motion alone, in SI units, or 1 if levels are factors."""
@@ -176,12 +173,12 @@ class Measure:
         """Whether the measure has a separate unit for each block."""
         return self.name in ("pga_ratio", "pgv_ratio")
 
-    def unit(self, lifting: Floats, p: Floats) -> Floats:
+    def unit(self, uplift_accelerations: Floats, p: Floats) -> Floats:
         """Return the unit for each block (m/s^2 or m/s) from its uplift acceleration and its p, shape (n,).
 
         The p of a block with two sides is the smaller one.
         """
-        return lifting if self.name == "pga_ratio" else lifting / p
+        return uplift_accelerations if self.name == "pga_ratio" else uplift_accelerations / p
 
     def options(self) -> dict[str, float]:
         """Return period (s) and damping of "sa", or nothing for other measures."""

@@ -2,8 +2,8 @@
 
 from rocking.core.result import Row
 from rocking.response.gradient import Gradient, gradient
-from rocking.response.perturbed import Perturbed, Repeat
+from rocking.response.perturbed import PerturbedSimulations, Repeat
 from rocking.response.response import Response
 from rocking.response.sensitivity import Sensitivity
 
-__all__ = ["Gradient", "Perturbed", "Repeat", "Response", "Row", "Sensitivity", "gradient"]
+__all__ = ["Gradient", "PerturbedSimulations", "Repeat", "Response", "Row", "Sensitivity", "gradient"]

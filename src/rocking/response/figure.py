@@ -28,8 +28,8 @@ from rocking.plot.canvas import (
     open_page,
 )
 from rocking.plot.curves import draw_ground
-from rocking.response.simulated import Simulated
-from rocking.response.summary import format_time
+from rocking.response.simulated import ResponseData
+from rocking.response.summary import describe_subject, format_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,13 +50,12 @@ _MAX_RATIO: Final = 2.0
 _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 
 
-def make_title(response: Simulated) -> str:
+def create_title(response: ResponseData) -> str:
     """Return the title of a figure: the body and its motion."""
-    motion_text = "no motion" if response.motion is None else response.motion.label
-    return escape_dollars(f"{response.block.description} under {motion_text}")
+    return escape_dollars(describe_subject(response))
 
 
-def find_active_span(response: Simulated) -> tuple[float, float]:
+def compute_active_span(response: ResponseData) -> tuple[float, float]:
     """Return the interval of all events, with margins, s."""
     times = np.concatenate([response.events["time"], response.impacts["time"]])
     if len(times) == 0:
@@ -66,21 +65,18 @@ def find_active_span(response: Simulated) -> tuple[float, float]:
     return max(0.0, first - margin), min(response.duration, float(times.max()) + margin)
 
 
-def resolve_window(response: Simulated, window: Sequence[float] | None) -> tuple[float, float]:
+def resolve_window(response: ResponseData, window: Sequence[float] | None) -> tuple[float, float]:
     """Return a valid window of a response, s, or its active span."""
     if window is None:
-        return find_active_span(response)
+        return compute_active_span(response)
     ends: Any = checks.numbers(window, "window", OptionError)
     if ends.shape != (2,) or not 0.0 <= ends[0] < ends[1] <= response.duration:
-        raise OptionError(
-            f"{{}} must be (start, end), in s, with 0 <= start < end <= {response.duration:.6g}, the duration",
-            "window",
-            value=window,
-        )
+        requirement = f"(start, end), in s, with 0 <= start < end <= {response.duration:.6g}, the duration"
+        raise OptionError(f"{{}} must be {requirement}", "window", value=window)
     return float(ends[0]), float(ends[1])
 
 
-def choose_times(response: Simulated, start: float, end: float) -> Floats:
+def choose_times(response: ResponseData, start: float, end: float) -> Floats:
     """Return times for a smooth line: even ones and visible steps."""
     even = np.linspace(start, end, _EVEN_TIMES)
     steps = _crop(response._history.trail.nodes["time"], start, end)
@@ -93,7 +89,7 @@ def _crop(times: Floats, start: float, end: float) -> Floats:
 
 
 def draw_histories(
-    response: Simulated,
+    response: ResponseData,
     units: RotationUnits,
     window: Sequence[float] | None,
     *,
@@ -109,7 +105,7 @@ def draw_histories(
     span = resolve_window(response, window)
     time, coordinate = choose_times(response, *span), response.block.coordinate
     is_rotation = coordinate.unit == "rad"
-    plus, minus = balances = _find_balances(response)
+    plus, minus = balances = _choose_balances(response)
     if not is_rotation or (units == "slenderness" and any(map(math.isinf, balances))):
         units = "rad"
     factors = {"slenderness": (1.0 / plus, 1.0 / minus), "deg": (math.degrees(1.0),) * 2, "rad": (1.0, 1.0)}[units]
@@ -149,27 +145,25 @@ def draw_histories(
     return page.figure
 
 
-def _find_balances(response: Simulated) -> tuple[float, float]:
+def _choose_balances(response: ResponseData) -> tuple[float, float]:
     """Return the balance on each side, for a one-sided body the same value twice."""
     (pair,), _ = compute_thresholds(response.block.as_bodies(), response.model)
     return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
 
 
-def _compute_ground_traces(response: Simulated, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
+def _compute_ground_traces(response: ResponseData, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
     """Return times and ground accelerations, g, by label."""
     motion = response.motion
     if motion is None:
         return {}
     times = motion.drawing_times(start, end)
-    components = {"ground acceleration (g)": motion, "vertical (g)": motion.vertical}
-    return {
-        name: (times, component.acceleration(times) / STANDARD_GRAVITY)
-        for name, component in components.items()
-        if component is not None
-    }
+    traces = {"ground acceleration (g)": (times, motion.acceleration(times) / STANDARD_GRAVITY)}
+    if motion.vertical is not None:
+        traces["vertical (g)"] = (times, motion.vertical.acceleration(times) / STANDARD_GRAVITY)
+    return traces
 
 
-def _find_longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
+def _find_longest_sequence(response: ResponseData, start: float, end: float) -> np.void | None:
     """Return the sequence with the most impacts in the interval, if its time of rest is bracketed."""
     inside = response.sequences[(response.sequences["start"] >= start) & (response.sequences["end"] <= end)]
     longest: np.void | None = max(inside, key=lambda row: row["impacts"], default=None)
@@ -180,9 +174,8 @@ def _find_longest_sequence(response: Simulated, start: float, end: float) -> np.
 
 def _create_panels(page: Page, count: int, *, zoomed: bool) -> list[Axes]:
     """Return the panels of rotation and motion, above the panel of the chattering sequence."""
-    panels = page.create_panels(
-        ";".join("RGV"[:count] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:count]] + [1.0] * zoomed
-    )
+    heights = [*(1.3, 1.0, 0.7)[:count]] + [1.0] * zoomed
+    panels = page.create_panels(";".join("RGV"[:count] + "Z" * zoomed), height_ratios=heights)
     for axes in panels[1:count]:
         axes.sharex(panels[0])
     return panels[:count]
@@ -207,7 +200,7 @@ def _draw_rotation(axes: Axes, time: Floats, rotation: Floats, tipping_angles: F
         axes.axhline(level, label=label, **_BOUNDARY)
 
 
-def _mark_events(axes: Axes, response: Simulated, start: float, end: float) -> None:
+def _mark_events(axes: Axes, response: ResponseData, start: float, end: float) -> None:
     impacts, uplifts = (_crop(response.impacts["time"], start, end), find_event_times(response, start, end)["uplift"])
     if impacts.size:
         add_ticks(axes, impacts, 0.055, label=f"resolved impacts ({impacts.size})")
@@ -220,27 +213,24 @@ def _mark_overturning(axes: Axes, time: Floats, rotation: Floats, label: str) ->
     low, high = axes.get_ylim()
     inside = np.flatnonzero((rotation >= low) & (rotation <= high))
     end = inside[-1] if inside.size else -1
-    axes.plot(
-        time[end],
-        np.clip(rotation[end], low, high),
-        "X",
-        color=ABOVE,
-        markersize=7,
-        clip_on=False,
-        zorder=4,
-        label=label,
-    )
+    style: dict[str, Any] = {"color": ABOVE, "markersize": 7, "clip_on": False, "zorder": 4}
+    axes.plot(time[end], np.clip(rotation[end], low, high), "X", label=label, **style)
 
 
 def _label_sides(axes: Axes, factors: tuple[float, float]) -> None:
     """Label the sides, with the angle of 1 on each."""
-    for name, alignment, offset, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
+    for name, offset, factor in zip(("side +", "side −"), (2, -2), factors, strict=True):
         text = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
-        style = {"va": alignment, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
-        add_text(axes, text, (0.0, 0.0), (3, offset), **style)
+        _label_left_end(axes, text, 0.0, offset)
 
 
-def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
+def _label_left_end(axes: Axes, text: str, y: float, offset: float) -> None:
+    """Write a text at the left end of a horizontal line, above it for a positive offset, in points."""
+    alignment, transform = "bottom" if offset > 0.0 else "top", axes.get_yaxis_transform()
+    add_text(axes, text, (0.0, y), (3, offset), va=alignment, color=INK, fontsize="small", xycoords=transform)
+
+
+def _draw_thresholds(axes: Axes, response: ResponseData, time: Floats, acceleration: Floats) -> None:
     """Draw the uplift thresholds, which vary with the weight, and the motion beyond them."""
     (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
     lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
@@ -254,9 +244,8 @@ def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration
             axes.fill_between(time, acceleration, threshold, where=is_beyond, label="beyond a threshold", **fill_style)
         axes.plot(time, threshold, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
         if pair[0] != pair[1]:
-            text, alignment = ("lifts to side +", "bottom") if sign < 0.0 else ("lifts to side −", "top")
-            text_style = {"va": alignment, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
-            add_text(axes, text, (0.0, threshold[0]), (3, -2.0 * sign), **text_style)
+            text = "lifts to side +" if sign < 0.0 else "lifts to side −"
+            _label_left_end(axes, text, threshold[0], -2.0 * sign)
 
 
 def _format_time_label(start: float, end: float, duration: float) -> str:
@@ -264,21 +253,15 @@ def _format_time_label(start: float, end: float, duration: float) -> str:
     return "time (s)" if is_all else f"time (s); shown: {start:.4g}–{end:.4g} s of {duration:.4g} s"
 
 
-def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.void) -> None:
+def _draw_sequence(main: Axes, axes: Axes, response: ResponseData, sequence: np.void) -> None:
     """Draw a sequence impact by impact, and mark it in the histories."""
     times = _crop(response.impacts["time"], sequence["start"], sequence["end"])
     ranges = response.perturbed().event_ranges[response.events["time"] == sequence["end"]]
     low, high = ranges.T.max(axis=1, initial=0.0)
     first, last, transform = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
     main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=transform)
-    style: dict[str, Any] = {
-        "ha": "center",
-        "va": "bottom",
-        "color": ABOVE,
-        "fontweight": "bold",
-        "xycoords": transform,
-    }
-    add_text(main, "A", (0.5 * (first + last), 0.955), (0, 2), **style)
+    style: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold"}
+    add_text(main, "A", (0.5 * (first + last), 0.955), (0, 2), xycoords=transform, **style)
     rest, start, interval = 0.5 * (sequence["lower"] + sequence["upper"]), times[:-1], np.diff(times)
     # Logarithms are undefined for impacts closer than floating-point spacing.
     is_positive = (interval > 0.0) & (rest > start)
@@ -320,7 +303,7 @@ class Course(NamedTuple):
         return np.insert(values, self.impact_rows + 1, np.nan)
 
 
-def compute_course(response: Simulated, start: float, end: float) -> Course:
+def compute_course(response: ResponseData, start: float, end: float) -> Course:
     """Compute the course of a response between two times, s."""
     history, energy = response._history, response._energy
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]
@@ -336,24 +319,17 @@ def compute_course(response: Simulated, start: float, end: float) -> Course:
 
     side_left, side_entered = energy.find_sides(impacts)
     side = insert(history.trail.nodes["side"][rows], side_left, side_entered).astype(np.int64)
-    v_before, v_after = (
-        (2.0 * side_left - 1.0) * impacts["speed_before"],
-        (1.0 - 2.0 * side_entered) * impacts["speed_after"],
-    )
+    v_before = (2.0 * side_left - 1.0) * impacts["speed_before"]
+    v_after = (1.0 - 2.0 * side_entered) * impacts["speed_after"]
     rotation, velocity = (insert(theta, 0.0 * impact_times, 0.0 * impact_times), insert(rate, v_before, v_after))
     side_index = np.maximum(side, 0)
     unit = energy.unit_of_rotation[side_index]
-    return Course(
-        insert(times, impact_times, impact_times),
-        rotation / unit,
-        velocity / (energy.p[side_index] * unit),
-        energy.kinetic(velocity, side),
-        energy.potential(rotation, side),
-        positions + 2 * np.arange(len(positions)),
-    )
+    all_times, impact_rows = insert(times, impact_times, impact_times), positions + 2 * np.arange(len(positions))
+    energies = energy.kinetic(velocity, side), energy.potential(rotation, side)
+    return Course(all_times, rotation / unit, velocity / (energy.p[side_index] * unit), *energies, impact_rows)
 
 
-def compute_boundary(response: Simulated) -> tuple[Floats, Floats]:
+def compute_boundary(response: ResponseData) -> tuple[Floats, Floats]:
     """Return rotations and velocities, in units of a `Course`, with the energy of the balance."""
     energy, gap = response._energy, np.array([np.nan])
     x: list[Floats] = []
@@ -368,14 +344,16 @@ def compute_boundary(response: Simulated) -> tuple[Floats, Floats]:
     return np.concatenate(x), np.concatenate(y)
 
 
-def find_event_times(response: Simulated, start: float, end: float) -> dict[str, Floats]:
+def find_event_times(response: ResponseData, start: float, end: float) -> dict[str, Floats]:
     """Return the times of uplift and rest within an interval, s."""
     events = response.events
     inside = (events["time"] >= start) & (events["time"] <= end)
     return {kind: np.asarray(events["time"][inside & (events["kind"] == kind)], float) for kind in ("uplift", "rest")}
 
 
-def draw_phase_plane(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
+def draw_phase_plane(
+    response: ResponseData, window: Sequence[float] | None, **options: Unpack[FigureOptions]
+) -> Figure:
     """Draw normalised velocity against normalised rotation in a window, in units of a `Course`."""
     span = resolve_window(response, window)
     course = compute_course(response, *span)
@@ -400,7 +378,7 @@ def draw_phase_plane(response: Simulated, window: Sequence[float] | None, **opti
     return page.figure
 
 
-def draw_energies(response: Simulated, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
+def draw_energies(response: ResponseData, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw kinetic, potential and total energy, divided by the overturning energy, in a window."""
     course = compute_course(response, *resolve_window(response, window))
     time, total = course.time, course.kinetic + course.potential

@@ -32,14 +32,12 @@ _AT_STOP: Final = "the body reaches its second stop, so its peak does not depend
 _UNFINISHED: Final = "the simulation was not finished, so its derivatives are unknown"
 _FROM_REST: Final = "the response starts on the ground, where derivatives differ between the two sides"
 _REASONS: Final = {
-    AdjointEnd.GRAZES: (
-        "the block touches the ground without speed, so a slightly weaker motion causes no contact or an impact"
-    ),
+    AdjointEnd.GRAZES:
+        "the block touches the ground without speed, so a slightly weaker motion causes no contact or an impact",
     AdjointEnd.LEAVES_AT_ONCE: "the block leaves the ground at the instant at which it comes to rest",
-    AdjointEnd.TOUCHES_THRESHOLD: (
-        "the motion touches the uplift threshold, so a slightly weaker motion causes no uplift"
-    ),
-}
+    AdjointEnd.TOUCHES_THRESHOLD:
+        "the motion touches the uplift threshold, so a slightly weaker motion causes no uplift",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,17 +116,17 @@ class Gradient:
         return f"<Gradient: {'; '.join(filter(None, [text, self.reason]))}>"
 
 
-def gradient(response: Response, of: Quantity = "peak", at: float | None = None) -> Gradient:
+def gradient(response: Response, quantity: Quantity = "peak", time_or_index: float | None = None) -> Gradient:
     """Differentiate a result of a response by the samples of its motion and by the initial state.
 
     Parameters
     ----------
     response : Response
         Result of `simulate`, for a block or another body.
-    of : {"peak", "rotation", "velocity", "event", "impact"}
+    quantity : {"peak", "rotation", "velocity", "event", "impact"}
         Differentiated quantity: the peak rotation (rad), the rotation (rad) or the angular velocity (rad/s) at a time,
         or the time (s) of an impact or an event (uplift, rest or overturning).
-    at : float or int, optional
+    time_or_index : float or int, optional
         Time, s, of a rotation or velocity (at an impact, just after it), or index of an event or impact in `events` or
         `impacts` (-1 is the last). Not used for a peak.
 
@@ -140,8 +138,8 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     Raises
     ------
     OptionError
-        If the response is not a `Response`, the quantity does not exist, or `at` is missing, superfluous or out of
-        range.
+        If the response is not a `Response`, the quantity does not exist, or `time_or_index` is missing, superfluous or
+        out of range.
 
     See Also
     --------
@@ -165,34 +163,25 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     """
     if not isinstance(response, Response):
         raise OptionError("{} must be a Response, as rocking.simulate returns", "response", value=response)
-    checks.choice(of, "of", OptionError, get_args(Quantity))
-    if of == "peak":
-        target = _target_peak(response, at)
-    elif of in ("rotation", "velocity"):
-        target = _target_state(response, of, at)
+    checks.choice(quantity, "quantity", OptionError, get_args(Quantity))
+    if quantity == "peak":
+        target = _target_peak(response, time_or_index)
+    elif quantity in ("rotation", "velocity"):
+        target = _target_state(response, quantity, time_or_index)
     else:
-        target = _target_time(response, of, at)
+        target = _target_time(response, quantity, time_or_index)
     trail = response.solution.trail
     derivatives = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
-    change = np.zeros(3)
+    by_state = np.zeros(3)
     reason = _UNFINISHED if response.unfinished else target.reason
     if response.rounding_decisions and not reason and _has_ties_before(trail, target.instant):
         reason = _REASONS[AdjointEnd.GRAZES]
-    reason = reason or _apply_adjoint(target, change, derivatives)
+    reason = reason or _apply_adjoint(target, by_state, derivatives)
     if reason and reason != _FROM_REST:
-        change[:] = math.nan
-        derivatives[:] = math.nan
+        by_state[:] = derivatives[:] = math.nan
     horizontal, vertical = _split_components(response.motion, trail, response.block.gravity, derivatives)
-    sign = _find_sign(int(trail.nodes["side"][0]))
-    return Gradient(
-        value=target.value,
-        coefficients=horizontal,
-        vertical=vertical,
-        initial_rotation=float(sign * change[0]),
-        initial_velocity=float(sign * change[1]),
-        reason=reason,
-        motion=response.motion,
-    )
+    by_rotation, by_velocity = (_choose_sign(trail, 0) * by_state[:2]).tolist()
+    return Gradient(target.value, horizontal, vertical, by_rotation, by_velocity, reason, response.motion)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,50 +202,42 @@ class _Target:
     is_height: bool = False
 
 
-def _target_peak(response: Response, at: float | None) -> _Target:
-    if at is not None:
-        raise OptionError('{} does not apply to a "peak"', "at", value=at)
+def _target_peak(response: Response, time_or_index: float | None) -> _Target:
+    if time_or_index is not None:
+        raise OptionError('{} does not apply to a "peak"', "time_or_index", value=time_or_index)
     trail, value, instant = response.solution.trail, response.peak_rotation, response.peak_time
-    reason = ""
-    if response.overturned:
-        reason = _OVERTURNS
-    elif response._reaches_second_stop:
-        reason = _AT_STOP
+    reason = _OVERTURNS if response.overturned else _AT_STOP if response._reaches_second_stop else ""
     row = max(0, int(np.searchsorted(trail.nodes["time"], instant)) - 1)
     since = instant - float(trail.nodes["time"][row])
     return _Target(value, instant, trail, row, since, (1.0, 0.0), reason, is_height=True)
 
 
-def _target_state(response: Response, of: Quantity, at: float | None) -> _Target:
+def _target_state(response: Response, quantity: Quantity, instant: float | None) -> _Target:
     """Create the target for the rotation or velocity at a time."""
-    if at is None:
-        raise OptionError(f"a {of} requires {{}}, the time in s", "at")
-    time = checks.between(at, "at", OptionError, 0.0, response.duration, "s")
-    trail, history = response.solution.trail, response._history
-    motion_state = history.states(time)
+    if instant is None:
+        raise OptionError(f"a {quantity} requires {{}}, the time in s", "time_or_index")
+    time = checks.between(instant, "time_or_index", OptionError, 0.0, response.duration, "s")
+    column = int(quantity == "velocity")
+    trail, motion_state = response.solution.trail, response._history.states(time)
     row = int(np.searchsorted(trail.nodes["time"], time, side="right")) - 1
     nodes = state.expose_fields(np.concatenate([trail.nodes[: row + 1], _find_later_nodes(response, row, time)]))
-    row = len(nodes) - 1
-    sign = _find_sign(int(nodes["side"][row])) if np.any(motion_state) or time == 0.0 else 0.0
-    by_state = (sign, 0.0) if of == "rotation" else (0.0, sign)
+    trail, row = trail._replace(nodes=nodes), len(nodes) - 1
+    sign = _choose_sign(trail, row) if np.any(motion_state) or time == 0.0 else 0.0
     since = max(0.0, time - float(nodes["time"][row]))
-    value = float(motion_state[0 if of == "rotation" else 1])
-    return _Target(value, time, trail._replace(nodes=nodes), row, since, by_state)
+    return _Target(float(motion_state[column]), time, trail, row, since, (0.0, sign) if column else (sign, 0.0))
 
 
-def _target_time(response: Response, of: Quantity, at: float | None) -> _Target:
+def _target_time(response: Response, quantity: Quantity, index: float | None) -> _Target:
     """Create the target for the time of an event or impact."""
-    trail, rows = response.solution.trail, response.events if of == "event" else response.impacts
-    if not len(rows):
-        raise OptionError(f"the response has no {of}; choose another quantity {{}}", "of", value=of)
-    k = checks.integer(at, "at", OptionError, -len(rows), len(rows) - 1)
-    nodes = trail.nodes
-    row = int(
-        (find_event_steps(nodes, overturns=response.overturned) if of == "event" else find_impact_steps(nodes))[k]
-    )
+    trail, is_event = response.solution.trail, quantity == "event"
+    nodes, results = trail.nodes, response.events if is_event else response.impacts
+    if not len(results):
+        raise OptionError(f"the response has no {quantity}; choose another {{}}", "quantity", value=quantity)
+    k = checks.integer(index, "time_or_index", OptionError, -len(results), len(results) - 1)
+    rows = find_event_steps(nodes, overturns=response.overturned) if is_event else find_impact_steps(nodes)
+    row, instant = int(rows[k]), float(results["time"][k])
     if row > 0 and nodes["side"][row + 1] < 0 and nodes["time"][row + 1] == nodes["time"][row]:
         row -= 1  # a rest at the instant of the impact
-    instant = float(rows["time"][k])
     since = math.inf if nodes["side"][row] >= 0 and nodes["side"][row + 1] >= 0 else 0.0
     if nodes["side"][row] >= 0 and nodes["side"][row + 1] < 0:
         later = _find_later_nodes(response, row, instant - _REST_MARGIN)
@@ -275,45 +256,42 @@ def _find_later_nodes(response: Response, row: int, until: float) -> Records:
 
 def _has_ties_before(trail: Trail, instant: float) -> bool:
     """Return whether rounding determined a touch up to an instant, by integrating again."""
-    rules, start = trail.settings.copy(), state.state_at_node(trail.nodes[0])
-    rules["stop"], rules["no_end_time"], rules["record"] = math.nextafter(instant, math.inf), False, False
-    march(trail.ground, copy_trail(trail).block, rules, state.new_table(0), state.new_scratch(), start)
+    settings, start = trail.settings.copy(), state.state_at_node(trail.nodes[0])
+    settings["stop"], settings["no_end_time"], settings["record"] = math.nextafter(instant, math.inf), False, False
+    march(trail.ground, copy_trail(trail).block, settings, state.new_table(0), state.new_scratch(), start)
     return bool(start["rounding_decisions"] > 0)
 
 
-def _apply_adjoint(target: _Target, change: Floats, derivatives: Floats) -> str:
+def _apply_adjoint(target: _Target, by_state: Floats, derivatives: Floats) -> str:
     """Write derivatives by the initial state and by pieces of the motion; return the reason if there are none."""
     nodes, scratch = target.trail.nodes, state.new_scratch()
     starts_at_rest, start_time = int(nodes["side"][0]) < 0, float(nodes["time"][0])
     ending = AdjointEnd.START
     if target.by_state is None:
-        ending = AdjointEnd(adjoint_of_final_state(copy_trail(target.trail), scratch, target.row, change, derivatives))
+        trail = copy_trail(target.trail)
+        ending = AdjointEnd(adjoint_of_final_state(trail, scratch, target.row, by_state, derivatives))
     else:
-        change[:2] = target.by_state
-        if not np.any(change) or (target.instant == start_time and not target.is_height):
+        by_state[:2] = target.by_state
+        if not np.any(by_state) or (target.instant == start_time and not target.is_height):
             return ""  # at rest, or the initial state itself
+    if ending not in _REASONS and target.instant > start_time:
+        trail, variation = copy_trail(target.trail), state.new_record(state.VARIATION)
+        ending = AdjointEnd(adjoint(trail, scratch, variation, target.row, target.since, by_state, derivatives))
+        is_waiting = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > start_time)
+        if ending not in _REASONS and (ending == AdjointEnd.REST or is_waiting):
+            return ""  # a new rest before any uplift removes all dependence
+        if not starts_at_rest and nodes["u"][0] == 0.0:
+            by_state[0] = math.nan
     if ending in _REASONS:
         return _REASONS[ending]
-    if target.instant > start_time:
-        variation = state.new_record(state.VARIATION)
-        ending = AdjointEnd(
-            adjoint(copy_trail(target.trail), scratch, variation, target.row, target.since, change, derivatives)
-        )
-        if ending in _REASONS:
-            return _REASONS[ending]
-        is_waiting = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > start_time)
-        if ending == AdjointEnd.REST or is_waiting:
-            return ""  # a new rest before any uplift removes all dependence
-        if not starts_at_rest:
-            change[0] = math.nan if nodes["u"][0] == 0.0 else change[0]
     if starts_at_rest:
-        change[:2] = math.nan
-    return _FROM_REST if np.any(np.isnan(change)) else ""
+        by_state[:2] = math.nan
+    return _FROM_REST if np.any(np.isnan(by_state)) else ""
 
 
-def _find_sign(side: int) -> float:
-    """Return the sign of a coordinate in the frame of a side, or at rest."""
-    return -1.0 if side == 1 else 1.0
+def _choose_sign(trail: Trail, row: int) -> float:
+    """Return the sign of a coordinate in the frame of the side at a node, or at rest."""
+    return -1.0 if int(trail.nodes["side"][row]) == 1 else 1.0
 
 
 def _split_components(
@@ -348,7 +326,4 @@ def _convert_to_samples(motion: Motion | None, values: Floats) -> Floats:
     if motion is None or values.shape[1] != 2 or piecewise.has_jumps(motion):
         raise OptionError("the motion is not linear between samples; use the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)
-    derivatives = np.zeros(len(values) + 1)
-    derivatives[:-1] = values[:, 0] - rates
-    derivatives[1:] += rates
-    return derivatives
+    return np.asarray(np.append(values[:, 0] - rates, 0.0) + np.append(0.0, rates))

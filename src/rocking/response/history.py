@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.core.bisection import bisect, find_middles, halve
+from rocking.core.bisection import bisect, compute_midpoints, halve
 from rocking.core.tables import format_count
 from rocking.errors import OptionError
 from rocking.kernels import state
@@ -98,7 +98,7 @@ class TimeHistory:
         ends = np.append(nodes["time"][1:], self.end)
         return np.column_stack([nodes["time"][rows], ends[rows]])
 
-    def find_tipping_time(self, balances: tuple[float, float]) -> float:
+    def compute_tipping_time(self, balances: tuple[float, float]) -> float:
         """Return the last time, s, at which a body passes its unstable balance outwards; NaN if it ends within it.
 
         ``balances``: coordinates of the balance on side + and side -.
@@ -133,7 +133,7 @@ class TimeHistory:
         step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
         low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
         for _ in range(_BISECTIONS if len(step) else 0):
-            is_outward = sign * self.states_in(find_middles(low, high), rows)[:, 1] > 0.0
+            is_outward = sign * self.states_in(compute_midpoints(low, high), rows)[:, 1] > 0.0
             low, high = halve(low, high, is_outward, ~is_outward)
         np.maximum.at(peaks, step, np.abs(self.states_in(low, rows)[:, 0]))
         plus, minus = (float(np.max(peaks[side == k], initial=0.0)) for k in range(2))
@@ -160,7 +160,7 @@ def find_impact_steps(nodes: Records) -> Integers:
     return np.flatnonzero(onto_ground & ((side[1:] != side[:-1]) | (nodes["v"][1:] > 0.0) | rests))
 
 
-def add_all_impacts(trail: Trail, *, cut: bool) -> Trail:
+def add_all_impacts(trail: Trail, *, ends_in_sequence: bool) -> Trail:
     """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
 
     ``cut``: whether the response ends within a sequence after its proof. Later impacts still exert forces, and are
@@ -168,25 +168,25 @@ def add_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     """
     nodes = trail.nodes
     # No rest follows the last impact if the duration ends within a sequence after its proof.
-    rests = np.append(nodes["side"][1:] < 0, cut)
+    rests = np.append(nodes["side"][1:] < 0, ends_in_sequence)
     last_impacts = np.flatnonzero(rests & (nodes["side"] >= 0) & (nodes["u"] == 0.0))
     min_speeds = _MIN_SPEED * np.sqrt(np.abs(trail.block["stiffness"]))
     last_impacts = last_impacts[nodes["v"][last_impacts] > min_speeds[nodes["side"][last_impacts]]]
     if not len(last_impacts):
         return trail
-    body, rules, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
-    rules["rest_rule"], rules["no_end_time"], rules["record"] = state.RestRule.VELOCITY, False, True
+    body, settings, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
+    settings["rest_rule"], settings["no_end_time"], settings["record"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
     parts, next_row, plastic = [], 0, compute_plastic_elongations(trail)
     for row in last_impacts:
         start = state.state_at_node(nodes[row], plastic[row], _MAX_IMPACTS)
         body["rest_limit"] = np.maximum(min_speeds, _MIN_SPEED_RATIO * start["v"])
         start["peak"] = math.inf  # the peak is not needed, and weight is positive at a proven rest
-        rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
-        while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
+        settings["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
+        while march(trail.ground, body, settings, table, scratch, start) == state.Ending.FULL:
             table = state.enlarge_table(table)
         later = table["node"][1 : start["nodes"]]
-        parts += [nodes[next_row : row + 1], later[(later["side"] >= 0) & (later["time"] < rules["stop"])]]
+        parts += [nodes[next_row : row + 1], later[(later["side"] >= 0) & (later["time"] < settings["stop"])]]
         next_row = row + 1
     return trail._replace(nodes=state.expose_fields(np.concatenate([*parts, nodes[next_row:]])))
 

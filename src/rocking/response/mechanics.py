@@ -41,8 +41,8 @@ def check_friction(value: object) -> float:
     """Return a coefficient of friction, or raise `OptionError` if it is not in (0, 3]."""
     coefficient = checks.positive(value, "friction", OptionError)
     if coefficient > _MAX_FRICTION:
-        text = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}; use the tangent of an angle of friction"
-        raise OptionError(text, "friction", value=value)
+        message = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}"
+        raise OptionError(f"{message}; use the tangent of an angle of friction", "friction", value=value)
     return coefficient
 
 
@@ -89,12 +89,11 @@ class Contact:
         horizontal[outside] = vertical[outside] = np.nan
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
-    def find_extremes(self) -> tuple[float, float]:
+    def compute_extremes(self) -> tuple[float, float]:
         """Return the largest friction required to stick, and the smallest normal force."""
         times, rows = self._sample_steps()
-        horizontal, vertical = (
-            force.reshape(times.shape) for force in self._compute_forces_in(times.ravel(), rows.ravel())
-        )
+        forces = self._compute_forces_in(times.ravel(), rows.ravel())
+        horizontal, vertical = (force.reshape(times.shape) for force in forces)
         friction, min_normal = float(compute_friction_demand(horizontal, vertical).max()), float(vertical.min())
 
         def refine_maximum(measure: ForceMeasure, beyond: Floats) -> float:
@@ -138,10 +137,8 @@ class Contact:
             values = self._evaluate(measure, times, rows)
             index = values.argmax(axis=1)[:, None]
             value, time_at_max = (np.take_along_axis(array, index, axis=1)[:, 0] for array in (values, times))
-            best_times, best_values = (
-                np.where(value > best_values, time_at_max, best_times),
-                np.maximum(value, best_values),
-            )
+            best_times = np.where(value > best_values, time_at_max, best_times)
+            best_values = np.maximum(value, best_values)
             low = np.take_along_axis(times, np.maximum(index - 1, 0), axis=1)
             high = np.take_along_axis(times, np.minimum(index + 1, times.shape[1] - 1), axis=1)
             times = low + (high - low) * np.linspace(0.0, 1.0, times.shape[1])
@@ -155,8 +152,8 @@ class Contact:
         theta, rate, acceleration = self.history.states_in(times, rows).T
         side = self.history.trail.nodes["side"][rows]
         ground = self._evaluate_ground(times, rows, side < 0)
-        stretch = compute_elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
-        return self.law((theta, rate, acceleration), ground, side, stretch)
+        elongation = compute_elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
+        return self.law((theta, rate, acceleration), ground, side, elongation)
 
     def _evaluate_ground(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
         """Return both ground accelerations in g, from the piece at the start of a step or, at rest, any piece."""
@@ -164,9 +161,8 @@ class Contact:
         current = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
         piece = np.where(at_rest, current, self.history.trail.nodes["piece"][rows])
         elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
-        push, *lift = (
-            piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in component_coefficients(ground, piece)
-        )
+        components = component_coefficients(ground, piece)
+        push, *lift = (piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in components)
         return push, lift[0] if lift else np.zeros_like(push)
 
     def _sample_steps(self) -> tuple[Floats, Integers]:
@@ -222,7 +218,7 @@ class Energy:
     @cached_property
     def balance(self) -> Floats:
         """Rotation of the unstable balance on each side in this model, rad; infinite if there is none."""
-        return np.array(self.body.balance) if self.nonlinear else find_linear_balance(self.body)
+        return np.array(self.body.balance) if self.nonlinear else compute_linear_balance(self.body)
 
     @cached_property
     def has_balances(self) -> bool:
@@ -237,10 +233,8 @@ class Energy:
     @cached_property
     def balance_energy(self) -> Floats:
         """Potential energy at the balance of each side, divided by inertia, 1/s^2; infinite if there is none."""
-        energies = np.full(2, math.inf)
-        for k, balance in enumerate(self.balance):
-            if math.isfinite(balance):
-                energies[k] = float(self._potential(np.array([balance]), np.array([k]))[0])
+        energies, finite = np.full(2, math.inf), np.flatnonzero(np.isfinite(self.balance))
+        energies[finite] = self._potential(self.balance[finite], finite)
         return energies
 
     @cached_property
@@ -300,7 +294,7 @@ class Energy:
         return self.kinetic(impacts["speed_before"], left) - self.kinetic(impacts["speed_after"], entered)
 
 
-def find_linear_balance(body: Block | RestrainedBlock) -> Floats:
+def compute_linear_balance(body: Block | RestrainedBlock) -> Floats:
     """Return the rotation of the unstable balance on each side in the linear model, rad; infinite if there is none.
 
     For a yielding tendon the first yield is considered, with the smaller of elastic force and strength, so the nearer
@@ -310,9 +304,8 @@ def find_linear_balance(body: Block | RestrainedBlock) -> Floats:
     elastic = _solve_linear_balance(record, record["added_weight"], record["added_push"], record["prestress"])
     if not record["yielding"]:
         return elastic
-    force = record["base_prestress"] + record["tendon_stiffness"] * (
-        record["yield_elongation"] - record["slack_elongation"]
-    )
+    elongation = record["yield_elongation"] - record["slack_elongation"]
+    force = record["base_prestress"] + record["tendon_stiffness"] * elongation
     return np.minimum(elastic, _solve_linear_balance(record, record["base_weight"], record["base_push"], force))
 
 
@@ -325,7 +318,7 @@ def _solve_linear_balance(record: Record, added_weight: Floats, added_push: Floa
     return balance
 
 
-def build_energy(body: Body, record: Record, *, nonlinear: bool) -> Energy:
+def create_energy(body: Body, record: Record, *, nonlinear: bool) -> Energy:
     """Return the energy of a block; raise `OptionError` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
         raise OptionError(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")

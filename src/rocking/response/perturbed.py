@@ -17,12 +17,12 @@ from rocking.core.tables import Column, columns_to_records, format_columns
 from rocking.errors import OptionError
 
 #: Relative step and number of factors in summaries and tables.
-RELATIVE: Final = 1e-6
-COUNT: Final = 5
+RELATIVE_STEP: Final = 1e-6
+FACTOR_COUNT: Final = 5
 
 #: Relative precision of a ground motion, and number of factors within it, in summaries and tables.
-PRECISION: Final = 1e-3
-_N_WITHIN_PRECISION: Final = 11
+MOTION_PRECISION: Final = 1e-3
+_PRECISION_FACTOR_COUNT: Final = 11
 
 #: Outcomes. A block that does not move also stands.
 OVERTURNS: Final = "overturns"
@@ -35,7 +35,7 @@ class Repeat(NamedTuple):
 
     See Also
     --------
-    rocking.response.Perturbed : Collect repeated simulations.
+    rocking.response.PerturbedSimulations : Collect repeated simulations.
     rocking.Response.perturbed : Repeat a simulation.
 
     Examples
@@ -58,7 +58,7 @@ class Repeat(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Perturbed(Result):
+class PerturbedSimulations(Result):
     """Repeated simulations with the motion or the initial state scaled, from `Response.perturbed`.
 
     The table "repeats" has a row for each factor.
@@ -124,17 +124,17 @@ class Perturbed(Result):
     @property
     def peak_range(self) -> tuple[float, float]:
         """Smallest and largest peak among the simulations with the outcome of factor 1, rad."""
-        return _find_range([repeat.peak for repeat in self.agreeing_repeats])
+        return _compute_range([repeat.peak for repeat in self.agreeing_repeats])
 
     @property
     def peak_time_range(self) -> tuple[float, float]:
         """Earliest and latest time of the peak among the simulations with the outcome of factor 1, s."""
-        return _find_range([repeat.peak_time for repeat in self.agreeing_repeats])
+        return _compute_range([repeat.peak_time for repeat in self.agreeing_repeats])
 
     @property
     def overturn_range(self) -> tuple[float, float]:
         """Earliest and latest time of overturning, s; NaN if the block does not overturn at factor 1."""
-        return _find_range([repeat.overturn_time for repeat in self.agreeing_repeats])
+        return _compute_range([repeat.overturn_time for repeat in self.agreeing_repeats])
 
     @property
     def event_ranges(self) -> Floats:
@@ -177,7 +177,7 @@ class Perturbed(Result):
         return f"{self.outcome} in {len(self.agreeing_repeats)} of {self.sample_text}"
 
     def describe_outcome(self) -> str:
-        """Return the outcome as text: `share`, or "undecided" and the number of overturnings if outcomes differ."""
+        """Return the outcome, or "undecided" and the number of overturnings if outcomes differ."""
         if self.is_decided:
             return self.describe_agreement()
         overturned = int(np.count_nonzero(self.overturned))
@@ -185,15 +185,11 @@ class Perturbed(Result):
         return f"undecided: {agreement}"
 
     def _columns(self, table: str) -> list[Column]:
-        (name, _, _, unit, _), columns = self.coordinate, list(zip(*self.repeats, strict=True))
-        return [
-            Column("factor", columns[0]),
-            Column("outcome", columns[1], label="outcome"),
-            Column(f"peak_{name}", columns[2], unit, f"peak, {unit}"),
-            Column("peak_time", columns[3], "s", "peak time, s"),
-            Column("overturn_time", columns[4], "s"),
-            Column("last_rest", columns[5], "s", "last rest, s"),
-        ]
+        (name, _, _, unit, _), values = self.coordinate, list(zip(*self.repeats, strict=True))
+        columns = [Column("factor", values[0]), Column("outcome", values[1], label="outcome")]
+        columns.append(Column(f"peak_{name}", values[2], unit, f"peak, {unit}"))
+        columns.append(Column("peak_time", values[3], "s", "peak time, s"))
+        return [*columns, Column("overturn_time", values[4], "s"), Column("last_rest", values[5], "s", "last rest, s")]
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the rows of `to_dataframe` as mappings, with units in the names."""
@@ -218,11 +214,11 @@ def check_factors(relative: float, count: int) -> list[float]:
     """Return the factors of `list_factors`, or raise `OptionError` if an argument is out of range."""
     step = checks.between(relative, "relative", OptionError, 1e-12, 0.1)
     if checks.integer(count, "count", OptionError, 3, 1001) % 2 == 0:
-        sentence = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
-        raise OptionError(sentence, "count", value=count)
+        message = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
+        raise OptionError(message, "count", value=count)
     if step * (count - 2) >= 1.0:
-        sentence = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
-        raise OptionError(sentence, "relative", value=step)
+        message = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
+        raise OptionError(message, "relative", value=step)
     return list_factors(step, count)
 
 
@@ -235,7 +231,7 @@ def list_factors(relative: float, count: int) -> list[float]:
 def choose_steps(precision: float) -> tuple[float, int]:
     """Return the relative step and number (eleven) of factors within a precision, for `Response.perturbed`."""
     limit = checks.between(precision, "precision", OptionError, 1e-6, 0.1)
-    return limit / (_N_WITHIN_PRECISION - 2), _N_WITHIN_PRECISION
+    return limit / (_PRECISION_FACTOR_COUNT - 2), _PRECISION_FACTOR_COUNT
 
 
 def format_percent(share: float) -> str:
@@ -250,5 +246,5 @@ def _merge(outcome: str) -> str:
     return STANDS if outcome == UNMOVED else outcome
 
 
-def _find_range(values: Sequence[float]) -> tuple[float, float]:
+def _compute_range(values: Sequence[float]) -> tuple[float, float]:
     return float(np.min(values)), float(np.max(values))

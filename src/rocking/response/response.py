@@ -18,8 +18,8 @@ from rocking.errors import OptionError
 from rocking.response import figure, summary
 from rocking.response.figure import RotationUnits
 from rocking.response.history import create_times
-from rocking.response.perturbed import PRECISION, choose_steps
-from rocking.response.simulated import Simulated
+from rocking.response.perturbed import MOTION_PRECISION, choose_steps
+from rocking.response.simulated import ResponseData
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ _N_POINTS = 2000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Simulated):
+class Response(ResponseData):
     """Response of one body to one motion, returned by `rocking.simulate`.
 
     Attributes
@@ -97,11 +97,11 @@ class Response(Simulated):
     def _headline(self) -> str:
         return summary.format_line(self)
 
-    def summary_rows(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
+    def summary_rows(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> Sequence[Row]:
         """Return the lines of `summary` as rows of name, value, unit and note; arguments as of `summary`."""
-        return summary.build_rows(self, friction, precision)
+        return summary.create_rows(self, friction, precision)
 
-    def facts(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
+    def result_rows(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> Sequence[Row]:
         """Return the entries of `to_dict` as rows of name, value and unit; arguments as of `summary`."""
         body, motion, limit = self.block, self.motion, self.block.coordinate.limit
         entries = motion and {
@@ -113,7 +113,7 @@ class Response(Simulated):
             and {"name": motion.vertical.name, add_unit("pga", "m/s^2"): motion.vertical.pga},
         }
         rows = [Row("block", {"description": body.description, **self._list_parameters()}), Row("motion", entries)]
-        rows += self._build_outcome_rows()
+        rows += self._create_outcome_rows()
         if limit:
             rows.append(Row(f"peak_over_{limit}", self.peak_over_slenderness))
         if isinstance(body, RestrainedBlock):
@@ -126,37 +126,26 @@ class Response(Simulated):
             rows.append(Row("lift_off_time", self.lift_off_time, "s"))
         if friction is not None:
             rows += [Row("friction", friction), Row("sliding_time", self.sliding_time(friction), "s")]
+        rows += [Row("impacts_resolved", len(self.impacts)), Row("duration", self.duration, "s")]
         perturbed = [self.perturbed().to_dict(), self.perturbed(*choose_steps(precision)).to_dict()]
-        return [
-            *rows,
-            Row("impacts_resolved", len(self.impacts)),
-            Row("duration", self.duration, "s"),
-            Row("time_at_rest", self.time_at_rest, "s"),
-            Row("perturbed", perturbed),
-            Row("ambiguous", self.ambiguous),
-            Row("ambiguities", self.ambiguities),
-            Row("events", columns_to_records(self._convert_table("events"))),
-            Row("sequences", columns_to_records(self._convert_table("sequences"))),
-        ]
+        rows += [Row("time_at_rest", self.time_at_rest, "s"), Row("perturbed", perturbed)]
+        rows += [Row("ambiguous", self.ambiguous), Row("ambiguities", self.ambiguities)]
+        return [*rows, *(Row(name, columns_to_records(self._convert_table(name))) for name in ("events", "sequences"))]
 
     def _list_parameters(self) -> dict[str, Any]:
         parameters = self.block.as_bodies().parameters().items()
         gravity = {add_unit("gravity", "m/s^2"): self.block.gravity}
         return {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters} | gravity
 
-    def _build_outcome_rows(self) -> list[Row]:
+    def _create_outcome_rows(self) -> list[Row]:
         name, unit = self.block.coordinate.name, self.block.coordinate.unit
-        return [
-            Row("model", self.model),
-            Row("chattering", repr(self.chattering)),
-            *(Row(flag, getattr(self, flag)) for flag in ("overturned", "unfinished", "stopped", "leans")),
-            Row("overturn_time", self.overturn_time, "s"),
-            Row("tipping_time", self.tipping_time, "s"),
-            Row(f"peak_{name}", self.peak_rotation, unit),
-            Row(f"residual_{name}", self.residual_rotation, unit),
-        ]
+        rows = [Row("model", self.model), Row("chattering", repr(self.chattering))]
+        rows += [Row(flag, getattr(self, flag)) for flag in ("overturned", "unfinished", "stopped", "leans")]
+        rows += [Row(time, getattr(self, time), "s") for time in ("overturn_time", "tipping_time")]
+        rows.append(Row(f"peak_{name}", self.peak_rotation, unit))
+        return [*rows, Row(f"residual_{name}", self.residual_rotation, unit)]
 
-    def summary(self, friction: float | None = None, *, precision: float = PRECISION) -> str:
+    def summary(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> str:
         """Return a description of the response, line by line, as printed by ``rocking simulate``.
 
         Parameters
@@ -174,12 +163,12 @@ class Response(Simulated):
         """
         return format_rows(self.summary_rows(friction, precision=precision), _WIDTH)
 
-    def to_dict(self, friction: float | None = None, *, precision: float = PRECISION) -> dict[str, Any]:
+    def to_dict(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> dict[str, Any]:
         """Return the result as plain values, as printed by ``rocking simulate --json``; arguments as of `summary`.
 
         Names contain units. Numbers that are not finite are None.
         """
-        return rows_to_dict(self.facts(friction, precision=precision))
+        return rows_to_dict(self.result_rows(friction, precision=precision))
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
         """Return time histories and events as a dataset. Its ``to_dataframe`` multiplies all dimensions.
@@ -191,15 +180,13 @@ class Response(Simulated):
         import xarray as xr
 
         time, *histories = self._columns("histories", dt)
-        variables: dict[str, Any] = {
-            history.name: ("time", history.values, {"units": history.unit}) for history in histories
-        }
+        variables: dict[str, Any] = {name: ("time", values, {"units": unit}) for name, values, unit, _ in histories}
         for table, dimension in (("events", "event"), ("impacts", "impact"), ("sequences", "sequence")):
             for name, values, unit, _ in self._columns(table):
                 column = values.astype(object) if values.dtype.kind == "U" else values
                 variables[f"{dimension}_{name}"] = (dimension, column, {"units": unit})
         motion = self.motion
-        rows = [row for row in self._build_outcome_rows() if row.name != "tipping_time"]
+        rows = [row for row in self._create_outcome_rows() if row.name != "tipping_time"]
         rows += [Row("peak_time", self.peak_time, "s"), Row("ambiguous", self.ambiguous)]
         attributes = {
             "block": self.block.description,
@@ -207,11 +194,9 @@ class Response(Simulated):
             "motion": "none" if motion is None else motion.name,
             "vertical_motion": "none" if motion is None or motion.vertical is None else motion.vertical.name,
             "motion_history": "" if motion is None else "; ".join(motion.history),
-            **{
-                add_unit(row.name, row.unit): int(row.value) if isinstance(row.value, bool) else row.value
-                for row in rows
-            },
         }
+        for name, value, unit, _ in rows:
+            attributes[add_unit(name, unit)] = int(value) if isinstance(value, bool) else value
         return xr.Dataset(variables, {"time": ("time", time.values, {"units": "s"})}, attributes)
 
     @property
@@ -229,7 +214,7 @@ class Response(Simulated):
     def _columns(self, table: str, dt: float | None = None) -> list[Column]:
         checks.choice(table, "table", OptionError, self.TABLES)
         if table == "histories":
-            return self._build_histories(dt)
+            return self._create_histories(dt)
         if dt is not None:
             raise OptionError(f"{{}} is the step of the histories, and does not apply to {table}; omit it", "dt")
         return self._convert_table(table)
@@ -240,22 +225,16 @@ class Response(Simulated):
         units |= {"elongation": "m", "force": "N", "plastic_elongation": "m"}
         return [Column(name, rows[name], units.get(name, "s")) for name in rows.dtype.names]
 
-    def _build_histories(self, dt: float | None) -> list[Column]:
+    def _create_histories(self, dt: float | None) -> list[Column]:
         motion, (name, rate, _, unit, _) = self.motion, self.block.coordinate
-        if dt is None:
-            dt = self._default_dt
-        step = checks.positive(dt, "dt", OptionError, "s")
+        step = checks.positive(self._default_dt if dt is None else dt, "dt", OptionError, "s")
         if self.duration > _MAX_POINTS * step:
-            problem = f"more than {_MAX_POINTS:,} points of {self.duration:g} s"
-            raise OptionError(f"{{}} = {step:g} s gives {problem}; use a longer step", "dt", value=dt)
+            message = f"{{}} = {step:g} s gives more than {_MAX_POINTS:,} points of {self.duration:g} s"
+            raise OptionError(f"{message}; use a longer step", "dt", value=dt)
         times = create_times(self.duration, step)
-        states = self.states(times)
-        columns = [
-            Column("time", times, "s"),
-            Column(name, states[:, 0], unit),
-            Column(rate, states[:, 1], f"{unit}/s"),
-        ]
+        rotation, velocity, _ = self.states(times).T
         ground = np.zeros_like(times) if motion is None else motion.acceleration(times)
+        columns = [Column("time", times, "s"), Column(name, rotation, unit), Column(rate, velocity, f"{unit}/s")]
         columns.append(Column("ground_acceleration", ground, "m/s^2"))
         if motion is not None and motion.vertical is not None:
             columns.append(Column("vertical_ground_acceleration", motion.vertical.acceleration(times), "m/s^2"))
@@ -302,7 +281,7 @@ class Response(Simulated):
         longest_sequence : bool
             Whether to show the longest chattering sequence, impact by impact, in a separate panel.
         """
-        title = title or figure.make_title(self)
+        title = title or figure.create_title(self)
         return figure.draw_histories(
             self, rotation_units, window, longest_sequence=longest_sequence, title=title, ax=ax, figsize=figsize
         )
@@ -320,7 +299,7 @@ class Response(Simulated):
         Rotations are normalised by the slenderness of their side (or the balance of a restrained block), velocities by
         p times this value. Without a balance, rotations are in rad. Raises `OptionError` also as `kinetic_energy`.
         """
-        return figure.draw_phase_plane(self, window, title=title or figure.make_title(self), ax=ax, figsize=figsize)
+        return figure.draw_phase_plane(self, window, title=title or figure.create_title(self), ax=ax, figsize=figsize)
 
     def plot_energy(
         self,
@@ -331,4 +310,4 @@ class Response(Simulated):
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
         """Draw kinetic, potential and total energy against time; arguments and errors as of `plot_phase_plane`."""
-        return figure.draw_energies(self, window, title=title or figure.make_title(self), ax=ax, figsize=figsize)
+        return figure.draw_energies(self, window, title=title or figure.create_title(self), ax=ax, figsize=figsize)

@@ -83,19 +83,19 @@ class Sensitivity:
     @cached_property
     def peak(self) -> NDArray[np.void]:
         """Derivatives of the peak rotation, rad, shape (1,); 0 if overturned."""
-        return self._build_table(0)
+        return self._create_table(0)
 
     @cached_property
     def impacts(self) -> NDArray[np.void]:
         """Derivatives of the times of impacts, s."""
-        return self._build_table(1)
+        return self._create_table(1)
 
     @cached_property
     def events(self) -> NDArray[np.void]:
         """Derivatives of the times of events, s."""
-        return self._build_table(2)
+        return self._create_table(2)
 
-    def _build_table(self, index: int) -> NDArray[np.void]:
+    def _create_table(self, index: int) -> NDArray[np.void]:
         """Return changes of peak, impacts or events, with a field for each input."""
         values = self._changes[index]
         table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
@@ -113,14 +113,14 @@ class Sensitivity:
         peak, impacts, events = (np.array(values) for values in zip(*rows, strict=True))
         return np.zeros_like(peak) if self._is_peak_fixed else peak, impacts, events
 
-    def rotation(self, time: ArrayLike, of: Iterable[str] = QUANTITIES) -> dict[str, Floats]:
+    def rotation(self, time: ArrayLike, inputs: Iterable[str] = QUANTITIES) -> dict[str, Floats]:
         """Return the derivative of the rotation at given times by each input.
 
         Parameters
         ----------
         time : array_like
             Times, s, of any shape.
-        of : iterable of str
+        inputs : iterable of str
             Inputs: "motion", "initial_rotation", "initial_velocity", "p", "alpha" or "restitution". The last three
             accept the suffix "_plus" or "_minus" for a single side.
 
@@ -137,16 +137,14 @@ class Sensitivity:
         continuous, and its derivative jumps at each impact (see "Impacts: restitution and sensitivity" in the
         documentation).
         """
-        changes = compute_changes(self._history, time, of)
+        changes = compute_changes(self._history, time, inputs)
         return changes if self._is_known else {name: np.full_like(values, np.nan) for name, values in changes.items()}
 
     def __repr__(self) -> str:
-        event = np.max(np.abs(self.events["motion"]), initial=0.0)
-        return (
-            f"<Sensitivity: 0.1 % more of the motion changes the peak by {1e-3 * self.peak['motion'][0]:.2g} rad and "
-            f"the times of {format_count(len(self.events), 'event')} by up to {1e-3 * event:.2g} s; "
-            f"{format_count(len(self.impacts), 'impact')}>"
-        )
+        peak, event = 1e-3 * self.peak["motion"][0], 1e-3 * np.max(np.abs(self.events["motion"]), initial=0.0)
+        events, impacts = format_count(len(self.events), "event"), format_count(len(self.impacts), "impact")
+        changes = f"changes the peak by {peak:.2g} rad and the times of {events} by up to {event:.2g} s"
+        return f"<Sensitivity: 0.1 % more of the motion {changes}; {impacts}>"
 
 
 def _vary_input(trail: Trail, quantity: int, times: Floats, impacts: int, events: int) -> Changes:
@@ -164,18 +162,15 @@ def find_ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding
 
     ``height`` is the height of the peak above the stop, and ``rounding_decisions`` the known number of ties.
     """
-    early, late = (_find_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
+    early, late = (_compute_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
     rounding_decisions += int(np.any(late > early + AMBIGUITY))
     peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._changes)
-    unaffected = {
-        "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
-        "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
-        "touch": rounding_decisions == 0,
-    }
-    return tuple(name for name, is_unaffected in unaffected.items() if not is_unaffected)
+    is_peak_clear = np.all(peak <= AMBIGUITY * max(height, 1e-300))
+    is_clear = (is_peak_clear, np.all(np.concatenate(times) <= AMBIGUITY), rounding_decisions == 0)
+    return tuple(name for name, clear in zip(("peak", "events", "touch"), is_clear, strict=True) if not clear)
 
 
-def _find_uplifts(trail: Trail, factor: float) -> Floats:
+def _compute_uplifts(trail: Trail, factor: float) -> Floats:
     """Return times of the next uplifts from all rests, with thresholds scaled by a factor."""
     block, times = trail.block.copy(), np.zeros(len(trail.nodes))
     block["threshold"] *= factor
@@ -191,11 +186,8 @@ def bound_rest_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
     """
     nodes = state.expose_fields(np.append(trail.nodes, trail.nodes[-1:]))
     nodes["side"][-1] = state.AT_REST
-    trail, scratch, variation = (
-        copy_trail(trail._replace(nodes=nodes)),
-        state.new_scratch(),
-        state.new_record(state.VARIATION),
-    )
+    trail = copy_trail(trail._replace(nodes=nodes))
+    scratch, variation = state.new_scratch(), state.new_record(state.VARIATION)
     fastest, out = np.sqrt(np.max(np.abs(trail.block["stiffness"]))), np.zeros_like(trail.ground.pieces[:, 2:])
     last, errors = (np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0)), np.full(len(proven), np.inf))
     for k in np.flatnonzero(proven):
@@ -213,7 +205,7 @@ def bound_rest_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
     return errors
 
 
-def compute_changes(history: TimeHistory, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:
+def compute_changes(history: TimeHistory, time: ArrayLike, inputs: Iterable[str]) -> dict[str, Floats]:
     """Compute the derivative of the coordinate at times of any shape by each input, see `Sensitivity.rotation`."""
     times, nodes = checks.numbers(time, "time", OptionError), history.trail.nodes
     flat = times.ravel()
@@ -226,9 +218,9 @@ def compute_changes(history: TimeHistory, time: ArrayLike, of: Iterable[str]) ->
     rests = nodes["side"] < 0
     events = int(np.count_nonzero(rests[:-1] | rests[1:]))
     changes = {}
-    for name in of:
+    for name in inputs:
         if name not in _INPUTS:
-            raise OptionError(f"{{}} must be among {', '.join(_INPUTS)}, not {name!r}", "of", value=name)
+            raise OptionError(f"{{}} must be among {', '.join(_INPUTS)}, not {name!r}", "inputs", value=name)
         values = np.full(flat.shape, np.nan)
         values[order] = signs * _vary_input(history.trail, _INPUTS.index(name), ascending, len(nodes), events)[0]
         changes[name] = values.reshape(times.shape)

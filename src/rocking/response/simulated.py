@@ -23,18 +23,27 @@ from rocking.response.history import Solution, TimeHistory, add_all_impacts
 from rocking.response.mechanics import (
     Contact,
     Energy,
-    build_energy,
     check_friction,
     compute_friction_demand,
+    compute_linear_balance,
     compute_pull,
-    find_linear_balance,
+    create_energy,
 )
-from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat, check_factors
+from rocking.response.perturbed import (
+    FACTOR_COUNT,
+    OVERTURNS,
+    RELATIVE_STEP,
+    STANDS,
+    UNMOVED,
+    PerturbedSimulations,
+    Repeat,
+    check_factors,
+)
 from rocking.response.sensitivity import Sensitivity, bound_rest_errors, find_ambiguities
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Simulated(Result):
+class ResponseData(Result):
     """Data and computed results of a response. `Response` adds the output methods."""
 
     block: Body
@@ -63,14 +72,14 @@ class Simulated(Result):
         """Time history, including the impacts after the proof of a sequence."""
         trail, sequences = self.solution.trail, self.solution.sequences
         if int(trail.settings["rest_rule"]) == state.RestRule.CERTIFIED:
-            closed = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration)
-            trail = add_all_impacts(trail, cut=closed and self.moves_at_end)
+            is_open = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration) and self.moves_at_end
+            trail = add_all_impacts(trail, ends_in_sequence=is_open)
         return TimeHistory(trail, self.duration, self.block.stops)
 
     @cached_property
     def _energy(self) -> Energy:
         trail = self.solution.trail
-        return build_energy(self.block, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
+        return create_energy(self.block, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
 
     @cached_property
     def _contact(self) -> Contact:
@@ -83,9 +92,8 @@ class Simulated(Result):
     def sequences(self) -> NDArray[np.void]:
         """Sequences of impacts that ended at rest: see `Response`."""
         sequences = self.solution.sequences.copy()
-        errors = bound_rest_errors(
-            self.solution.trail, np.isfinite(sequences["lower"]), max(map(abs, self.block.stops))
-        )
+        largest_stop = max(map(abs, self.block.stops))
+        errors = bound_rest_errors(self.solution.trail, np.isfinite(sequences["lower"]), largest_stop)
         sequences["lower"] -= errors
         sequences["upper"] += errors
         return sequences
@@ -97,7 +105,7 @@ class Simulated(Result):
         For a free block it equals the slenderness in both models.
         """
         if isinstance(self.block, RestrainedBlock) and self.model == "linear":
-            plus, minus = find_linear_balance(self.block).tolist()
+            plus, minus = compute_linear_balance(self.block).tolist()
             return plus, minus
         return self.block.balance
 
@@ -132,7 +140,7 @@ class Simulated(Result):
             if self.overturned:  # the last step ends at the peak
                 side = int(self.solution.trail.nodes["side"][-1])
                 plus, minus = (self.peak_rotation, minus) if side == 0 else (plus, self.peak_rotation)
-            rows = self.block.tendons_at((plus, minus), self.model)
+            rows = self.block.compute_tendon_extremes((plus, minus), self.model)
         return np.array(rows, dtype=[("elongation", "f8"), ("force", "f8"), ("plastic_elongation", "f8")])
 
     @property
@@ -184,7 +192,7 @@ class Simulated(Result):
 
         After this time an overturning block only falls.
         """
-        return self._history.find_tipping_time(self.balance)
+        return self._history.compute_tipping_time(self.balance)
 
     @property
     def rest_intervals(self) -> Floats:
@@ -224,7 +232,7 @@ class Simulated(Result):
         height = abs(self.peak_rotation - self.block.stops[0])
         return find_ambiguities(self.sensitivity, self.solution.trail, height, self.rounding_decisions + balanced)
 
-    def perturbed(self, relative: float = RELATIVE, count: int = COUNT) -> Perturbed:
+    def perturbed(self, relative: float = RELATIVE_STEP, count: int = FACTOR_COUNT) -> PerturbedSimulations:
         """Repeat the simulation with the motion scaled by factors near 1.
 
         Parameters
@@ -236,7 +244,7 @@ class Simulated(Result):
 
         Returns
         -------
-        Perturbed
+        PerturbedSimulations
             Outcome, peak and times for each factor, and their ranges.
 
         Notes
@@ -248,16 +256,18 @@ class Simulated(Result):
         if (relative, count) not in self._perturbations:
             repeats = tuple(self._repeat(factor) for factor in check_factors(relative, count))
             scaled = "initial states" if self.motion is None else "motions"
-            self._perturbations[relative, count] = Perturbed(float(relative), repeats, self.block.coordinate, scaled)
+            self._perturbations[relative, count] = PerturbedSimulations(
+                float(relative), repeats, self.block.coordinate, scaled
+            )
         return self._perturbations[relative, count]
 
     @cached_property
-    def _perturbations(self) -> dict[tuple[float, int], Perturbed]:
+    def _perturbations(self) -> dict[tuple[float, int], PerturbedSimulations]:
         return {}
 
     def _repeat(self, factor: float) -> Repeat:
         try:
-            repeated: Simulated = self if factor == 1.0 else self.solution.repeat(factor)
+            repeated: ResponseData = self if factor == 1.0 else self.solution.repeat(factor)
         except OptionError:  # balanced: `simulate` requires a duration
             return Repeat(factor, "balances", math.nan, math.nan, math.nan, math.nan, self.events[:0])
         rests = repeated.events["time"][repeated.events["kind"] == "rest"]
@@ -333,7 +343,7 @@ class Simulated(Result):
 
     @cached_property
     def _extremes(self) -> tuple[float, float]:
-        return self._contact.find_extremes()
+        return self._contact.compute_extremes()
 
     @property
     def required_friction(self) -> float:
@@ -357,9 +367,11 @@ class Simulated(Result):
         level = check_friction(friction)
         if not self.required_friction > level:
             return math.nan
-        return self._contact.find_first_time(
-            lambda push, normal: np.abs(push) - level * normal, lambda excess: excess > 0.0
-        )
+
+        def compute_excess(push: Floats, normal: Floats) -> Floats:
+            return np.abs(push) - level * normal
+
+        return self._contact.find_first_time(compute_excess, lambda excess: excess > 0.0)
 
     @cached_property
     def lift_off_time(self) -> float:

@@ -14,7 +14,7 @@ from rocking.core.result import Row
 from rocking.core.tables import format_count
 from rocking.engine.problem import compute_thresholds
 from rocking.response.perturbed import choose_steps, format_percent
-from rocking.response.simulated import Simulated
+from rocking.response.simulated import ResponseData
 
 #: Largest numbers of decimals of a time and digits of a peak, and digits of a range of peaks.
 _MAX_DECIMALS: Final = 9
@@ -39,7 +39,7 @@ _AMBIGUITIES: Final = {
 }
 
 
-def build_rows(response: Simulated, friction: float | None, precision: float) -> list[Row]:
+def create_rows(response: ResponseData, friction: float | None, precision: float) -> list[Row]:
     """Return the rows of a summary, including the check of a coefficient of friction if given."""
     body = response.block
     sliding = math.nan if friction is None else response.sliding_time(friction)
@@ -49,9 +49,9 @@ def build_rows(response: Simulated, friction: float | None, precision: float) ->
         *([Row("balance", _describe_balance(response))] if isinstance(body, RestrainedBlock) else []),
         Row("motion", _summarize_motion(response)),
         Row("uplift above", _describe_thresholds(response)),
-        *_build_event_rows(response),
+        *_create_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
-        *_build_peak_rows(response),
+        *_create_peak_rows(response),
         *([Row(f"residual {body.coordinate.name}", _format_residual(response))] if response.leans else []),
     ]
     for row in response.tendons:
@@ -66,52 +66,46 @@ def build_rows(response: Simulated, friction: float | None, precision: float) ->
             Row("friction needed", f"{response.required_friction:.4f}", note=until),
             Row("least normal force", f"{response.minimum_normal_force:.4f}", "of the weight", until),
         ]
+        end_of_validity = "what follows is not this response"
         if friction is not None:
-            sliding_text = (
-                f"is not enough: the block slides, first at {sliding:.4f} s; what follows is not this response"
-            )
-            sticking_text = "is enough: the block does not slide"
-            rows.append(Row(f"friction {friction:g}", sticking_text if math.isnan(sliding) else sliding_text))
+            text = f"is not enough: the block slides, first at {sliding:.4f} s; {end_of_validity}"
+            text = "is enough: the block does not slide" if math.isnan(sliding) else text
+            rows.append(Row(f"friction {friction:g}", text))
         if not math.isnan(response.lift_off_time):
-            rows.append(Row("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
+            rows.append(Row("base lifts off", f"at {response.lift_off_time:.4f} s; {end_of_validity}"))
     perturbed = response.perturbed()
-    if (
-        np.max(np.nan_to_num(perturbed.event_spreads, nan=math.inf), initial=0.0) >= _MIN_RANGE
-        or _count_peak_digits(response) < _MIN_DIGITS
-    ):
+    max_spread = np.max(np.nan_to_num(perturbed.event_spreads, nan=math.inf), initial=0.0)
+    if max_spread >= _MIN_RANGE or _count_peak_digits(response) < _MIN_DIGITS:
         rows.append(Row("ranges", f"those of the {perturbed.sample_text}; other factors can lead beyond them"))
     without_sliding = "" if math.isnan(sliding) else " (as if it did not slide)"
-    return [
-        *rows,
-        Row("outcome", _describe_outcome(response), note=without_sliding),
-        Row("", response.perturbed(*choose_steps(precision)).describe_agreement()),
-    ]
+    rows.append(Row("outcome", _describe_outcome(response), note=without_sliding))
+    return [*rows, Row("", response.perturbed(*choose_steps(precision)).describe_agreement())]
 
 
-def format_line(response: Simulated) -> str:
+def describe_subject(response: ResponseData) -> str:
+    """Return the body and its motion as text."""
+    return f"{response.block.description} under {'no motion' if response.motion is None else response.motion.label}"
+
+
+def format_line(response: ResponseData) -> str:
     """Return the response in one line."""
-    motion, limit = response.motion, response.block.coordinate.limit
-    peak = ""
+    limit, peak = response.block.coordinate.limit, ""
     if limit and not response.overturned and math.isfinite(response._balance_at_peak):
         peak = f", peak {format_ratio(response)} of the {limit}"
-    return (
-        f"{response.block.description} under {'no motion' if motion is None else motion.label}: "
-        f"{format_outcome(response, f'{response.overturn_time:.4f} s')}{peak}; "
-        f"{format_count(len(response.events), 'event')}, {format_count(len(response.impacts), 'impact')} resolved, "
-        f"{response.duration:.5g} s"
-    )
+    outcome = format_outcome(response, f"{response.overturn_time:.4f} s")
+    counts = f"{format_count(len(response.events), 'event')}, {format_count(len(response.impacts), 'impact')} resolved"
+    return f"{describe_subject(response)}: {outcome}{peak}; {counts}, {response.duration:.5g} s"
 
 
-def format_outcome(response: Simulated, overturn_time: str) -> str:
+def format_outcome(response: ResponseData, overturn_time: str) -> str:
     """Return the outcome for the summary. The time of overturning is passed as text."""
     if response.overturned:
         return f"overturns at {overturn_time}"
     if response.unfinished:
         return f"UNFINISHED: given up at {response.duration:.4f} s, after too many steps"
     if response.stopped:
-        motion = response.motion
-        goes_on = motion is not None and response.duration < motion.end
-        to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
+        motion_end = 0.0 if response.motion is None else response.motion.end
+        to_come = f"; the motion goes on to {motion_end:.6g} s" if response.duration < motion_end else ""
         return f"{_describe_stop(response)}, where the simulation was stopped{to_come}"
     if response.leans and response.block.coordinate.limit:
         return f"does not overturn: it stays leaning, at {_format_residual(response)}"
@@ -120,59 +114,52 @@ def format_outcome(response: Simulated, overturn_time: str) -> str:
     return "rocks and does not overturn" if response.block.coordinate.limit else "moves, and comes to rest"
 
 
-def format_brief_outcome(response: Simulated, precision: float) -> str:
+def format_brief_outcome(response: ResponseData, precision: float) -> str:
     """Return the outcome for a row of a table."""
     perturbed, within_precision = response.perturbed(), response.perturbed(*choose_steps(precision))
-    if not perturbed.is_decided and perturbed.overturned.any():
-        shares = [int(repeats.overturned.sum()) for repeats in (perturbed, within_precision)]
+    counts_overturned = not perturbed.is_decided and perturbed.overturned.any()
+    text = perturbed.outcome if perturbed.is_decided else f"undecided: {perturbed.outcome}"
+    if counts_overturned:
         text = "undecided: overturns"
-    else:
-        shares = [len(repeats.agreeing_repeats) for repeats in (perturbed, within_precision)]
-        text = perturbed.outcome if perturbed.is_decided else f"undecided: {perturbed.outcome}"
     if response.overturned and perturbed.is_decided:
-        text += (
-            f" at {_format_short_time(response.overturn_time, *perturbed.overturn_range, max_decimals=_ROW_DECIMALS)}"
-        )
+        time = _format_short_time(response.overturn_time, *perturbed.overturn_range, max_decimals=_ROW_DECIMALS)
+        text += f" at {time}"
     elif response.leans:
         text += f" at {_format_residual(response)}"
     elif response.stopped:
         text = _describe_stop(response) if perturbed.is_decided else text
-    parts = [
-        f"{share} of {len(repeats.repeats)} ({format_percent(repeats.max_deviation)})"
-        for share, repeats in zip(shares, (perturbed, within_precision), strict=True)
-    ]
+    parts = []
+    for repeats in (perturbed, within_precision):
+        count = int(repeats.overturned.sum()) if counts_overturned else len(repeats.agreeing_repeats)
+        parts.append(f"{count} of {len(repeats.repeats)} ({format_percent(repeats.max_deviation)})")
     return f"{text} in {', '.join(parts)}{', AMBIGUOUS' if response.ambiguous else ''}"
 
 
-def _format_residual(response: Simulated) -> str:
+def _format_residual(response: ResponseData) -> str:
     """Return the residual rotation, which depends on the peak if a tendon has yielded."""
     return f"{response.residual_rotation:.{_count_peak_digits(response)}g} {response.block.coordinate.unit}"
 
 
-def format_ratio(response: Simulated) -> str:
+def format_ratio(response: ResponseData) -> str:
     """Return the normalised peak rotation with the known digits."""
     return f"{response.peak_over_slenderness:.{min(_count_peak_digits(response), 4)}g}"
 
 
-def round_ratio(response: Simulated) -> float:
+def round_ratio(response: ResponseData) -> float:
     """Return the normalised peak rotation, rounded if fewer than four digits are known."""
-    return (
-        response.peak_over_slenderness
-        if _count_peak_digits(response) >= _SHORT_DECIMALS
-        else float(format_ratio(response))
-    )
+    is_known = _count_peak_digits(response) >= _SHORT_DECIMALS
+    return response.peak_over_slenderness if is_known else float(format_ratio(response))
 
 
 def format_time(time: float, low: float, high: float) -> str:
     """Return a time, s, with the digits common to its range, or its range if wide."""
     uncertainty = _compute_uncertainty(time, low, high)
     decimals = _count_decimals(uncertainty)
-    if uncertainty < _MIN_RANGE:
-        return f"{time:.{decimals}f} s"
-    return f"{low:.{decimals}f} to {high:.{decimals}f} s"
+    is_narrow = uncertainty < _MIN_RANGE
+    return f"{time:.{decimals}f} s" if is_narrow else f"{low:.{decimals}f} to {high:.{decimals}f} s"
 
 
-def format_tipping_time(response: Simulated) -> str:
+def format_tipping_time(response: ResponseData) -> str:
     """Return the tipping time with the known digits, which equal the ones of the overturning time."""
     uncertainty = 0.0
     if response.overturned:
@@ -181,7 +168,7 @@ def format_tipping_time(response: Simulated) -> str:
     return f"{prefix}{response.tipping_time:.{min(_count_decimals(uncertainty), _SHORT_DECIMALS)}f} s"
 
 
-def _summarize_motion(response: Simulated) -> str:
+def _summarize_motion(response: ResponseData) -> str:
     """Describe the ground motion. In all texts g is standard gravity."""
     motion = response.motion
     if motion is None:
@@ -192,7 +179,7 @@ def _summarize_motion(response: Simulated) -> str:
     return "; ".join(parts)
 
 
-def _describe_thresholds(response: Simulated) -> str:
+def _describe_thresholds(response: ResponseData) -> str:
     """Return the uplift thresholds, which vary with the weight under vertical motion."""
     motion = response.motion
     (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
@@ -204,15 +191,11 @@ def _describe_thresholds(response: Simulated) -> str:
     low, high = (1.0 + lift / response.block.gravity for lift in motion.vertical.extremes)
     if np.array_equal(pair, weight_part):
         return f"{text}, times the weight over that at rest, {low:.4f} to {high:.4f}"
-    min_threshold, max_threshold = (
-        (pair[0] + (factor - 1.0) * weight_part[0]) / STANDARD_GRAVITY for factor in (low, high)
-    )
-    return (
-        f"{text}; from {min_threshold:.4f} to {max_threshold:.4f} g with the weight{'' if is_single else ', to side +'}"
-    )
+    lowest, highest = ((pair[0] + (factor - 1.0) * weight_part[0]) / STANDARD_GRAVITY for factor in (low, high))
+    return f"{text}; from {lowest:.4f} to {highest:.4f} g with the weight{'' if is_single else ', to side +'}"
 
 
-def _build_event_rows(response: Simulated) -> list[Row]:
+def _create_event_rows(response: ResponseData) -> list[Row]:
     sequences = {float(row["end"]): row for row in response.sequences}
     perturbed = response.perturbed()
     rows: list[Row] = []
@@ -221,11 +204,10 @@ def _build_event_rows(response: Simulated) -> list[Row]:
             break
         time, kind = float(event["time"]), str(event["kind"])
         text = format_time(time, low, high)
+        note = f", to side {'+' if event['side'] > 0 else '-'}" if kind == "uplift" else ""
         if kind == "rest" and time in sequences:
-            rows.append(Row(kind, text, note=_describe_proof(_compute_uncertainty(time, low, high), sequences[time])))
-        else:
-            side = f", to side {'+' if event['side'] > 0 else '-'}" if kind == "uplift" else ""
-            rows.append(Row(kind, text, note=side))
+            note = _describe_proof(_compute_uncertainty(time, low, high), sequences[time])
+        rows.append(Row(kind, text, note=note))
     if remaining := len(response.events) - len(rows):
         note = "" if len(rows) == _MAX_EVENTS else f", not the same in all {len(perturbed.repeats)} {perturbed.scaled}"
         rows.append(Row("...", f"{format_count(remaining, 'more event')}{note}"))
@@ -244,7 +226,7 @@ def _describe_proof(uncertainty: float, sequence: np.void) -> str:
     return f", complete chattering proven{start}{bracket}"
 
 
-def _build_peak_rows(response: Simulated) -> list[Row]:
+def _create_peak_rows(response: ResponseData) -> list[Row]:
     """Return rows of the peak and its time, each with the known digits."""
     perturbed, (name, _, _, unit, limit) = response.perturbed(), response.block.coordinate
     (low, high), digits, balance = perturbed.peak_range, _count_peak_digits(response), response._balance_at_peak
@@ -264,7 +246,7 @@ def _build_peak_rows(response: Simulated) -> list[Row]:
     return [Row(f"peak {name}", value, unit, note)]
 
 
-def _describe_balance(response: Simulated) -> str:
+def _describe_balance(response: ResponseData) -> str:
     """Return the unstable balance of a restrained block."""
     plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
     if plus != minus and not (isinstance(response.block, RestrainedBlock) and response.block.is_one_sided):
@@ -272,7 +254,7 @@ def _describe_balance(response: Simulated) -> str:
     return "none: restraints hold it at any rotation" if plus == "none" else plus
 
 
-def _describe_outcome(response: Simulated) -> str:
+def _describe_outcome(response: ResponseData) -> str:
     text = response.perturbed().describe_outcome()
     if response.overturned:
         text += f", at {format_time(response.overturn_time, *response.perturbed().overturn_range)}"
@@ -286,7 +268,7 @@ def _describe_outcome(response: Simulated) -> str:
     return text
 
 
-def _describe_stop(response: Simulated) -> str:
+def _describe_stop(response: ResponseData) -> str:
     end = f"{response.duration:.6g} s"
     if not math.isnan(response.tipping_time):
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
@@ -295,7 +277,7 @@ def _describe_stop(response: Simulated) -> str:
     return f"at rest at {end}" if response.moved else f"has not moved by {end}"
 
 
-def _count_peak_digits(response: Simulated) -> int:
+def _count_peak_digits(response: ResponseData) -> int:
     """Return the number of known digits of the peak."""
     uncertainty = _compute_uncertainty(response.peak_rotation, *response.perturbed().peak_range)
     value = abs(response.peak_rotation - response.block.stops[0])
@@ -322,9 +304,8 @@ def _count_decimals(uncertainty: float) -> int:
 
 
 def _format_short_time(time: float, low: float, high: float, max_decimals: int = _SHORT_DECIMALS) -> str:
-    """Return a time, s, or its range, with at most ``most`` decimals."""
+    """Return a time, s, or its range, with at most ``max_decimals`` decimals."""
     uncertainty = _compute_uncertainty(time, low, high)
     decimals = min(_count_decimals(uncertainty), max_decimals)
-    if 10.0**decimals * uncertainty < 1.0:
-        return f"{time:.{decimals}f} s"
-    return f"{low:.{decimals}f} to {high:.{decimals}f} s"
+    is_narrow = 10.0**decimals * uncertainty < 1.0
+    return f"{time:.{decimals}f} s" if is_narrow else f"{low:.{decimals}f} to {high:.{decimals}f} s"

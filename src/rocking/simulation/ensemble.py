@@ -25,7 +25,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 from rocking.records.named import Motions, list_motion_names, list_motions
-from rocking.response.perturbed import COUNT, RELATIVE, list_factors
+from rocking.response.perturbed import FACTOR_COUNT, RELATIVE_STEP, list_factors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,18 +44,14 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "uplifts": ("1", "uplifts from rest"),
     "rests": ("1", "times the block came to rest"),
     "time_at_rest": ("s", "time spent at rest"),
-    "complete_chattering": (
-        "1",
-        "whether the block came to rest after its first uplift before the motion passed a threshold again",
-    ),
+    "complete_chattering": ("1",
+        "whether the block came to rest after its first uplift before the motion passed a threshold again"),
     "rests_by_rounding": ("1", "rests that were not proven, as time no longer advanced between impacts"),
     "leans": ("1", "whether restraints hold the block leaning for ever"),
     "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
-    "stopped": (
-        "1",
-        "whether the duration ended it while the block moved or the motion went on, and left the verdict open",
-    ),
-}
+    "stopped": ("1",
+        "whether the duration ended it while the block moved or the motion went on, and left the verdict open"),
+}  # fmt: skip
 
 #: Optional times, likewise.
 TIMES: Final[Mapping[str, tuple[str, str]]] = {
@@ -199,7 +195,7 @@ class Product:
         return self.bodies
 
 
-def build_product(
+def create_product(
     blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     levels: ArrayLike | None,
@@ -211,18 +207,11 @@ def build_product(
 ) -> Product:
     """Create a product from the arguments of `simulate_many`."""
     bodies, ground_motions = gather_bodies(blocks), tuple(list_motions(motions))
-    return Product(
-        bodies,
-        ground_motions,
-        Scales.from_levels(levels, measure),
-        polarity,
-        model,
-        chattering_scheme(chattering),
-        duration,
-    )
+    scales, scheme = Scales.from_levels(levels, measure), chattering_scheme(chattering)
+    return Product(bodies, ground_motions, scales, polarity, model, scheme, duration)
 
 
-def build_setup(product: Product, bodies: slice | None = None) -> Setup:
+def create_setup(product: Product, bodies: slice | None = None) -> Setup:
     """Return the setup for all or some bodies of a product."""
     selected = product.bodies if bodies is None else product.bodies.select(bodies)
     return Setup(selected, product.model, product.chattering, product.duration)
@@ -239,7 +228,7 @@ def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
         yield create_task(block, product.motions, m, perturbation * (signs[k] * scales), key)
 
 
-def build_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
+def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     """Create a dataset from arrays named as in `VARIABLES`, without the dimensions that were not requested."""
     import xarray as xr
 
@@ -249,14 +238,11 @@ def build_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     variable_attributes = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in meanings.items()}
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
-        variable_attributes["peak_rotation"] = {
-            "units": coordinate.unit,
-            "long_name": f"largest {coordinate.name} in size",
-        }
-        variable_attributes["residual_rotation"]["units"] = coordinate.unit
-        variable_attributes["overturned"]["long_name"] = (
-            f"whether the {coordinate.name} passed its limit, where it has one"
-        )
+        for name in ("peak_rotation", "residual_rotation"):
+            variable_attributes[name]["units"] = coordinate.unit
+        variable_attributes["peak_rotation"]["long_name"] = f"largest {coordinate.name} in size"
+        meaning = f"whether the {coordinate.name} passed its limit, where it has one"
+        variable_attributes["overturned"]["long_name"] = meaning
     variables = {name: (dimensions, values, variable_attributes.get(name, {})) for name, values in outcomes.items()}
     coordinates = {
         "motion": ("motion", list_motion_names(product.motions)),
@@ -287,13 +273,12 @@ def collect_verticals(motions: Sequence[Motion]) -> dict[str, Any]:
 def body_coordinates(bodies: Bodies) -> dict[str, Any]:
     """Return parameters with units as coordinates of ``block``, one for each side if the sides differ."""
     columns = bodies.parameters()
-    if all(np.array_equal(values[:, 0], values[:, 1], equal_nan=True) for values, _ in columns.values()):
-        return {name: ("block", values[:, 0], {"units": units}) for name, (values, units) in columns.items()}
-    return {
-        f"{name}_{side}": ("block", values[:, k], {"units": units})
-        for name, (values, units) in columns.items()
-        for k, side in enumerate(("plus", "minus"))
-    }
+    are_equal = all(np.array_equal(values[:, 0], values[:, 1], equal_nan=True) for values, _ in columns.values())
+    coordinates = {}
+    for name, (values, units) in columns.items():
+        for k, suffix in enumerate(("",) if are_equal else ("_plus", "_minus")):
+            coordinates[f"{name}{suffix}"] = ("block", values[:, k], {"units": units})
+    return coordinates
 
 
 def simulate_many(
@@ -366,17 +351,16 @@ def simulate_many(
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    product = build_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
     names = (*VARIABLES, *(TIMES if checks.boolean(times, "times", OptionError) else ()))
-    setup = build_setup(product)
+    setup = create_setup(product)
     outcomes = simulate_product(product, setup, names)
     if checks.boolean(robust, "robust", OptionError):
-        factors = [factor for factor in list_factors(RELATIVE, COUNT) if factor != 1.0]
+        factors = [factor for factor in list_factors(RELATIVE_STEP, FACTOR_COUNT) if factor != 1.0]
         repeats = [simulate_product(product, setup, ["overturned"], factor) for factor in factors]
-        outcomes["overturned_share"] = np.mean(
-            [result["overturned"].astype(bool) for result in (outcomes, *repeats)], axis=0
-        )
-    return build_dataset(product, outcomes)
+        overturned = [result["overturned"].astype(bool) for result in (outcomes, *repeats)]
+        outcomes["overturned_share"] = np.mean(overturned, axis=0)
+    return create_dataset(product, outcomes)
 
 
 def simulate_product(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path, PurePath
@@ -61,45 +62,32 @@ class MeshParts(NamedTuple):
 
 def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
     """Return the parts of a mesh in their order, with unique names. Too many triangles are an error."""
-    name, up, path = type(mesh).__name__, "z", ""
-    shapes: list[tuple[str, Any, Any]]
-    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
-        shapes = [("mesh", mesh, np.eye(4))]
-    else:
-        scene: Any = mesh
-        if not hasattr(mesh, "geometry"):
-            file: PurePath
-            if isinstance(mesh, (str, PathLike)):
-                file = SHIPPED_MESHES.get(str(mesh)) or Path(mesh)
-                path, scene = str(mesh), _read_file(file, str(mesh))
-            elif hasattr(mesh, "read") and isinstance(getattr(mesh, "name", None), str):
-                file = PurePath(mesh.name)
-                path, scene = file.name, _read_stream(mesh, file.name)
-            else:
-                raise BlockError(
-                    "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, "
-                    f"not {checks.short_repr(mesh)}",
-                    "mesh",
-                    value=mesh,
-                )
-            name, up = file.name, "y" if file.suffix.lower() in (".glb", ".gltf") else "z"
-        graph, geometry = scene.graph, scene.geometry
-        placements = [(str(node), *graph[node]) for node in sorted(graph.nodes_geometry)]
-        shapes = [(node, geometry[key], transform) for node, transform, key in placements]
-    if max_faces is not None and (count := sum(len(getattr(shape, "faces", ())) for _, shape, _ in shapes)) > max_faces:
-        raise BlockError(
-            f"contains {count} triangles; use a coarser mesh of at most {max_faces}",
-            path=path or name,
-        )
-    parts = tuple(
-        _place_part(node, shape, transform) for node, shape, transform in shapes if len(getattr(shape, "faces", ()))
-    )
-    if not parts:
-        raise BlockError(
-            "contains no faces; a mesh of triangles is required, not points, lines or other text", path=path or name
-        )
+    scene: Any = mesh
+    name = path = type(mesh).__name__
+    is_mesh = hasattr(mesh, "vertices") and hasattr(mesh, "faces")
+    if isinstance(mesh, (str, PathLike)):
+        file = SHIPPED_MESHES.get(str(mesh)) or Path(mesh)
+        name, path, scene = file.name, str(mesh), _read_file(file, str(mesh))
+    elif not is_mesh and not hasattr(mesh, "geometry"):
+        if not (hasattr(mesh, "read") and isinstance(getattr(mesh, "name", None), str)):
+            requirement = "the path of a file, a binary stream that has a name, or a mesh or scene of trimesh"
+            raise BlockError(f"{{}} must be {requirement}, not {checks.short_repr(mesh)}", "mesh", value=mesh)
+        name = path = PurePath(scene.name).name
+        scene = _read_stream(scene, name)
+    up = "y" if scene is not mesh and PurePath(name).suffix.lower() in (".glb", ".gltf") else "z"
+    shapes = [("mesh", scene, np.eye(4))]
+    if not is_mesh:
+        placements = [(str(node), *scene.graph[node]) for node in sorted(scene.graph.nodes_geometry)]
+        shapes = [(node, scene.geometry[key], transform) for node, transform, key in placements]
+    shapes = [shape for shape in shapes if len(getattr(shape[1], "faces", ()))]
+    if max_faces is not None and (count := sum(len(shape.faces) for _, shape, _ in shapes)) > max_faces:
+        raise BlockError(f"contains {count} triangles; use a coarser mesh of at most {max_faces}", path=path)
+    if not shapes:
+        message = "contains no faces; a mesh of triangles is required, not points, lines or other text"
+        raise BlockError(message, path=path)
+    parts = tuple(_place_part(*shape) for shape in shapes)
     if not all(np.all(np.isfinite(part.vertices)) for part in parts):
-        raise BlockError("has corners that are not finite numbers; export the mesh again", path=path or name)
+        raise BlockError("has corners that are not finite numbers; export the mesh again", path=path)
     return MeshParts(parts, name, up)
 
 
@@ -127,7 +115,8 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
     try:
         import trimesh
     except ImportError:
-        raise OptionError(f"meshes are read with trimesh, which is not installed: {describe_install('mesh')}") from None
+        message = f"meshes are read with trimesh, which is not installed: {describe_install('mesh')}"
+        raise OptionError(message) from None
     suffix = PurePath(source.name).suffix.lower().removeprefix(".")
     # Objects and groups of OBJ files are parts, regardless of material. Corners are unchanged.
     options |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
@@ -135,11 +124,11 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
         return trimesh.load_scene(source, file_type=suffix, process=False, **options)
     except Exception as error:  # readers of foreign files raise any type
         formats = sorted(trimesh.available_formats())
-        message = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())
-        reason = f"{message or type(error).__name__}; check that the file is complete and has the correct suffix"
+        cause = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())
+        message = f"{cause or type(error).__name__}; check that the file is complete and has the correct suffix"
         if suffix not in formats:
-            reason = f"trimesh reads only the formats {', '.join(formats)}"
-        raise BlockError(f"cannot be read: {escape_braces(reason)}", path=path) from None
+            message = f"trimesh reads only the formats {', '.join(formats)}"
+        raise BlockError(f"cannot be read: {escape_braces(message)}", path=path) from None
 
 
 def _place_part(name: str, mesh: Any, transform: Any) -> MeshPart:
@@ -220,7 +209,8 @@ def compute_properties(
     with np.errstate(over="ignore"):
         extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in scene.parts) * parse_length_unit(unit)
     if extent and not 1e-9 < extent < 1e9:
-        raise BlockError(f"is {extent:.3g} m large, outside the range of bodies; correct {{}}", "unit", path=scene.name)
+        message = f"is {extent:.3g} m large, outside the range of bodies; correct {{}}"
+        raise BlockError(message, "unit", path=scene.name)
     sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", BlockError)))
     clockwise = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])  # seen from above
     rotation = clockwise @ compute_upright_rotation(scene.up if up is None else up) * parse_length_unit(unit)
@@ -235,19 +225,18 @@ def compute_properties(
     for name, surface, moments in zip(names, surfaces, part_moments, strict=True):
         if not moments.amount > 1e-9 * float(np.ptp(surface.vertices, axis=0).max()) ** 3:
             prefix = "" if name == scene.name else f"{name} "
-            raise BlockError(
-                f"{prefix}encloses no volume: it is a surface without an inside; give it a thickness", path=scene.name
-            )
+            message = f"{prefix}encloses no volume: it is a surface without an inside; give it a thickness"
+            raise BlockError(message, path=scene.name)
     part_densities = [densities[name] for name in names]
     total = combine_moments(part_moments, [1.0 if value is None else value for value in part_densities])
     max_height = 1e-3 * height if tolerance is None else checks.positive(tolerance, "tolerance", BlockError, "m")
     if max_height >= height:
-        raise BlockError(
-            f"{{}} must be below the height of the mesh, {height:.4g} m, not {max_height:g}",
-            "tolerance",
-            value=tolerance,
-        )
+        message = f"{{}} must be below the height of the mesh, {height:.4g} m, not {max_height:g}"
+        raise BlockError(message, "tolerance", value=tolerance)
     polygon, notes = _find_support(corners, support, max_height, scene.name)
+    prefixes = [f"{name}: " if len(names) > 1 else "" for name in names]
+    repairs = [prefix + repair for prefix, part in zip(prefixes, surfaces, strict=True) for repair in part.repairs]
+    volumes = [part.amount for part in part_moments]
     arguments = {
         "support": polygon,
         "centre": total.centre - [0.0, 0.0, ground],
@@ -255,15 +244,8 @@ def compute_properties(
         "mass": None if density is None else total.amount,
         "description": scene.name,
         "height": height,
-        "regions": [
-            Region(*fields)
-            for fields in zip(names, (part.amount for part in part_moments), part_densities, strict=True)
-        ],
-        "repairs": tuple(
-            f"{name}: {sentence}" if len(names) > 1 else sentence
-            for name, surface in zip(names, surfaces, strict=True)
-            for sentence in surface.repairs
-        ),
+        "regions": [Region(*fields) for fields in zip(names, volumes, part_densities, strict=True)],
+        "repairs": repairs,
         "notes": (*notes, *describe_overlaps(names, surfaces), *height_notes(height), *density_notes(part_densities)),
     }
     return arguments, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
@@ -281,9 +263,8 @@ def _resolve_densities(
     unknown, missing = [name for name in density if name not in known], [name for name in names if name not in density]
     if unknown:
         hint = checks.suggest(str(unknown[0]), known, parts_text)
-        raise BlockError(
-            f"{{}} has a part {checks.short_repr(unknown[0])}, which the mesh does not have; {hint}", "density"
-        )
+        message = f"{{}} has a part {checks.short_repr(unknown[0])}, which the mesh does not have; {hint}"
+        raise BlockError(message, "density")
     if missing:
         raise BlockError(f"{{}} is missing for {', '.join(missing)}; {parts_text}", "density")
     return {name: checks.positive(density[name], "density", BlockError, "kg/m^3") for name in names}
@@ -297,11 +278,12 @@ def _close_surfaces(
     surfaces = [merge_corners(file, part.vertices, part.faces) for part in parts]
     is_open = [not is_closed(surface.faces) for surface in surfaces]
     if not isinstance(density, Mapping) and sum(is_open) > 1:
-        open_parts = [part for part, has_gap in zip(parts, is_open, strict=True) if has_gap]
+        open_parts = [*itertools.compress(parts, is_open)]
         combined = combine_surfaces([Surface(part.vertices, part.faces) for part in open_parts])
-        closed_indices = [k for k, has_gap in enumerate(is_open) if not has_gap]
-        names = [*(names[k] for k in closed_indices), " + ".join(part.name for part in open_parts)]
-        surfaces = [*(surfaces[k] for k in closed_indices), merge_corners(file, combined.vertices, combined.faces)]
+        is_complete = [not has_gap for has_gap in is_open]
+        names = [*itertools.compress(names, is_complete), " + ".join(part.name for part in open_parts)]
+        merged = merge_corners(file, combined.vertices, combined.faces)
+        surfaces = [*itertools.compress(surfaces, is_complete), merged]
     densities = density if isinstance(density, Mapping) else {}
     closed = orient_surfaces([fill_holes(surface) for surface in surfaces], [name not in densities for name in names])
     nonempty = [k for k, surface in enumerate(closed) if len(surface.faces)]
@@ -320,22 +302,15 @@ def _find_support(
             excess = float(np.max((polygon - outline[0]) @ polygons.compute_directions(azimuths).T - distances))
         if outline is None or excess > 1e-6 * float(np.ptp(corners, axis=0).max()):
             (west, south, _), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
-            raise BlockError(
-                f"{{}} reaches {excess:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in the "
-                f"east and {south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, in the "
-                "mesh's own coordinates",
-                "support",
-            )
+            span = f"from {west:.4g} m to {east:.4g} m in the east and {south:.4g} m to {north:.4g} m in the north"
+            message = f"{{}} reaches {excess:.3g} m beyond the outline of the mesh, {span}"
+            hint = "its corners are (east, north) in m, in the mesh's own coordinates"
+            raise BlockError(f"{message}; {hint}", "support")
         return polygon, ()
     base = polygons.compute_hull(corners[corners[:, 2] <= tolerance, :2])
     if base is None:
-        raise BlockError(
-            f"stands on a point or a line: the corners within {{}}, {tolerance:.3g} m, of the lowest one span no "
-            "polygon; give a larger one, or {}",
-            "tolerance",
-            "support",
-            path=path,
-        )
+        message = f"stands on a point or a line: the corners within {{}}, {tolerance:.3g} m, of the lowest one span no "
+        raise BlockError(f"{message}polygon; give a larger one, or {{}}", "tolerance", "support", path=path)
     wider = polygons.compute_hull(corners[corners[:, 2] <= 10.0 * tolerance, :2])
     assert wider is not None
     growth = polygons.compute_area(wider) / polygons.compute_area(base) - 1.0

@@ -48,16 +48,11 @@ def merge_corners(name: str, vertices: Floats, faces: Integers) -> Surface:
     valid = valid[np.sort(np.unique(rotated, axis=0, return_index=True)[1])]
     edges, _, _, pairs = _index_edges(valid)
     if np.any(edges[pairs[:, 0], 0] == edges[pairs[:, 1], 0]):
-        raise BlockError(
-            "normals of neighbouring triangles point to different sides of the surface: orient them alike, as MeshLab "
-            "does by re-orienting all faces coherently",
-            path=name,
-        )
+        message = "normals of neighbouring triangles point to different sides of the surface: orient them alike, as "
+        raise BlockError(f"{message}MeshLab does by re-orienting all faces coherently", path=name)
     removed_count = len(faces) - len(valid)
-    repairs = (
-        (f"{format_count(removed_count, 'face')} without area, or there twice, left out",) if removed_count else ()
-    )
-    return Surface(vertices[first], valid, repairs)
+    repair = f"{format_count(removed_count, 'face')} without area, or there twice, left out"
+    return Surface(vertices[first], valid, (repair,) if removed_count else ())
 
 
 def combine_surfaces(surfaces: Sequence[Surface]) -> Surface:
@@ -80,12 +75,8 @@ def orient_surfaces(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list
     sizes, owner = np.abs(volumes), surface_of.copy()
     is_cavity = np.zeros(len(shells), bool)
     for n in np.argsort(-sizes, kind="stable"):  # larger pieces first, because they may be cavities
-        may_enclose = (
-            (volumes * volumes[n] < 0.0)
-            & (sizes > sizes[n])
-            & ~is_cavity
-            & ((surface_of == surface_of[n]) | hollow[surface_of[n]])
-        )
+        may_contain = (surface_of == surface_of[n]) | hollow[surface_of[n]]
+        may_enclose = (volumes * volumes[n] < 0.0) & (sizes > sizes[n]) & ~is_cavity & may_contain
         if enclosing := [m for m in np.flatnonzero(may_enclose) if surrounds(*shells[m][:2], *shells[n][:2])]:
             is_cavity[n], owner[n] = True, surface_of[min(enclosing, key=lambda m: sizes[m])]
     is_flipped = np.where(is_cavity, volumes > 0.0, volumes < 0.0)
@@ -112,8 +103,7 @@ def _describe_repairs(cavities: Floats, is_flipped: Flags) -> Iterator[str]:
     if is_flipped.all() and len(is_flipped):
         yield "normals pointed inwards: the surface was turned inside out"
     if len(cavities):
-        count_text = "1 cavity" if len(cavities) == 1 else f"{len(cavities)} cavities"
-        yield f"{count_text} of {cavities.sum():.3g} m^3 taken as hollow"
+        yield f"{format_count(len(cavities), 'cavity')} of {cavities.sum():.3g} m^3 taken as hollow"
     if is_flipped.any() and not is_flipped.all():
         yield f"{format_count(int(is_flipped.sum()), 'separate surface')} turned inside out"
 
@@ -222,7 +212,7 @@ class Moments(NamedTuple):
 
 def compute_signed_volumes(vertices: Floats, faces: Integers) -> Floats:
     """Return the volume between each triangle and the middle, positive if its normal points outwards."""
-    first, second, third = (vertices[faces[:, k]] - _find_middle(vertices) for k in range(3))
+    first, second, third = (vertices[faces[:, k]] - _compute_middle(vertices) for k in range(3))
     return np.asarray(np.einsum("ij,ij->i", first, np.cross(second, third)) / 6.0)
 
 
@@ -232,7 +222,7 @@ def compute_moments(vertices: Floats, faces: Integers) -> Moments:
     Every triangle and a common point span a tetrahedron of signed volume V. With the sum s of its corners a, b, c
     relative to this point, its first moment is V s/4, its second V (s s^T + a a^T + b b^T + c c^T)/20.
     """
-    reference = _find_middle(vertices)
+    reference = _compute_middle(vertices)
     corners = vertices[faces] - reference
     volumes = compute_signed_volumes(vertices, faces)
     amount = float(volumes.sum())
@@ -255,7 +245,7 @@ def combine_moments(parts: Sequence[Moments], densities: Sequence[float]) -> Mom
     return Moments(total, centre, second)
 
 
-def _find_middle(vertices: Floats) -> Floats:
+def _compute_middle(vertices: Floats) -> Floats:
     """Return the middle of all corners, a reference point that avoids cancellation."""
     return np.asarray(0.5 * (vertices.min(axis=0) + vertices.max(axis=0)))
 
@@ -279,21 +269,19 @@ def describe_overlaps(names: Sequence[str], surfaces: Sequence[Surface]) -> tupl
         # An additive recurrence fills the box evenly, and avoids the faces of common shapes.
         fractions = (0.5 + np.arange(count)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1.0
         points = low + fractions * (high - low)
-        windings = np.array(
-            [sum(compute_winding_number(shell.vertices, shell.faces, point) for shell in involved) for point in points]
-        )
-        common = volume * float(np.mean(windings > 1.5))
+        winding_numbers = [
+            sum(compute_winding_number(shell.vertices, shell.faces, point) for shell in involved) for point in points
+        ]
+        common = volume * float(np.mean(np.array(winding_numbers) > 1.5))
         if common > 1e-4 * min(volumes[k] for k in pair):
             overlaps.append((common, *(names[surface_of[k]] for k in pair)))
     if not overlaps:
         return ()
     overlaps.sort(key=lambda pair: -pair[0])
-    texts = [
-        f"{f'{first} and {second}' if first != second else f'two pieces of {first}'} overlap in about {common:.2g} m^3"
-        for common, first, second in overlaps[:3]
-    ]
+    texts = []
+    for common, first, second in overlaps[:3]:
+        pair_text = f"{first} and {second}" if first != second else f"two pieces of {first}"
+        texts.append(f"{pair_text} overlap in about {common:.2g} m^3")
     more = f", and {format_count(len(overlaps) - 3, 'more pair')}" if len(overlaps) > 3 else ""
-    return (
-        f"{', '.join(texts)}{more}, which is counted twice: make one surface of the two, cut one out of the other, or, "
-        "if one is a cavity, turn its normals inwards",
-    )
+    remedy = "make one surface of the two, cut one out of the other, or, if one is a cavity, turn its normals inwards"
+    return (f"{', '.join(texts)}{more}, which is counted twice: {remedy}",)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import DatasetResult, format_some_rows, variable
-from rocking.core.tables import escape_dollars, round_decimal
+from rocking.core.tables import Column, columns_to_records, escape_dollars, round_decimal
 from rocking.errors import OptionError
 from rocking.solid import support as polygons
 
@@ -55,12 +55,10 @@ class ResistanceRose(DatasetResult):
     [0.307, 0.282]
     """
 
-    TABLES = MappingProxyType(
-        {
-            "rose": (*("acceleration", "alpha", "p", "restitution", "radius", "rise"), *("coupling", "aside", "gap")),
-            "support": ("east", "north"),
-        }
-    )
+    TABLES = MappingProxyType({
+        "rose": ("acceleration", "alpha", "p", "restitution", "radius", "rise", "coupling", "aside", "gap"),
+        "support": ("east", "north"),
+    })  # fmt: skip
 
     def _headline(self) -> str:
         data = self.data
@@ -73,23 +71,17 @@ class ResistanceRose(DatasetResult):
             "restitution": "restitution", "coupling": "coupling", "aside": "pivot aside, m"
         }  # fmt: skip
         rows = [*zip(*(data[name].values.tolist() for name in titles), strict=True)]
-        largest = {name: float(data[name].max()) for name in ("coupling", "aside", "gap")}
-        return "\n".join(
-            [
-                self._headline(),
-                "",
-                format_some_rows([*titles.values()], rows),
-                "",
-                "planar rocking leaves out turning about the vertical and rolling over corners: over all azimuths "
-                f"products of inertia are up to {largest['coupling']:.2g} of the moment, pivots lie up to "
-                f"{largest['aside']:.2g} m to the side of the centre of mass, and those of both sides up to "
-                f"{largest['gap']:.2g} m from facing each other",
-            ]
+        coupling, aside, gap = (float(data[name].max()) for name in ("coupling", "aside", "gap"))
+        limits = (
+            "planar rocking leaves out turning about the vertical and rolling over corners: over all azimuths "
+            f"products of inertia are up to {coupling:.2g} of the moment, pivots lie up to {aside:.2g} m to the side "
+            f"of the centre of mass, and those of both sides up to {gap:.2g} m from facing each other"
         )
+        return "\n\n".join([self._headline(), format_some_rows([*titles.values()], rows), limits])
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
-        names = ("azimuth", *self.TABLES["rose"])
+        columns = [Column(name, data[name].values) for name in ("azimuth", *self.TABLES["rose"])]
         return {
             "description": data.description,
             "weakest_azimuth_deg": data.weakest_azimuth,
@@ -97,10 +89,7 @@ class ResistanceRose(DatasetResult):
             "height_of_mass_m": data.height_of_mass,
             "gravity_m_s2": data.gravity,
             "support_m": np.column_stack([data.east.values, data.north.values]).tolist(),
-            "rose": [
-                dict(zip(names, row, strict=True))
-                for row in zip(*(data[name].values.tolist() for name in names), strict=True)
-            ],
+            "rose": columns_to_records(columns),
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -138,45 +127,36 @@ def compute_rose(
 
     front, back = (polygons.compute_extents(polygon, direction) for direction in (azimuths, azimuths + 180.0))
     radius, back_radius = np.hypot(front.distance, height), np.hypot(back.distance, height)
-    squared, coupling = compute_axis_moments(inertia, azimuths)
+    gyration_squared, coupling = compute_axis_moments(inertia, azimuths)
     edge_azimuths, distances = polygons.compute_edges(polygon)
     weakest = int(np.argmin(distances))
+    numerator = gyration_squared + height**2 - front.distance * back.distance
+    restitution = numerator / (gyration_squared + back_radius**2)
+    gap = np.maximum(np.maximum(front.low + back.low, -front.high - back.high), 0.0)
+    meaning = "factor on the angular speed on leaving this side, by angular momentum; not positive: too stocky to rock"
     columns = {
         "acceleration": (front.distance / height, "ground acceleration that lifts the body to this side", "g"),
         "alpha": (np.arctan2(front.distance, height), "slenderness, at which a tilted table overturns it", "rad"),
-        "p": (np.sqrt(gravity * radius / (squared + radius**2)), "frequency parameter", "rad/s"),
-        "restitution": (
-            (squared + height**2 - front.distance * back.distance) / (squared + back_radius**2),
-            "factor on the angular speed on leaving this side, by angular momentum; not positive: too stocky to rock",
-            "1",
-        ),
+        "p": (np.sqrt(gravity * radius / (gyration_squared + radius**2)), "frequency parameter", "rad/s"),
+        "restitution": (restitution, meaning, "1"),
         "radius": (radius, "distance from the pivot to the centre of mass", "m"),
         "rise": (radius - height, "rise of the centre of mass up to the unstable balance", "m"),
         "coupling": (coupling, "products of inertia about the axis of rocking over the moment of inertia", "1"),
         "aside": (front.aside, "how far the pivot lies to the side of the centre of mass", "m"),
-        "gap": (
-            np.maximum(np.maximum(front.low + back.low, -front.high - back.high), 0.0),
-            "how far the pivots of both sides are from facing each other",
-            "m",
-        ),
+        "gap": (gap, "how far the pivots of both sides are from facing each other", "m"),
     }
-    return ResistanceRose(
-        xr.Dataset(
-            {
-                **{name: variable("azimuth", values, label, unit) for name, (values, label, unit) in columns.items()},
-                "east": variable("corner", polygon[:, 0], "support, east of the centre of mass", "m"),
-                "north": variable("corner", polygon[:, 1], "support, north of the centre of mass", "m"),
-            },
-            {"azimuth": variable("azimuth", azimuths, "clockwise from north", "deg")},
-            {
-                "description": description,
-                "weakest_azimuth": float(edge_azimuths[weakest]),
-                "weakest_acceleration": float(distances[weakest] / height),
-                "height_of_mass": height,
-                "gravity": gravity,
-            },
-        )
-    )
+    variables = {name: variable("azimuth", values, label, unit) for name, (values, label, unit) in columns.items()}
+    variables["east"] = variable("corner", polygon[:, 0], "support, east of the centre of mass", "m")
+    variables["north"] = variable("corner", polygon[:, 1], "support, north of the centre of mass", "m")
+    attributes = {
+        "description": description,
+        "weakest_azimuth": float(edge_azimuths[weakest]),
+        "weakest_acceleration": float(distances[weakest] / height),
+        "height_of_mass": height,
+        "gravity": gravity,
+    }
+    coordinates = {"azimuth": variable("azimuth", azimuths, "clockwise from north", "deg")}
+    return ResistanceRose(xr.Dataset(variables, coordinates, attributes))
 
 
 def compute_axis_moments(inertia: Floats, azimuths: Floats) -> tuple[Floats, Floats]:
@@ -184,6 +164,6 @@ def compute_axis_moments(inertia: Floats, azimuths: Floats) -> tuple[Floats, Flo
     directions = polygons.compute_directions(azimuths)
     axis = np.column_stack([directions[:, 1], -directions[:, 0], np.zeros(len(directions))])
     torque = axis @ inertia
-    squared = np.sum(torque * axis, axis=1)
+    gyration_squared = np.sum(torque * axis, axis=1)
     products = np.hypot(np.sum(torque[:, :2] * directions, axis=1), torque[:, 2])
-    return squared, products / squared
+    return gyration_squared, products / gyration_squared

@@ -105,11 +105,9 @@ class Solid(Result):
         azimuths, distances = polygons.compute_edges(self._centred_support)
         weakest = int(np.argmin(distances))
         if not distances[weakest] > 0.0:
-            raise BlockError(
-                f"this body does not stand: its centre of mass lies {-distances[weakest]:.3g} m outside its support, "
-                f"towards {azimuths[weakest]:.0f} deg; correct which axis points up, the densities, or {{}}",
-                "support",
-            )
+            place = f"{-distances[weakest]:.3g} m outside its support, towards {azimuths[weakest]:.0f} deg"
+            message = f"this body does not stand: its centre of mass lies {place}; correct which axis points up, the "
+            raise BlockError(f"{message}densities, or {{}}", "support")
 
     @classmethod
     def from_mesh(
@@ -225,32 +223,19 @@ class Solid(Result):
         Block.from_pivots : Create a block from its pivots and its radius of gyration.
         """
         plane = compute_plane(self, azimuth)
-        plus, minus = plane.pivots.distance.tolist()
-        return Block.from_pivots(
-            (plus, minus),
-            plane.height,
-            plane.gyration,
-            restitution=restitution,
-            mass=self.mass,
-            gravity=self.gravity,
-            description=f"{self.description} in the plane of {plane.azimuth:.5g} deg",
-        )
+        options: dict[str, Any] = {"restitution": restitution, "mass": self.mass, "gravity": self.gravity}
+        options["description"] = f"{self.description} in the plane of {plane.azimuth:.5g} deg"
+        return Block.from_pivots(plane.pivots.distance.tolist(), plane.height, plane.gyration, **options)
 
     def rose(self, azimuths: ArrayLike | None = None) -> ResistanceRose:
         """Compute the resistance at azimuths, in degrees clockwise from north; by default every five."""
-        angles = check_azimuths(azimuths)
-        height = float(self.centre[2])
-        return compute_rose(
-            self._centred_support, height, self.inertia_over_mass, self.gravity, angles, self.description
-        )
+        angles, support, height = check_azimuths(azimuths), self._centred_support, float(self.centre[2])
+        return compute_rose(support, height, self.inertia_over_mass, self.gravity, angles, self.description)
 
     def _headline(self) -> str:
-        sizes = [
-            None if self.height is None else f"{self.height:.4g} m high",
-            None if self.volume is None else f"{self.volume:.4g} m^3",
-            None if self.mass is None else f"{self.mass:.4g} kg",
-        ]
-        return ": ".join(part for part in (self.description, ", ".join(filter(None, sizes))) if part)
+        values = {"m high": self.height, "m^3": self.volume, "kg": self.mass}
+        sizes = ", ".join(f"{value:.4g} {unit}" for unit, value in values.items() if value is not None)
+        return ": ".join(filter(None, (self.description, sizes)))
 
     def summary(self) -> str:
         weakest = self.rose([self.weakest_azimuth])
@@ -258,11 +243,10 @@ class Solid(Result):
         east, north = (float(coordinate) for coordinate in self.centre[:2])
         sizes = np.ptp(self.support, axis=0)
         radii = np.sqrt(np.diag(self.inertia_over_mass))
+        densities = ["" if region.density is None else f" of {region.density:g} kg/m^3" for region in self.regions]
+        parts = [f"{region.name}: {region.volume:.4g} m^3" for region in self.regions]
         rows = [
-            *(
-                Row("part", f"{name}: {volume:.4g} m^3", note=f" of {density:g} kg/m^3" if density is not None else "")
-                for name, volume, density in self.regions
-            ),
+            *(Row("part", part, note=density) for part, density in zip(parts, densities, strict=True)),
             Row("centre of mass", f"{self.centre[2]:.5g} m high, at {east:.4g} m east, {north:.4g} m north"),
             Row("radii of gyration", "about axes to the east, to the north and up "
                 + ", ".join(f"{radius:.4g} m" for radius in radii)),
@@ -278,23 +262,14 @@ class Solid(Result):
         return f"{self._headline()}\n\n{format_rows(rows, 22)}"
 
     def to_dict(self) -> dict[str, Any]:
-        rows = [
-            Row("height", self.height, "m"),
-            Row("volume", self.volume, "m^3"),
-            Row("mass", self.mass, "kg"),
-            Row("gravity", self.gravity, "m/s^2"),
-            Row("centre", self.centre, "m"),
-            Row("inertia_over_mass", self.inertia_over_mass, "m^2"),
-            Row("support", self.support, "m"),
-            Row("weakest_azimuth", self.weakest_azimuth, "deg"),
-        ]
+        units = {"height": "m", "volume": "m^3", "mass": "kg", "gravity": "m/s^2", "centre": "m"}
+        units |= {"inertia_over_mass": "m^2", "support": "m", "weakest_azimuth": "deg"}
+        rows = [Row(name, getattr(self, name), unit) for name, unit in units.items()]
+        region_units = {"name": "1", "volume": "m^3", "density": "kg/m^3"}
         return {
             "description": self.description,
             **rows_to_dict(rows),
-            "regions": [
-                rows_to_dict([Row("name", name), Row("volume", volume, "m^3"), Row("density", density, "kg/m^3")])
-                for name, volume, density in self.regions
-            ],
+            "regions": [rows_to_dict(map(Row, region_units, part, region_units.values())) for part in self.regions],
             "repairs": [*self.repairs],
             "notes": [*self.notes],
         }
@@ -316,8 +291,8 @@ def compute_plane(solid: Solid, azimuth: float) -> Plane:
     mean, difference = pivots.distance.mean(), np.ptp(pivots.distance)
     if difference <= 1e-12 * mean:  # rounding only: a symmetric body has equal sides at any position
         pivots = pivots._replace(distance=np.full(2, mean))
-    squared, _ = compute_axis_moments(solid.inertia_over_mass, np.array([direction]))
-    return Plane(direction, pivots, float(solid.centre[2]), math.sqrt(float(squared[0])))
+    gyration_squared, _ = compute_axis_moments(solid.inertia_over_mass, np.array([direction]))
+    return Plane(direction, pivots, float(solid.centre[2]), math.sqrt(float(gyration_squared[0])))
 
 
 def _check_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
@@ -334,9 +309,6 @@ def _check_inertia(value: ArrayLike) -> Floats:
     smallest, middle, largest = np.linalg.eigvalsh(0.5 * (tensor + tensor.T))
     is_symmetric = np.allclose(tensor, tensor.T, rtol=0.0, atol=rounding)
     if not (rounding > 0.0 and is_symmetric and smallest + middle >= largest - rounding and smallest > -rounding):
-        raise BlockError(
-            "{} must be symmetric, with each principal moment at most the sum of the other two",
-            "inertia_over_mass",
-            value=value,
-        )
+        message = "{} must be symmetric, with each principal moment at most the sum of the other two"
+        raise BlockError(message, "inertia_over_mass", value=value)
     return tensor

@@ -16,20 +16,20 @@ from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import format_count, read_csv_rows
 from rocking.engine.schemes import chattering_scheme
-from rocking.errors import MotionError, OptionError, RecordError, StudyError
+from rocking.errors import MotionError, OptionError, RecordError, StudyError, join_placeholders
 from rocking.inputs import quantities
 from rocking.inputs.bodies import (
     check_parameters,
     create_block,
     create_body,
+    find_description,
     find_reader,
-    find_shape,
     note_likely_mistakes,
 )
 from rocking.inputs.declared import BLOCK, COUPLES, FORCES, INPUTS, SUPPORTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes
 from rocking.inputs.pulses import find_family
-from rocking.inputs.toml import Tables, locate_errors, suggest_key
+from rocking.inputs.toml import Tables, locate_errors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.named import expand_record_names, load_motion, path_exists
@@ -155,18 +155,19 @@ def _check_tables(tables: Tables) -> None:
     for table, content in tables.tables.items():
         if table not in SCHEMA:
             moved_hint = "its options are now those of rocking study report"
-            hint = moved_hint if table == "report" else suggest_key(table, SCHEMA)
+            hint = moved_hint if table == "report" else checks.suggest(table, [*SCHEMA])
             raise tables.create_error(table, None, f"there is no table [{{}}]; {hint}", table)
         if not isinstance(content, dict):
             raise tables.create_error(table, None, f"{{}} must be one table, [{table}], once", table)
         for key, value in content.items():
             if key not in SCHEMA[table]:
-                raise tables.create_error(table, key, f"[{table}] has no {{}}; {suggest_key(key, SCHEMA[table])}", key)
+                message = f"[{table}] has no {{}}; {checks.suggest(key, SCHEMA[table])}"
+                raise tables.create_error(table, key, message, key)
             kind, expected = _VALUE_TYPES.get(key, (object, ""))
             is_valid = isinstance(value, list if isinstance(kind, list) else kind)
             if not is_valid or (isinstance(kind, list) and not all(isinstance(item, kind[0]) for item in value)):
-                sentence = f"{{}} must be {expected}, not {checks.short_repr(value)}"
-                raise tables.create_error(table, key, sentence, key, value=value)
+                message = f"{{}} must be {expected}, not {checks.short_repr(value)}"
+                raise tables.create_error(table, key, message, key, value=value)
     for needed in ("blocks", "motions"):
         if needed not in tables.tables:
             raise StudyError("the table [{}] is missing", needed, path=str(tables.file))
@@ -180,7 +181,7 @@ def _read_bodies(tables: Tables) -> Bodies:
             raise tables.create_error("blocks", "csv", "{} cannot be combined with other keys", "csv")
         return _read_blocks_csv(tables, tables.file.parent / entries["csv"])
     with tables.locating_errors("blocks"):
-        find_shape(entries)
+        find_description(entries)
     axes: dict[str, Any] = {}
     for name in (*(name for name in entries if name in BLOCK), "one_sided", "lean", *COUPLES):
         with tables.locating_errors("blocks", key=name):
@@ -196,11 +197,8 @@ def _read_bodies(tables: Tables) -> Bodies:
         checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
         rows = [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
         blocks = [create_block(row) for row in rows]
-        pairs = zip(blocks, rows, strict=True)
-        bodies: list[Any] = [
-            create_body(block, row, [value for value in row.values() if isinstance(value, Restraint)])
-            for block, row in pairs
-        ]
+        restraints = [[value for value in row.values() if isinstance(value, Restraint)] for row in rows]
+        bodies: list[Any] = [*map(create_body, blocks, rows, restraints)]
         note_likely_mistakes(blocks, bodies)
         return Blocks.from_bodies(bodies)
 
@@ -247,9 +245,8 @@ def _read_blocks_csv(tables: Tables, file: Path) -> Blocks:
         reason = error.strerror if isinstance(error, OSError) else "it is not a text table in UTF-8; save it as CSV"
         raise tables.create_error("blocks", "csv", f"{file} cannot be read: {reason}") from None
     if len(rows) < 2:
-        raise tables.create_error(
-            "blocks", "csv", f"{file} contains no blocks; a heading and a row for each block are required"
-        )
+        message = f"{file} contains no blocks; a heading and a row for each block are required"
+        raise tables.create_error("blocks", "csv", message)
     headings, known_names = rows[0][1], [name + suffix for name in BLOCK for suffix in ("", *_SIDE_SUFFIXES)]
     for name in headings:
         suggestion = "" if name in known_names else checks.suggest(name, known_names, "")
@@ -260,17 +257,14 @@ def _read_blocks_csv(tables: Tables, file: Path) -> Blocks:
     for line, row in rows[1:]:
         with locate_errors(file, line):
             if len(row) != len(headings):
-                raise StudyError(
-                    f"this row has {format_count(len(row), 'cell')} for {format_count(len(headings), 'column')}; "
-                    "correct it"
-                )
-            cells = dict(zip(headings, row, strict=True))
-            texts = {
-                name: ",".join(cells[name + suffix] for suffix in _SIDE_SUFFIXES if name + suffix in cells)
-                for name in BLOCK
-            }
-            nonempty = {name: cells.get(name, text) for name, text in texts.items()}
-            blocks.append(create_block({name: INPUTS[name].read(text) for name, text in nonempty.items() if text}))
+                cells_text, columns_text = format_count(len(row), "cell"), format_count(len(headings), "column")
+                raise StudyError(f"this row has {cells_text} for {columns_text}; correct it")
+            cells, values = dict(zip(headings, row, strict=True)), {}
+            for name in BLOCK:
+                sides = [cells[name + suffix] for suffix in _SIDE_SUFFIXES if name + suffix in cells]
+                if text := cells.get(name, ",".join(sides)):
+                    values[name] = INPUTS[name].read(text)
+            blocks.append(create_block(values))
     note_likely_mistakes(blocks)
     return Blocks.from_bodies(blocks)
 
@@ -279,9 +273,8 @@ def _read_scales(tables: Tables) -> Scales:
     entries = tables.table("scales")
     measures = [name for name in _MEASURES if name in entries]
     if len(measures) > 1:
-        placeholders = " and ".join(["{}"] * len(measures))
-        sentence = f"motions can be scaled to one measure only, not to {placeholders}"
-        raise tables.create_error("scales", measures[0], sentence, *measures)
+        message = f"motions can be scaled to one measure only, not to {join_placeholders(measures)}"
+        raise tables.create_error("scales", measures[0], message, *measures)
     options = {option: entries[option] for option in ("period", "damping") if option in entries}
     for option in () if "sa" in entries else options:
         raise tables.create_error("scales", option, "{} is only allowed with {}", option, "sa")
@@ -298,9 +291,8 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
     """Load the motions; return them, their records, and a sentence for each skipped record."""
     entries, folder = tables.table("motions"), tables.file.parent
     if "vertical" in entries and not entries.get("records"):
-        raise tables.create_error(
-            "motions", "vertical", "{} applies only to records; add a record, or omit it", "vertical"
-        )
+        message = "{} applies only to records; add a record, or omit it"
+        raise tables.create_error("motions", "vertical", message, "vertical")
     names_by_path: dict[str, str] = {}  # names in the file by path or record name
     for name in entries.get("records", []):
         with tables.locating_record_errors(name):

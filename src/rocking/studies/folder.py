@@ -9,7 +9,7 @@ import json
 import os
 import socket
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Final
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rocking.dynamics.bodies  # noqa: F401 -- registers its kinds
-from rocking.block.body import KINDS
+from rocking.block.body import BODIES_TYPES
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import format_count, write_bytes
@@ -26,7 +26,7 @@ from rocking.errors import DamagedStudyError, OutputError, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, Scales, build_setup
+from rocking.simulation.ensemble import Product, Scales, create_setup
 from rocking.studies.units import OUTCOMES, Key, UnitGrid, UnitInput, decode, format_key, identify_program, seal, unseal
 
 if sys.platform == "win32":
@@ -44,11 +44,11 @@ else:
 
 
 #: File that describes a study; its number increases when other versions cannot read it.
-_INPUTS: Final = "study.npz"
+_INPUT_FILE: Final = "study.npz"
 _FORMAT: Final = 4
 
 #: Folder of the units, inside the folder of the study.
-_UNITS: Final = "units"
+_UNIT_FOLDER: Final = "units"
 
 
 class Store:
@@ -56,14 +56,13 @@ class Store:
 
     def __init__(self, path: str | Path) -> None:
         self.folder = check_folder(path)
-        data = read_bytes(self.folder / _INPUTS)
+        data = read_bytes(self.folder / _INPUT_FILE)
         if data is None:
             raise StudyError("the folder contains no study: create it first", path=str(path))
         archive = unseal(data)
         if archive is None:
-            raise StudyError(
-                f"{_INPUTS} is damaged: restore it, or create the study again elsewhere", path=str(self.folder)
-            )
+            message = f"{_INPUT_FILE} is damaged: restore it, or create the study again elsewhere"
+            raise StudyError(message, path=str(self.folder))
         with np.load(io.BytesIO(archive), allow_pickle=False) as arrays:
             self.inputs: dict[str, NDArray[Any]] = dict(arrays)
         header = json.loads(str(self.inputs.pop("about")))
@@ -79,49 +78,38 @@ class Store:
     @staticmethod
     def create(path: str | Path, product: Product, unit: Sequence[int], records: Sequence[str]) -> None:
         """Write a new store into an empty folder."""
-        buffer, header = (
-            io.BytesIO(),
-            {"format": _FORMAT, "program": identify_program(), "unit": unit, "records": records},
-        )
+        header = {"format": _FORMAT, "program": identify_program(), "unit": unit, "records": records}
         arrays: dict[str, Any] = _product_to_arrays(product) | {"about": np.array(json.dumps(header))}
+        buffer = io.BytesIO()
         np.savez_compressed(buffer, **arrays)
-        write_atomically(check_folder(path) / _INPUTS, seal(buffer.getvalue()))
+        write_atomically(check_folder(path) / _INPUT_FILE, seal(buffer.getvalue()))
 
     def check_program(self) -> None:
         """Raise a StudyError unless this program computes the same bits as the store."""
         if self.program != identify_program():
-            raise StudyError(
-                f"the study was created by {self.program}, this is {identify_program()}: run it with that version, or "
-                "create it again elsewhere",
-                path=str(self.folder),
-            )
+            remedy = "run it with that version, or create it again elsewhere"
+            message = f"the study was created by {self.program}, this is {identify_program()}: {remedy}"
+            raise StudyError(message, path=str(self.folder))
 
     def check_inputs(self, product: Product) -> None:
         """Check the inputs against the store; a StudyError names the parts that differ."""
-        new_arrays, stored_arrays = _product_to_arrays(product), self.inputs
-        changed = [
-            "/".join(name.split("/")[:2])
-            for name in (stored_arrays | new_arrays)
-            if name not in stored_arrays
-            or name not in new_arrays
-            or new_arrays[name].tobytes() != stored_arrays[name].tobytes()
-        ]
+        inputs = self.inputs, _product_to_arrays(product)
+        stored, new = ({name: array.tobytes() for name, array in arrays.items()} for arrays in inputs)
+        changed = [name for name in stored | new if stored.get(name) != new.get(name)]
         if changed:
-            parts = [*dict.fromkeys(changed)]
-            summary = ", ".join(parts[:3]) + (" and more" if len(parts) > 3 else "")
-            raise StudyError(
-                f"the folder contains a study of other inputs ({summary} changed), {len(self.find_done())} of "
-                f"{format_count(len(self.grid), 'unit')} done: create this study elsewhere, or remove the other one",
-                path=str(self.folder),
-            )
+            parts = dict.fromkeys("/".join(name.split("/")[:2]) for name in changed)
+            progress = f"{len(self.find_done())} of {format_count(len(self.grid), 'unit')} done"
+            message = f"the folder contains a study of other inputs ({_list_some(parts)} changed), {progress}"
+            message += ": create this study elsewhere, or remove the other one"
+            raise StudyError(message, path=str(self.folder))
 
     def unit_path(self, key: Key) -> Path:
         """Return the file of a unit."""
-        return self.folder / _UNITS / format_key(key)
+        return self.folder / _UNIT_FOLDER / format_key(key)
 
     def find_done(self) -> set[Key]:
         """Return the keys of the units that are done."""
-        with contextlib.suppress(FileNotFoundError), os.scandir(self.folder / _UNITS) as entries:
+        with contextlib.suppress(FileNotFoundError), os.scandir(self.folder / _UNIT_FOLDER) as entries:
             names = {entry.name for entry in entries}
             return {key for key in self.grid if format_key(key) in names}
         return set()
@@ -130,10 +118,8 @@ class Store:
         """Raise a StudyError if units are missing."""
         missing = len(self.grid) - len(self.find_done())
         if missing:
-            raise StudyError(
-                f"{missing} of {len(self.grid)} units are missing; complete the study first",
-                path=str(self.folder),
-            )
+            message = f"{missing} of {len(self.grid)} units are missing; complete the study first"
+            raise StudyError(message, path=str(self.folder))
 
     def read_outcomes(self, key: Key) -> Mapping[str, Floats] | None:
         """Return the outcomes of a full unit by name, or None; raise a StudyError if it is damaged."""
@@ -149,7 +135,7 @@ class Store:
         """Create the complete input of a worker for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
-        return UnitInput(build_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
+        return UnitInput(create_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
 
     def _compute_factors(self, unit: int) -> Floats:
         """Return the factors on the motions of a unit, shape (motions, scales, polarities)."""
@@ -169,7 +155,7 @@ def check_folder(path: str | Path) -> Path:
 
 def contains_study(path: str | Path) -> bool:
     """Return whether a folder contains a study."""
-    return (check_folder(path) / _INPUTS).exists()
+    return (check_folder(path) / _INPUT_FILE).exists()
 
 
 def require_empty(path: str | Path) -> None:
@@ -177,8 +163,12 @@ def require_empty(path: str | Path) -> None:
     folder = check_folder(path)
     names = sorted({entry.name for entry in folder.glob("[!.]*")} - {"lock"})
     if names:
-        summary = ", ".join(names[:3]) + (" and more" if len(names) > 3 else "")
-        raise StudyError(f"the folder contains no study, but {summary}: choose a new or empty folder", path=str(folder))
+        message = f"the folder contains no study, but {_list_some(names)}: choose a new or empty folder"
+        raise StudyError(message, path=str(folder))
+
+
+def _list_some(names: Collection[str]) -> str:
+    return ", ".join([*names][:3]) + (" and more" if len(names) > 3 else "")
 
 
 def read_bytes(file: Path) -> bytes | None:
@@ -219,10 +209,8 @@ def lock_folder(path: str | Path, *, shared: bool = False) -> Iterator[None]:
                 # On Windows the locked byte is unreadable, so the name begins at the second byte.
                 file.seek(1)
                 holder = file.read().decode(errors="replace") or "another process"
-                raise StudyError(
-                    f"the study is being run by {holder}; wait until it ends, or stop it there and run it again",
-                    path=str(folder),
-                ) from None
+                message = f"the study is being run by {holder}; wait until it ends, or stop it there and run it again"
+                raise StudyError(message, path=str(folder)) from None
             file.truncate(0)
             file.write(f" process {os.getpid()} on {socket.gethostname()}".encode())
             for remains in () if shared else folder.rglob(".*.part*"):  # remains of a killed process
@@ -247,53 +235,38 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
     for k, motion in enumerate(product.motions):
         arrays |= _motion_to_arrays(motion, f"motions/{k}")
     measure = None if scales.measure is None else {"name": scales.measure.name, **scales.measure.options()}
-    rules = {
-        "scales/measure": measure,
-        "rules/polarity": product.polarity,
-        "rules/model": product.model,
-        "rules/chattering": str(product.chattering),
-        "rules/duration": product.duration,
-    }
-    texts = {name: np.array(json.dumps(value)) for name, value in rules.items()}
+    rules = {name: getattr(product, name) for name in ("polarity", "model", "chattering", "duration")}
+    rules["chattering"] = str(product.chattering)
+    values = {"scales/measure": measure} | {f"rules/{name}": value for name, value in rules.items()}
+    texts = {name: np.array(json.dumps(value)) for name, value in values.items()}
     return arrays | {"scales/values": scales.values} | texts
 
 
 def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
     """Create the inputs from their arrays."""
-    kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in KINDS), "")
+    kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in BODIES_TYPES), "")
     if not kind:
         raise StudyError("the study contains an unknown kind of body: import its module first")
     values = {name.partition("/")[2]: array for name, array in arrays.items() if name.startswith(f"{kind}/")}
     motions = dict.fromkeys(name.split("/")[1] for name in arrays if name.startswith("motions/"))
     texts = {name: json.loads(str(array)) for name, array in arrays.items() if array.dtype.kind == "U"}
-    measure = texts["scales/measure"]
+    measure, chattering = texts["scales/measure"], chattering_scheme(texts["rules/chattering"])
     return Product(
-        KINDS[kind](**{**values, "gravity": float(values["gravity"])}),
+        BODIES_TYPES[kind](**{**values, "gravity": float(values["gravity"])}),
         tuple(_motion_from_arrays(arrays, f"motions/{k}") for k in motions),
         Scales(None if measure is None else Measure(**measure), arrays["scales/values"]),
-        texts["rules/polarity"],
-        texts["rules/model"],
-        chattering_scheme(texts["rules/chattering"]),
-        texts["rules/duration"],
+        *(texts["rules/polarity"], texts["rules/model"], chattering, texts["rules/duration"]),
     )
 
 
 def _motion_to_arrays(motion: Motion, prefix: str) -> dict[str, NDArray[Any]]:
-    description = motion.description
-    texts = {
-        "name": motion.name,
-        "family": description.family,
-        "parameters": dict(description.parameters),
-        "text": description.text,
-        "history": motion.history,
-        "error": motion.error,
-    }
-    arrays: dict[str, NDArray[Any]] = {
-        f"{prefix}/breakpoints": motion.breakpoints,
-        f"{prefix}/coefficients": motion.coefficients,
-        f"{prefix}/words": np.array(json.dumps(texts)),
-    }
-    return arrays if motion.vertical is None else arrays | _motion_to_arrays(motion.vertical, f"{prefix}/vertical")
+    family, text, parameters = (getattr(motion.description, name) for name in ("family", "text", "parameters"))
+    texts = {"name": motion.name, "family": family, "parameters": dict(parameters), "text": text}
+    texts |= {"history": motion.history, "error": motion.error}
+    arrays = {"breakpoints": motion.breakpoints, "coefficients": motion.coefficients}
+    arrays["words"] = np.array(json.dumps(texts))
+    vertical = {} if motion.vertical is None else _motion_to_arrays(motion.vertical, f"{prefix}/vertical")
+    return {f"{prefix}/{name}": array for name, array in arrays.items()} | vertical
 
 
 def _motion_from_arrays(arrays: Mapping[str, NDArray[Any]], prefix: str) -> Motion:

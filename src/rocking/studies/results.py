@@ -48,7 +48,7 @@ from rocking.engine.problem import compute_slenderness
 from rocking.engine.tasks import OUTCOME, describe_missing
 from rocking.errors import FitError, OptionError, StudyError, describe_install
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, body_coordinates, build_dataset, collect_verticals
+from rocking.simulation.ensemble import Product, body_coordinates, collect_verticals, create_dataset
 from rocking.studies.folder import Store
 from rocking.studies.units import OUTCOMES, format_key
 
@@ -78,7 +78,7 @@ def open_results(store: Store) -> xr.Dataset:
         outcomes["done"] = np.zeros(grid.shape, dtype=bool)
         for key in done:
             outcomes["done"][grid.ranges(key)] = True
-    return _add_records(store, build_dataset(store.product, outcomes))
+    return _add_records(store, create_dataset(store.product, outcomes))
 
 
 def _add_records(store: Store, data: xr.Dataset) -> xr.Dataset:
@@ -118,17 +118,14 @@ def _read_selection(store: Store, names: Sequence[str], complete: bool, key: _Se
     units = [np.unique(axis // part).tolist() for axis, part in zip(indices, grid.unit, strict=True)]
     for unit in itertools.product(*units):
         targets = [np.flatnonzero(axis // part == k) for axis, part, k in zip(indices, grid.unit, unit, strict=True)]
-        sources = [
-            axis[target] - k * part for axis, target, part, k in zip(indices, targets, grid.unit, unit, strict=True)
-        ]
+        sources = [axis[target] % part for axis, target, part in zip(indices, targets, grid.unit, strict=True)]
         outcomes = store.read_outcomes(unit)
         if outcomes is not None:
             for values, name in zip(selection, names, strict=True):
                 values[np.ix_(*targets)] = outcomes[name][np.ix_(*sources)]
         elif complete:
-            raise StudyError(
-                f"unit {format_key(unit)} was removed after these results were opened: run the study again"
-            )
+            event = f"unit {format_key(unit)} was removed after these results were opened"
+            raise StudyError(f"{event}: run the study again")
     single = tuple(position for position, axis in enumerate(axes) if axis.ndim == 0)
     return [values.squeeze(axis=single) for values in selection]
 
@@ -166,7 +163,8 @@ def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise OptionError(f"Parquet requires pyarrow: {describe_install('parquet')}, or write CSV or NetCDF") from None
+        message = f"Parquet requires pyarrow: {describe_install('parquet')}, or write CSV or NetCDF"
+        raise OptionError(message) from None
     tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
     first = next(tables)
     with parquet.ParquetWriter(target, first.schema) as file:
@@ -199,34 +197,24 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     changed = (holds[:, 1:] != holds[:, :-1]) & (below[:, :-1] >= 0)
     motion, polarity, block, scale = np.nonzero(changed.transpose(0, 2, 3, 1))
     low = below[motion, scale, polarity, block]
-    coordinates, attributes = build_dataset(product, {}), product.scales.attributes
-    variable_name, meaning = {
-        "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
-        "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not below"),
-    }[outcome]
-    unit = attributes["units"]
-    return xr.Dataset(
-        {
-            "low": variable("change", levels[low], "scale below the change", unit),
-            "high": variable("change", levels[scale + 1], "scale above the change", unit),
-            variable_name: variable("change", holds[motion, scale + 1, polarity, block], meaning),
-            "known": variable("change", low == scale, "whether the outcomes of all simulations are known"),
-        },
-        {
-            **{
-                str(name): ("change", coordinate.values[motion])
-                for name, coordinate in _add_records(store, coordinates).coords.items()
-                if coordinate.dims == ("motion",)
-            },
-            "polarity": ("change", np.where(np.array(product.signs)[polarity] > 0, "+", "-")),
-            "block": ("change", block),
-            **{
-                name: ("change", np.asarray(values)[block], details)
-                for name, (_, values, details) in body_coordinates(product.bodies).items()
-            },
-        },
-        coordinates.attrs | {name: value for name, value in attributes.items() if name != "units"},
-    )
+    dataset, attributes = _add_records(store, create_dataset(product, {})), product.scales.attributes
+    name, meaning = ("overturns", "whether the scale above overturns the block, and the one below does not")
+    if outcome == "complete_chattering":
+        name, meaning = ("completes", "whether chattering is complete at the scale above, and not below")
+    unit = attributes.pop("units")
+    variables = {
+        "low": variable("change", levels[low], "scale below the change", unit),
+        "high": variable("change", levels[scale + 1], "scale above the change", unit),
+        name: variable("change", holds[motion, scale + 1, polarity, block], meaning),
+        "known": variable("change", low == scale, "whether the outcomes of all simulations are known"),
+    }
+    motions = {name: values for name, values in dataset.coords.items() if values.dims == ("motion",)}
+    coordinates: dict[Any, Any] = {name: ("change", values.values[motion]) for name, values in motions.items()}
+    coordinates["polarity"] = ("change", np.where(np.array(product.signs)[polarity] > 0, "+", "-"))
+    coordinates["block"] = ("change", block)
+    for name, (_, values, details) in body_coordinates(product.bodies).items():
+        coordinates[name] = ("change", np.asarray(values)[block], details)
+    return xr.Dataset(variables, coordinates, dataset.attrs | attributes)
 
 
 def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
@@ -242,11 +230,9 @@ def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
         selection = _ALL, _ALL, polarities, blocks
         peak, overturned, unfinished, stopped = _read_selection(store, names, True, selection)
         if stopped.any():
-            raise StudyError(
-                f"{np.count_nonzero(stopped)} of {stopped.size} simulations were stopped by the study's duration, "
-                "while the block moved or the motion went on, so that their outcomes are unknown: create the study "
-                "without a duration"
-            )
+            count_text = f"{np.count_nonzero(stopped)} of {stopped.size} simulations"
+            message = "were stopped by the study's duration, while the block moved or the motion went on, so that their"
+            raise StudyError(f"{count_text} {message} outcomes are unknown: create the study without a duration")
         alpha = compute_slenderness(store.product.bodies.select(blocks))
         yield blocks, compute_ratios(alpha, peak, overturned != 0.0, unfinished != 0.0)
 
@@ -289,11 +275,7 @@ class BlockTable(DatasetResult):
     @property
     def block_parameters(self) -> dict[str, Floats]:
         """Return the parameters of the blocks in the tables, by name, in SI units."""
-        return {
-            str(name): coordinate.values
-            for name, coordinate in self.data.coords.items()
-            if coordinate.dims == ("block",)
-        }
+        return {str(name): values.values for name, values in self.data.coords.items() if values.dims == ("block",)}
 
     def summary(self) -> str:
         columns = [column for column in self._columns("blocks") if column.name != "fault"]  # too long for a table
@@ -327,19 +309,16 @@ class BlockTable(DatasetResult):
         else:
             measure, names = _parse_measure(self.data.attrs), [str(name) for name in plotted.limit_state.values]
             panels, missing, label = measure.display_factor * plotted.values, "no curve fits", f"median {measure.label}"
-        p, alpha = (
-            np.mean([parameters[key] for key in (name, f"{name}_plus", f"{name}_minus") if key in parameters], axis=0)
-            for name in ("p", "alpha")
-        )
+
+        def average(name: str) -> Floats:
+            keys = [key for key in (name, f"{name}_plus", f"{name}_minus") if key in parameters]
+            return np.asarray(np.mean([parameters[key] for key in keys], axis=0))
+
+        selected = {names[k]: panels[k] for k in select_evenly(len(names), 4)}
+        labels = {"value_label": label, "missing_label": missing}
+        title = title or escape_dollars(self.data.description)
         return draw_blocks(
-            p,
-            alpha,
-            panels={names[k]: panels[k] for k in select_evenly(len(names), 4)},
-            value_label=label,
-            missing_label=missing,
-            title=title or escape_dollars(self.data.description),
-            ax=ax,
-            figsize=figsize,
+            average("p"), average("alpha"), panels=selected, **labels, title=title, ax=ax, figsize=figsize
         )
 
     def _table(self, name: str) -> xr.Dataset:
@@ -348,9 +327,8 @@ class BlockTable(DatasetResult):
 
 def _parse_measure(attributes: Mapping[str, Any]) -> Measure:
     """Create the measure from the attributes of a variable."""
-    return Measure(
-        attributes["measure"], **{name: attributes[name] for name in ("period", "damping") if name in attributes}
-    )
+    options = {name: attributes[name] for name in ("period", "damping") if name in attributes}
+    return Measure(attributes["measure"], **options)
 
 
 def check_fractiles(fractiles: Sequence[float]) -> Floats:
@@ -360,8 +338,7 @@ def check_fractiles(fractiles: Sequence[float]) -> Floats:
         raise OptionError("{} must contain at least one number, as [0.16, 0.5, 0.84]", "fractiles")
     for value in shares:
         if not 0.0 < value < 1.0:
-            sentence = f"each of {{}} must be between 0 and 1; got {value:g}"
-            raise OptionError(sentence, "fractiles", value=value)
+            raise OptionError(f"each of {{}} must be between 0 and 1; got {value:g}", "fractiles", value=value)
     return shares
 
 
@@ -387,30 +364,24 @@ def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
             repeated = _mark_repeated(product.bodies.select(blocks), ratios.shape[2])
             missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
             distinct = np.where(repeated, np.nan, ratios).swapaxes(1, 2).reshape(-1, scales.count, ratios.shape[3])
-            values[:, :, blocks], overturned[:, blocks] = (
-                compute_fractiles(distinct, shares),
-                compute_overturned_share(distinct),
-            )
+            values[:, :, blocks] = compute_fractiles(distinct, shares)
+            overturned[:, blocks] = compute_overturned_share(distinct)
             bar.advance(blocks.stop - blocks.start)
-    description = "peak rotation over the slenderness, infinite where that share overturns"
-    missing_note = describe_missing(missing)
-    heading = (
-        f"fractiles of peak rotation over slenderness, {format_count(len(product.motions), 'motion')}, {product.model} "
-    )
-    return BlockTable(
-        xr.Dataset(
-            {
-                "fractile_over_alpha": variable(("fractile", "scale", "block"), values, description, "1"),
-                "overturned_share": variable(("scale", "block"), overturned, unit="1"),
-            },
-            {
-                "fractile": shares,
-                "scale": ("scale", scales.values, scales.attributes),
-                **body_coordinates(product.bodies),
-            },
-            {"description": f"{heading}model" + f"; {missing_note}" * bool(missing_note), "model": product.model},
-        )
-    )
+    meaning = "peak rotation over the slenderness, infinite where that share overturns"
+    variables = {
+        "fractile_over_alpha": variable(("fractile", "scale", "block"), values, meaning, "1"),
+        "overturned_share": variable(("scale", "block"), overturned, unit="1"),
+    }
+    coordinates = {"fractile": shares, "scale": ("scale", scales.values, scales.attributes)}
+    text = f"fractiles of peak rotation over slenderness, {format_count(len(product.motions), 'motion')}"
+    description = _describe(f"{text}, {product.model} model", missing)
+    attributes = {"description": description, "model": product.model}
+    return BlockTable(xr.Dataset(variables, coordinates | body_coordinates(product.bodies), attributes))
+
+
+def _describe(text: str, missing: int) -> str:
+    """Add the number of simulations without a result to a description."""
+    return "; ".join(filter(None, [text, describe_missing(missing)]))
 
 
 def fit_pooled_fragility(
@@ -438,28 +409,16 @@ def fit_pooled_fragility(
             counts[name] += compute_exceedances(ratios, limit, name).sum(axis=2) @ membership
     has_trials = trials > 0.0
     labels = assign_clusters(product.motions, clusters)
-    x, groups = (
-        _compute_intensities(product, measure)[:, :, None] / units,
-        np.broadcast_to(labels[:, None, None], has_trials.shape),
-    )
-    curves = [
-        fit_curve(
-            name,
-            (x[has_trials], count[has_trials], trials[has_trials]),
-            groups[has_trials],
-            confidence,
-            measure,
-            limits[name],
-        )
-        for name, count in counts.items()
-    ]
+    intensities = (_compute_intensities(product, measure)[:, :, None] / units)[has_trials]
+    groups = np.broadcast_to(labels[:, None, None], has_trials.shape)[has_trials]
+    curves = []
+    for name, limit in limits.items():
+        data = intensities, counts[name][has_trials], trials[has_trials]
+        curves.append(fit_curve(name, data, groups, confidence, measure, limit))
     text = f"{describe_pool(bodies, weights)}, {describe_sample(labels, clusters)}, {format_count(scales, 'scale')}"
+    text += f", {product.model} model{describe_polarities(product.polarity, is_symmetric=bodies.is_symmetric)}"
     return Fragility(
-        tuple(curves),
-        measure,
-        f"{text}, {product.model} model{describe_polarities(product.polarity, is_symmetric=bodies.is_symmetric)}",
-        find_single_block(bodies),
-        product.model,
+        *(tuple(curves), measure, text, find_single_block(bodies), product.model),
         outcomes=None,
         one_way=product.polarity != "both" and not bodies.is_symmetric,
         with_vertical=bool(collect_verticals(product.motions)),
@@ -522,27 +481,18 @@ def fit_block_fragilities(
                     for values, number in zip(estimates.values(), numbers, strict=True):
                         values[i, j] = number
                     bar.advance()
-    dims, unfitted_count, missing_note = (
-        ("limit_state", "block"),
-        np.count_nonzero(faults != ""),
-        describe_missing(missing),
-    )
+    dims, unfitted_count = ("limit_state", "block"), int(np.count_nonzero(faults != ""))
     text = f"fragility of {format_count(len(bodies), 'block')}; intensity: {measure.quantity}"
-    text += f"; {format_count(int(unfitted_count), 'curve')} cannot be fitted (see fault)" if unfitted_count else ""
-    attributes = {"confidence": confidence, "model": product.model, "measure": measure.name, **measure.options()}
-    return BlockTable(
-        xr.Dataset(
-            {
-                name: variable(
-                    dims, values, _CURVE_VARIABLES[name], measure.units if name.startswith("median") else "1"
-                )
-                for name, values in estimates.items()
-            }
-            | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
-            {"limit_state": list(limits), **body_coordinates(bodies)},
-            {"description": text + f"; {missing_note}" * bool(missing_note), **attributes},
-        )
-    )
+    text += f"; {format_count(unfitted_count, 'curve')} cannot be fitted (see fault)" if unfitted_count else ""
+    attributes = {"description": _describe(text, missing), "confidence": confidence, "model": product.model}
+    attributes |= {"measure": measure.name, **measure.options()}
+    variables = {}
+    for name, values in estimates.items():
+        unit = measure.units if name.startswith("median") else "1"
+        variables[name] = variable(dims, values, _CURVE_VARIABLES[name], unit)
+    variables["fault"] = variable(dims, faults.astype(str), "why there is no curve")
+    coordinates = {"limit_state": list(limits), **body_coordinates(bodies)}
+    return BlockTable(xr.Dataset(variables, coordinates, attributes))
 
 
 def _compute_intensities(product: Product, measure: Measure) -> Floats:

@@ -35,7 +35,7 @@ from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import OptionError, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions
-from rocking.simulation.ensemble import Polarity, Product, build_product
+from rocking.simulation.ensemble import Polarity, Product, create_product
 from rocking.studies.folder import Store, contains_study, lock_folder, read_bytes, require_empty, write_atomically
 from rocking.studies.results import (
     BlockTable,
@@ -428,7 +428,7 @@ def create_study(
     >>> rocking.Study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    product = build_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
     return open_or_create(folder, product, unit_blocks)
 
 
@@ -442,23 +442,20 @@ def open_or_create(
         with lock_folder(folder):
             if not contains_study(folder):  # another process may have created it meanwhile
                 Store.create(folder, product, unit, records)
-    opened = Study(folder)
-    opened._store.check_inputs(product)
-    width, count = opened._store.grid.unit[3], len(product.bodies)
+    study = Study(folder)
+    study._store.check_inputs(product)
+    width, count = study._store.grid.unit[3], len(product.bodies)
     if unit_blocks is not None and min(choose_unit_shape(product, unit_blocks)[3], count) != min(width, count):
         raise OptionError(f"the study already exists, in units of {width} blocks: omit {{}}", "unit_blocks")
-    return opened
+    return study
 
 
 def _parse_part(part: str) -> tuple[int, int]:
     """Return the number of a part and the number of parts."""
     number, slash, count = str(part).partition("/")
     if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
-        raise OptionError(
-            f"{{}} must be the number of a part and the number of parts, as 3/10; got {part}",
-            "part",
-            value=part,
-        )
+        message = f"{{}} must be the number of a part and the number of parts, as 3/10; got {part}"
+        raise OptionError(message, "part", value=part)
     return int(number), int(count)
 
 
@@ -490,10 +487,8 @@ def _run_units(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
                     except (BrokenExecutor, CancelledError) as error:
                         raise _create_worker_error(error) from error
                     except Exception as error:
-                        reason, error_name = " ".join(str(error).split()), type(error).__name__
-                        failed[format_key(key)] = (
-                            reason if isinstance(error, RockingError) else f"{error_name}: {reason}".rstrip(": ")
-                        )
+                        prefix = "" if isinstance(error, RockingError) else f"{type(error).__name__}: "
+                        failed[format_key(key)] = " ".join(f"{prefix}{error}".split()).rstrip(": ")
                         bar.note(f"{format_count(len(failed), 'unit')} failed")
                         continue
                     write_atomically(store.unit_path(key), data)
@@ -534,8 +529,8 @@ def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[
     client: Any = executor if hasattr(executor, "get_executor") else getattr(executor, "_client", None)
     pool = executor.get_executor(pure=False) if client is executor else executor
     if not isinstance(pool, Executor):
-        kinds = "a concurrent.futures.Executor or a client of dask.distributed"
-        raise OptionError(f"{{}} must be {kinds}; got {checks.short_repr(executor)}", "executor", value=executor)
+        message = "{} must be a concurrent.futures.Executor or a client of dask.distributed; got "
+        raise OptionError(message + checks.short_repr(executor), "executor", value=executor)
 
     def submit(unit_input: UnitInput) -> Future[bytes]:
         try:

@@ -93,9 +93,8 @@ def choose_unit_shape(product: Product, unit_blocks: int | None) -> tuple[int, .
     if unit_blocks is not None:
         width = checks.integer(unit_blocks, "unit_blocks", OptionError, minimum=_GROUP_SIZE)
         if width % _GROUP_SIZE:
-            raise OptionError(
-                f"{{}} must be a multiple of {_GROUP_SIZE}, not {width}", "unit_blocks", value=unit_blocks
-            )
+            message = f"{{}} must be a multiple of {_GROUP_SIZE}, not {width}"
+            raise OptionError(message, "unit_blocks", value=unit_blocks)
         return 1, 1, 1, width
     motions, scales, polarities, count = product.shape
     sample = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP_SIZE)).astype(np.int64))
@@ -136,9 +135,8 @@ class UnitInput:
 def compute_unit(unit_input: UnitInput, cancelled: threading.Event | None = None) -> bytes:
     """Compute the bytes of a unit, unless `cancelled`; raise a StudyError if the program differs."""
     if unit_input.program != identify_program():
-        raise StudyError(
-            f"the worker on {socket.gethostname()} has {identify_program()}, the study requires {unit_input.program}"
-        )
+        worker = f"the worker on {socket.gethostname()} has {identify_program()}"
+        raise StudyError(f"{worker}, the study requires {unit_input.program}")
     # NaN where the unit contains fewer simulations than a full one
     values = np.full((len(OUTCOMES), *unit_input.unit), np.nan)
     shape = (*unit_input.factors.shape, len(unit_input.setup.bodies))
