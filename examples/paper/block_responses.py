@@ -278,7 +278,8 @@ def _uplift(case: BlockUnderSine) -> float:
 
 
 def _acceleration(case: BlockUnderSine, time_over_period: Floats) -> Floats:
-    return case.excitation().acceleration(time_over_period * case.period) / (case.block().gravity * case.alpha)
+    acceleration: Floats = case.excitation().acceleration(time_over_period * case.period)
+    return acceleration / (case.block().gravity * case.alpha)
 
 
 def _first(response: Response) -> float:

@@ -166,7 +166,8 @@ class RuleComparison(BlockUnderRecords):
         rows, labels = [], self._create_labels()
         columns = labels, self.responses, self.ratios, self.margins, self.overturns_when_scaled_down
         for label, response, ratios, margin, overturns_when_scaled_down in zip(*columns, strict=True):
-            motion, verdict, factor = require_motion(response), format_brief_outcome(response, MOTION_PRECISION), 1.0 / margin
+            motion, factor = require_motion(response), 1.0 / margin
+            verdict = format_brief_outcome(response, MOTION_PRECISION)
             if overturns_when_scaled_down:  # with more digits near 1
                 verdict += f"; overturns at x {factor:.{2 if factor < 0.985 else 4}f}"
             rows.append(

@@ -334,8 +334,8 @@ def _simulate_point(point: SimulationInput) -> _MapPoint:
             states, trail = state.new_states(1, 0), response.solution.trail
             states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, upper
             grounds, factors = join_grounds([trail.ground]), np.array([trail.ground.factor])
-            blocks, motion = np.array([trail.block]), np.zeros(1, dtype=np.int64)
-            results["complete_chattering"] = detect_complete_chattering(grounds, motion, factors, blocks, states)
+            blocks, index = np.array([trail.block]), np.zeros(1, dtype=np.int64)
+            results["complete_chattering"] = detect_complete_chattering(grounds, index, factors, blocks, states)
     outcome = int(classify_uplifts(results, last_exceedance)[0])
     return _MapPoint(outcome, uplift, rest, lower, upper, rests, response.overturned)
 
