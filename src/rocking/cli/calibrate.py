@@ -101,7 +101,7 @@ def calibrate(
     settings: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
     arguments = {name: value for name, value in settings.items() if value is not None}
     with output.folder() as folder:
-        table = read_calibration(data, **file.metadata())
+        table = read_calibration(data, **file.metadata(), **file.corrections())
         conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
         if isinstance(table, MeasuredHistory):
             conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
@@ -189,7 +189,7 @@ def validate(
         Seed of the simulations for bands and probabilities.
     """
     with output.folder() as folder:
-        rows = read_tests(tests, **file.metadata())
+        rows = read_tests(tests, **file.metadata(), **file.corrections())
         validation = run_validation(
             rows, **block.blocks(model), outlier_probability=outlier_probability, bins=bins, seed=seed
         )
