@@ -15,6 +15,7 @@ from rocking.cli import main
 from rocking.core.progress import notes_for
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.records import channels, group_components, identify, read
+from rocking.records.formats import source
 from rocking.records.named import expand_record_names, load_motion
 
 GRAVITY = 9.80665
@@ -93,7 +94,7 @@ def test_the_first_sheet_of_a_workbook_is_a_table(tmp_path: Path) -> None:
     assert (north.name, east.name, north.dt) == ("NS", "EW", 0.01)
     np.testing.assert_allclose(east.acceleration, -0.025 * np.arange(5), atol=1e-15)
     path.write_bytes(packed({"xl/workbook.xml": "x", "xl/worksheets/sheet1.xml": "x"}))
-    assert "this workbook is damaged" in refusal(lambda: channels(path))
+    assert "this workbook is damaged or too large" in refusal(lambda: channels(path))
 
 
 # Archives
@@ -130,6 +131,19 @@ def test_a_damaged_archive_is_refused_in_a_sentence(tmp_path: Path) -> None:
                 except UnreadableRecord as error:
                     refused += "\n" not in str(error)
     assert refused > 100
+
+
+def test_archives_in_archives_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    content = packed({"nga.at2": written.fixtures()["nga.at2"]})
+    for _ in range(6):
+        content = packed({"inner.zip": content})
+    path = tmp_path / "deep.zip"
+    path.write_bytes(content)
+    assert expand_record_names([str(path)]) == [f"{path}/inner.zip/inner.zip/inner.zip"]
+    path.write_bytes(packed({"a{}.csv": "0\n" * 99, "b.csv": "1"}))
+    assert "give one of " in refusal(lambda: read(path)) and "a{}.csv" in refusal(lambda: read(path))
+    monkeypatch.setattr(source, "_MEMBER_LIMIT", 100)
+    assert "is larger than 0 MiB; unpack it" in refusal(lambda: read(f"{path}/a{{}}.csv"))
 
 
 # Selections

@@ -199,9 +199,10 @@ class Header:
     def _collect(self) -> None:
         """Collect what the header states, by name, in the order of the patterns."""
         text = "\n".join(line.text for line in self.lines)
-        for match in filter(None, (_compile(pattern).search(text) for pattern in self.form.stated)):
+        patterns = self.form.stated if self.lines else ()
+        for match in filter(None, (_compile(pattern).search(text) for pattern in patterns)):
             for name, value in ((name, value) for name, value in match.groupdict().items() if value is not None):
-                line = self.lines[min(text.count("\n", 0, match.start(name)), len(self.lines) - 1)]
+                line = self.lines[text.count("\n", 0, match.start(name))]
                 self.stated[re.sub(r"_\d$", "", name)].append(Statement(" ".join(value.split()), line.start))
 
     def _fail(self, text: str, offset: int, advice: str = "correct the header, or download the file again") -> NoReturn:

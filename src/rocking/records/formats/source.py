@@ -5,6 +5,7 @@ Line ends in the text of a file are made uniform, and errors refer to one of its
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import errno
 import io
@@ -26,11 +27,15 @@ from rocking.records.units import UNIT_NAMES, Unit, choose_unit, find_unit
 #: Largest accepted file, bytes, a hundred times the longest strong-motion records.
 SIZE_LIMIT = 512 * 2**20
 
+#: Largest accepted file in an archive, bytes, because a small archive may unpack to any size.
+_MEMBER_LIMIT = 64 * 2**20
+
 #: Decoded length of header lines, which limits the cost of files without line ends.
 LINE_LIMIT = 512
 
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n")
 _VISIBLE = re.compile(rb"\S")
+_ZIP_MARK = b"PK\3\4"
 _ARCHIVE_ERRORS = (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error)
 #: Members of archives that are no records: folders, hidden files, documents and pictures.
 _NO_RECORD = re.compile(r"(?i)/$|(?:^|/)(?:\.|__MACOSX)|\.(?:pdf|docx?|html?|png|jpe?g|gif|ps|eps|kml|xml)$")
@@ -128,7 +133,7 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
         raise UnreadableRecord(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
-    data = _normalise_text(_read_workbook(name, raw) if _list_members(raw, of_workbook=True) else raw)
+    data = _normalise_text(_read_workbook(name, raw) if _is_workbook(raw) else raw)
     if not data.strip():
         raise UnreadableRecord("this file is empty; download the record again", path=name)
     return Source(name, raw, data)
@@ -150,23 +155,20 @@ def list_archive(name: str) -> list[str]:
         raise unreadable_file_error(name, error) from error
 
 
-def _list_members(raw: bytes, *, of_workbook: bool = False) -> list[str]:
-    """Return the files of a ZIP archive that may be records, none of a workbook, or the sheets of a workbook."""
-    if not raw.startswith(b"PK\3\4"):
-        return []
-    try:
-        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            names = archive.namelist()
-            if "xl/workbook.xml" in names or of_workbook:
-                return [name for name in names if of_workbook and name.startswith("xl/worksheets/")]
-            names = sorted(name for name in names if not _NO_RECORD.search(name))
-            return [
-                member if name == member else f"{name}/{member}"
-                for name in names
-                for member in ((name.lower().endswith(".zip") and _list_members(_extract(raw, name))) or [name])
-            ]
-    except (ValueError, *_ARCHIVE_ERRORS):
-        return []
+def _is_workbook(raw: bytes) -> bool:
+    return raw.startswith(_ZIP_MARK) and b"xl/workbook.xml" in raw
+
+
+def _list_members(raw: bytes, depth: int = 3) -> list[str]:
+    """Return the files of a ZIP archive that may be records, also of archives within it, or none of other files."""
+    members: list[str] = []
+    if depth == 0 or not raw.startswith(_ZIP_MARK) or _is_workbook(raw):
+        return members
+    with contextlib.suppress(ValueError, *_ARCHIVE_ERRORS), zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        for name in sorted(name for name in archive.namelist() if not _NO_RECORD.search(name)):
+            inner = _list_members(_extract(raw, name), depth - 1) if name.lower().endswith(".zip") else []
+            members += [f"{name}/{member}" for member in inner] or [name]
+    return members
 
 
 def _extract(raw: bytes, member: str) -> bytes:
@@ -174,7 +176,11 @@ def _extract(raw: bytes, member: str) -> bytes:
     with zipfile.ZipFile(io.BytesIO(raw)) as archive:
         if member in archive.namelist():
             with archive.open(member) as file:
-                return file.read(SIZE_LIMIT + 1)
+                content = file.read(_MEMBER_LIMIT + 1)
+            if len(content) > _MEMBER_LIMIT:
+                limit = _MEMBER_LIMIT // 2**20
+                raise UnreadableRecord(f"this file in an archive is larger than {limit} MiB; unpack it", path=member)
+            return content
     for match in re.finditer(r"(?i)\.zip/", member):
         return _extract(_extract(raw, member[: match.end() - 1]), member[match.end() :])
     raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), member)
@@ -184,7 +190,7 @@ def _unpack(name: str, raw: bytes) -> tuple[str, bytes]:
     """Return the name and content of the only file in a ZIP archive, or those of another file."""
     members = _list_members(raw)
     if len(members) > 1:
-        listing = ", ".join(f"{name}/{member}" for member in members[:10]) + (", ..." if len(members) > 10 else "")
+        listing = escape_braces(", ".join(f"{name}/{member}" for member in members[:10]))
         raise UnreadableRecord(f"this archive contains {len(members)} files; give one of {listing}", path=name)
     return (f"{name}/{members[0]}", _extract(raw, members[0])) if members else (name, raw)
 
@@ -197,12 +203,17 @@ def _read_workbook(name: str, raw: bytes) -> bytes:
         raise UnreadableRecord(f"this workbook requires openpyxl: {describe_install('excel')}", path=name) from None
     text = io.StringIO()
     try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            if sum(info.file_size for info in archive.infolist()) > _MEMBER_LIMIT:
+                raise ValueError
         workbook = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
         for row in workbook.worksheets[0].iter_rows(values_only=True):
             cells = ["" if cell is None else cell.isoformat() if hasattr(cell, "isoformat") else cell for cell in row]
             csv.writer(text).writerow(cells)
     except Exception as error:  # openpyxl raises any exception from a damaged file
-        raise UnreadableRecord("this workbook is damaged; save it again, or save it as CSV", path=name) from error
+        raise UnreadableRecord(
+            "this workbook is damaged or too large; save it again, or save it as CSV", path=name
+        ) from error
     return re.sub(r"(?m),+\r?$", "", text.getvalue()).encode()
 
 
