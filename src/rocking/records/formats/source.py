@@ -237,7 +237,8 @@ def _normalise_text(raw: bytes) -> bytes:
     # A form feed at the start of a line is a page break and does not occupy a column.
     data = data.removeprefix(b"\f").replace(b"\n\f", b"\n").replace(b"\f", b" ")
     # Some programs fill up the last row of numbers with zero bytes.
-    return re.sub(rb"\x00+(?=\n)", b"", data.rstrip(b"\x00\x1a"))
+    data = data.rstrip(b"\x00\x1a")
+    return re.sub(rb"\x00+(?=\n)", b"", data) if b"\x00" in data else data
 
 
 @dataclass(frozen=True)
