@@ -106,39 +106,39 @@ STANDARD_INPUT = "-"
 
 
 def load_motion(
-    name: str,
-    *,
-    vertical: str | None = None,
-    scale: float = 1.0,
-    several: bool = False,
-    baseline: int | str | None = None,
-    highpass: float | None = None,
-    **options: Any,
+    name: str, *, vertical: str | None = None, scale: float = 1.0, several: bool = False, **options: Any
 ) -> Motion:
     """Return the scaled motion of a record file ("-" is standard input), or of a shipped record if no file exists.
 
-    Channel, dt and units are optional. With `several`, they apply to several files: files that state step and units
-    keep them, and the name of a single channel does not matter. A name may end with a factor, as in "a.at2 x 1.5".
+    Channel, dt, units, baseline and highpass are optional. With `several`, the first three apply to several files:
+    files that state step and units keep them, and the name of a single channel does not matter. A name may end with a
+    factor, as in "a.at2 x 1.5".
     """
     several = several or (vertical is not None and _is_file_or_record(vertical))
     name, factor = split_factor(name)
+    metadata, corrections = _split_options(options)
     if is_shipped(name):
-        reject_redundant_arguments(name, **({} if several else options))
+        reject_redundant_arguments(name, **({} if several else metadata))
         original = catalogue.load(name)
-        motion = remove_baseline(original, baseline, highpass)
+        motion = remove_baseline(original, *corrections)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        channel = formats.read_channel(file, Request.create(**options, several=several))
-        original, motion = channel.motion("none"), channel.motion(baseline, highpass)
+        channel = formats.read_channel(file, Request.create(**metadata, several=several))
+        original, motion = channel.motion("none"), channel.motion(*corrections)
     if motion.history:
         peaks = " to ".join(
             f"{each.pga:.4g} m/s^2 ({each.pga / STANDARD_GRAVITY:.4g} g)" for each in (original, motion)
         )
         note(f"{name}: {' and '.join(motion.history)}, which changes the peak acceleration from {peaks}")
     if vertical is not None:
-        processing = {"baseline": baseline, "highpass": highpass}
-        motion = motion.with_vertical(load_vertical(vertical, name, several=several, **processing, **options))
+        motion = motion.with_vertical(load_vertical(vertical, name, several=several, **options))
     return motion if scale * factor == 1.0 else motion.scaled(scale * factor)
+
+
+def _split_options(options: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+    """Return the options of a request, and baseline and highpass."""
+    names = ("baseline", "highpass")
+    return {name: value for name, value in options.items() if name not in names}, [options.get(name) for name in names]
 
 
 def split_factor(name: str) -> tuple[str, float]:
@@ -152,12 +152,12 @@ def load_vertical(name: str, record: str, *, several: bool = False, **options: A
     options = {key: value for key, value in options.items() if key != "channel"}  # the channel of the horizontal motion
     if _is_file_or_record(name):
         return load_motion(name, several=True, **options)
-    baseline, highpass = options.pop("baseline", None), options.pop("highpass", None)
+    metadata, corrections = _split_options(options)
     if record == STANDARD_INPUT or not path_exists(record):
         text = f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels"
         raise UnreadableRecord(f"{text}; check the name")
-    channel = formats.read_channel(record, Request.create(**options, several=several), vertical=name)
-    return channel.motion(baseline, highpass)
+    channel = formats.read_channel(record, Request.create(**metadata, several=several), vertical=name)
+    return channel.motion(*corrections)
 
 
 def _is_file_or_record(vertical: str) -> bool:
@@ -204,34 +204,31 @@ def _find_records(name: str) -> list[str]:
 
 def _unfold(name: str) -> list[str]:
     """Return the records in a ZIP archive, or those of a selection with factors, or none for another file."""
-    suffix = Path(name).suffix.lower()
-    if suffix == ".zip" and os.path.isfile(name):  # noqa: PTH113 - see `path_exists`
-        return list_archive(name)
-    if suffix != ".csv" or not os.path.isfile(name):  # noqa: PTH113
-        return []
+    suffix = Path(name).suffix.lower() if os.path.isfile(name) else ""  # noqa: PTH113 - see `path_exists`
+    if suffix != ".csv":
+        return list_archive(name) if suffix == ".zip" else []
     with Path(name).open(encoding="utf-8-sig", errors="replace", newline="") as file:
         text = file.read(2**20)
-    rows = list(csv.reader(text.splitlines(), delimiter=";" if text.count(";") > text.count(",") else ","))
-    for number, row in enumerate(rows, 1):
+    rows = csv.reader(text.splitlines(), delimiter=";" if text.count(";") > text.count(",") else ",")
+    for row in rows:
         heading = [cell.strip().lower() for cell in row]
         files = [k for k, cell in enumerate(heading) if re.search("file|^record$", cell) and "vert" not in cell]
         factors = [k for k, cell in enumerate(heading) if re.search("scale|scaling|^factor$", cell)]
         if files and factors:
-            return list(_list_selection(name, rows[number:], number, files, factors[0]))
+            # A blank line ends the selection.
+            selected = itertools.takewhile(lambda row: any(map(str.strip, row)), rows)
+            return [record for row in selected for record in _scale_files(name, rows.line_num, row, files, factors[0])]
     return []
 
 
-def _list_selection(name: str, rows: list[list[str]], number: int, files: list[int], factor: int) -> Iterator[str]:
-    """Yield the files of a selection with their factors, up to a blank line."""
-    for line, row in enumerate(rows, number + 1):
-        if not any(cell.strip() for cell in row):
-            return
-        text = row[factor].strip() if len(row) > factor else ""
-        if not _FACTOR.fullmatch(f"- x {text}"):
-            raise UnreadableRecord(f"the scale factor must be a number; got {text!r}", path=name, line=line, value=text)
-        for cell in (row[k].strip() for k in files if len(row) > k and row[k].strip()):
-            sibling = str(Path(name).parent / cell)
-            yield f"{sibling if path_exists(sibling) else cell} x {text}"
+def _scale_files(name: str, line: int, row: list[str], files: list[int], factor: int) -> Iterator[str]:
+    """Yield the files in a row of a selection with their factor."""
+    text = row[factor].strip() if len(row) > factor else ""
+    if not _FACTOR.fullmatch(f"- x {text}"):
+        raise UnreadableRecord(f"the scale factor must be a number; got {text!r}", path=name, line=line, value=text)
+    for cell in (row[k].strip() for k in files if len(row) > k and row[k].strip()):
+        sibling = str(Path(name).parent / cell)
+        yield f"{sibling if path_exists(sibling) else cell} x {text}"
 
 
 @dataclass(frozen=True)
