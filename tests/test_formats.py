@@ -267,6 +267,24 @@ def test_film_records_keep_their_uneven_times() -> None:
     assert uneven.motion().duration == pytest.approx(written.film_times()[-1])
 
 
+def test_an_instant_of_a_film_that_is_printed_twice_has_the_mean_of_its_values(file: Callable[[str], Path]) -> None:
+    times = [round(0.002 * k + 0.0005 * (k % 3 == 1), 4) for k in range(2000)]
+    values = written.series(1, 2000)
+    wanted = list(values)
+    for k in (500, 1501):
+        times[k] = times[k - 1]
+        wanted[k - 1] = 0.5 * (values[k - 1] + values[k])
+    kept = [k for k in range(2000) if k not in (500, 1501)]
+    pairs = [x for pair in zip(times, values, strict=True) for x in pair]
+    (channel,) = channels(file(written.smc(pairs, rate=None)))
+    assert channel.times is not None
+    np.testing.assert_allclose(channel.times, np.array(times)[kept], rtol=1e-12)
+    np.testing.assert_allclose(channel.acceleration, np.array(wanted)[kept] / 100.0, rtol=0.0, atol=1e-4)
+    for k in (502, 1503):
+        pairs[2 * k] = pairs[2 * (k - 1)]
+    assert "the time does not increase" in complaint(file(written.smc(pairs, rate=None)))
+
+
 def test_labels_of_a_channel() -> None:
     first, up = channels(written.FOLDER / "two.v1")
     assert (first.name, first.number, first.azimuth, first.station) == ("90 Deg", 1, 90.0, "Testville - Town Hall")

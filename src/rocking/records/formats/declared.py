@@ -94,9 +94,7 @@ class Format:
     is_paired: bool = False  # whether the numbers are pairs
     layout: str = ""  # columns of the numbers, such as 8x10, if they may touch
     pairs_layout: str = ""  # columns of pairs
-    wide_layout: tuple[
-        Any, ...
-    ] = ()  # place in the header's numbers, the number there, and the columns that it selects
+    wide_layout: tuple[Any, ...] = ()  # place in the header's numbers, a number, and the columns that it selects
     required: tuple[str, ...] = ()  # keys that must have a value
     count_name: str = "the header"  # name of the count, for messages
     count: tuple[Any, ...] = ()  # place of the count in the header's numbers
@@ -420,8 +418,8 @@ class Header:
         if step is None:
             if len(values) % 2 or len(values) < 4:
                 self._fail("expected pairs of time and acceleration", self.offset, "correct the file")
-            dt, times = resolve_timing(source, request, values[0::2], SECOND, self.offset)
-            values = values[1::2]
+            instants, values = _merge_repeated(values[0::2], values[1::2])
+            dt, times = resolve_timing(source, request, instants, SECOND, self.offset)
         if len(values) % len(columns):
             self._fail(f"{len(values)} values do not fill {len(columns)} columns", self.end)
         table = values.reshape(-1, len(columns))
@@ -493,6 +491,15 @@ class Header:
         if stated > 0.0 and all(peak > 0.0 and not 1.0 / _PEAK_RATIO < peak / stated < _PEAK_RATIO for peak in peaks):
             text = f"the header states a peak of {stated:.4g} m/s^2, but the largest value is {peaks[0]:.4g} m/s^2"
             self._fail(text, statements[0].offset, "check the units, or download the file again")
+
+
+def _merge_repeated(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return pairs with the mean of values at equal times, if few times of a film are printed twice."""
+    steps = np.diff(times)
+    starts = np.flatnonzero(np.append(True, steps > 0.0))
+    if (steps < 0.0).any() or not 0 < len(times) - len(starts) <= len(times) // 1000:
+        return times, values
+    return times[starts], np.add.reduceat(values, starts) / np.diff(np.append(starts, len(times)))
 
 
 def _invert(rate: float) -> float:
