@@ -13,7 +13,7 @@ import rocking
 from rocking import records, studies
 from rocking.cli import main
 from rocking.core.progress import notes_for
-from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.errors import MotionError, RecordError
 from rocking.records import channels, group_components, identify, read
 from rocking.records.formats import source
 from rocking.records.named import expand_record_names, load_motion
@@ -39,7 +39,7 @@ def station(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def refusal(call: Callable[[], object], error: type[Exception] = UnreadableRecord) -> str:
+def refusal(call: Callable[[], object], error: type[Exception] = RecordError) -> str:
     """The message with which a call fails."""
     with pytest.raises(error) as caught:
         call()
@@ -128,7 +128,7 @@ def test_a_damaged_archive_is_refused_in_a_sentence(tmp_path: Path) -> None:
             for name in (str(path), f"{path}/a.at2"):
                 try:
                     read(name)
-                except UnreadableRecord as error:
+                except RecordError as error:
                     refused += "\n" not in str(error)
     assert refused > 100
 
@@ -239,7 +239,7 @@ def test_the_offset_of_an_instrument_is_removed_by_default_and_noted(
     peaks = [f"{motion.pga:.4g} m/s^2" for motion in (kept, removed)]
     assert all(peak in note for peak in peaks) and "baseline of degree 0 removed, which changes the peak" in note
     for bad in ("mean", -1, 2.5):
-        assert "baseline" in refusal(lambda bad=bad: read(name, baseline=bad), InvalidMotion)
+        assert "baseline" in refusal(lambda bad=bad: read(name, baseline=bad), MotionError)
 
 
 @pytest.mark.parametrize(
@@ -274,4 +274,4 @@ def test_shipped_records_are_corrected_only_on_request() -> None:
 
 def test_uneven_samples_cannot_be_filtered() -> None:
     sentence = "highpass requires samples at even steps; resample the record in Python first"
-    assert sentence in refusal(lambda: read(written.FOLDER / "film.smc", highpass=0.1), InvalidMotion)
+    assert sentence in refusal(lambda: read(written.FOLDER / "film.smc", highpass=0.1), MotionError)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from rocking.core.progress import note
-from rocking.errors import UnreadableRecord, escape_braces
+from rocking.errors import RecordError, escape_braces
 from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
@@ -62,14 +62,12 @@ class Components:
 
         Raises
         ------
-        UnreadableRecord
+        RecordError
             If there are not two.
         """
         if len(self.horizontals) != 2:
             names = ", ".join(motion.name for motion in self.horizontals) or "none"
-            raise UnreadableRecord(
-                f"{self.station} has {len(self.horizontals)} horizontal components, not two: {names}"
-            )
+            raise RecordError(f"{self.station} has {len(self.horizontals)} horizontal components, not two: {names}")
         return self.horizontals[0], self.horizontals[1]
 
 
@@ -98,7 +96,7 @@ def group_components(
 
     Raises
     ------
-    UnreadableRecord
+    RecordError
         If no file can be read.
 
     See Also
@@ -119,7 +117,7 @@ def group_components(
         try:
             request = Request.create(dt, units, several=True)
             channels = [] if is_shipped(name) else formats.read_content(name, request)[1]
-        except UnreadableRecord as error:
+        except RecordError as error:
             reasons.append(str(error))
             continue
         motions = [channel.motion(baseline, highpass) for channel in channels] or [catalogue.load(name)]
@@ -130,7 +128,7 @@ def group_components(
             groups.setdefault(key, []).append(motion if factor == 1.0 else motion.scaled(factor))
     for reason in reasons:
         if not groups:
-            raise UnreadableRecord(f"no record could be read; the first: {escape_braces(reason)}")
+            raise RecordError(f"no record could be read; the first: {escape_braces(reason)}")
         note(f"skipped: {reason}")
     return tuple(_create_components(str(key[0]), str(key[1]), motions) for key, motions in groups.items())
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from typing import BinaryIO
 
-from rocking.errors import UnreadableRecord, describe_install
+from rocking.errors import RecordError, describe_install
 from rocking.motion.motion import Motion
 from rocking.records.formats import table, through_obspy
 from rocking.records.formats.channel import Channel, Identification, Recognised
@@ -58,10 +58,10 @@ def read(
 
     Raises
     ------
-    UnreadableRecord
+    RecordError
         If the file is missing, unreadable or inconsistent, its format is unknown, a number is damaged, or the channel
         is unknown or not specified. The message contains file, line and correction.
-    InvalidMotion
+    MotionError
         If `dt` is not a positive number, the samples do not form a motion, or `baseline` or `highpass` is invalid.
 
     See Also
@@ -150,7 +150,7 @@ def identify(path: str | os.PathLike[str]) -> Identification:
 
     Raises
     ------
-    UnreadableRecord
+    RecordError
         If the file is missing or unreadable, or its format is unknown.
 
     See Also
@@ -180,7 +180,7 @@ def _recognise_format(source: Source) -> Recognised:
     return recognised
 
 
-def _unknown_format_error(source: Source) -> UnreadableRecord:
+def _unknown_format_error(source: Source) -> RecordError:
     text = f"the format of this text is unknown: none of its first {table.HEADING_LINES} lines contains only numbers"
     advice = "use the complete file, with times in seconds"
     if source.is_binary:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.errors import MotionError, RecordError
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
 from rocking.records.formats.source import Request, Source
@@ -221,7 +221,7 @@ class Channel:
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If there are fewer than two samples, or they are too large for a motion, or an argument is invalid.
         """
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
@@ -243,12 +243,12 @@ def remove_baseline(motion: Motion, baseline: int | str | None, highpass: float 
     degree = int(baseline) if isinstance(baseline, str) and baseline.isdecimal() else baseline
     if isinstance(degree, str) and degree != "none":
         text = f"{{}} must be the degree of a polynomial (0 removes the mean) or none; got {degree!r}"
-        raise InvalidMotion(text, "baseline", value=baseline)
+        raise MotionError(text, "baseline", value=baseline)
     steps: dict[str, Any] = {} if degree in (None, "none") else {"baseline": degree}
     steps |= {} if highpass is None else {"band_pass": (highpass, None)}
     if steps and motion.dt is None:
         name = "baseline" if "baseline" in steps else "highpass"
-        raise InvalidMotion("{} requires samples at even steps; resample the record in Python first", name)
+        raise MotionError("{} requires samples at even steps; resample the record in Python first", name)
     return motion.processed(**steps) if steps else motion
 
 
@@ -299,7 +299,7 @@ def find_missing_value(values: Floats) -> int | None:
     return int(starts[is_isolated][0]) if is_isolated.any() else None
 
 
-def missing_value_error(source: Source, value: float, offset: int | None) -> UnreadableRecord:
+def missing_value_error(source: Source, value: float, offset: int | None) -> RecordError:
     """Return the error for a missing value."""
     text = f"{value:g} seems to represent a missing value; use a record without missing values"
     return source.error(text, offset)

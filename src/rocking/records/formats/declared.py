@@ -25,7 +25,7 @@ from typing import Any, Final, NamedTuple, NoReturn
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import UnreadableRecord, escape_braces
+from rocking.errors import RecordError, escape_braces
 from rocking.records.formats.channel import Channel, Recognised, create_channel, missing_value_error, resolve_timing
 from rocking.records.formats.engine import (
     NUMBER,
@@ -206,7 +206,7 @@ class Header:
     def _fail(self, text: str, offset: int, advice: str = "correct the header, or download the file again") -> NoReturn:
         raise self.source.error(f"{text}; {advice}", offset)
 
-    def _missing_count_error(self, offset: int) -> UnreadableRecord:
+    def _missing_count_error(self, offset: int) -> RecordError:
         advice = "if the file is incomplete, download it again; if its layout differs, write it as a text table"
         return self.source.error(f"no line of points and units ends this channel's header; {advice}", offset)
 
@@ -399,7 +399,7 @@ class Header:
                 if find_numeric_end(self.source, start) < self.end:
                     raise self._missing_count_error(start)
                 return read_values(self.source, self.end, end, layout, count)
-            except UnreadableRecord:
+            except RecordError:
                 if rows == self.skips[-1]:
                     raise
         raise AssertionError("the last alternative returns or raises")

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import UnreadableRecord
+from rocking.errors import RecordError
 from rocking.records.formats.source import Source
 
 #: Number in a header, as a regular expression.
@@ -103,7 +103,7 @@ def read_values(source: Source, start: int, end: int, layout: Layout | None, sta
     return values
 
 
-def invalid_number_error(source: Source, token: bytes, offset: int) -> UnreadableRecord:
+def invalid_number_error(source: Source, token: bytes, offset: int) -> RecordError:
     """Return the error for text that should be a finite number."""
     token_text, number = repr(token[:40].decode("latin-1")), parse_token(token)
     if b"," in token and parse_token(token.replace(b",", b".")) is not None:
