@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import format_table
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -78,9 +79,14 @@ def test_fixtures_are_what_their_writer_writes() -> None:
         assert (written.FOLDER / name).read_bytes() == content.encode(), name
 
 
+def test_the_table_of_formats_is_that_of_the_declarations() -> None:
+    page = format_table.PAGE.read_text("utf-8")
+    assert format_table.update_page(page) == page
+
+
 def test_every_format_has_a_fixture_and_stands_in_the_reference_the_how_to_and_the_docstring() -> None:
     names = {identify(written.FOLDER / fixture).format for fixture in written.fixtures().keys() - REFUSED.keys()}
-    assert names == {each.name for each in formats.FORMATS} | {"text table"}
+    assert names == {each.name for each in formats.load_formats()} | {"text table"}
     docs = Path(__file__).parents[1] / "docs"
     reference, how_to = (
         (docs / each).read_text("utf-8") for each in ("reference/records.md", "howto/read-a-record.md")
@@ -98,6 +104,10 @@ def test_every_format_has_a_fixture_and_stands_in_the_reference_the_how_to_and_t
         ("two.v1", "CSMIP V1", 1, 1e-6 * GRAVITY), ("pairs.v1", "CSMIP V1", "EW", 1e-4 * GRAVITY),
         ("two.v2", "CSMIP V2", 1, 1e-7), ("two.v2c", "COSMOS", 1, 1e-7), ("single.v2c", "COSMOS", None, 1e-6),
         ("even.smc", "USGS SMC", None, 1e-4), ("esm.asc", "ESM", None, 1e-8),
+        ("padded.smc", "USGS SMC", None, 1e-4), ("even.v1", "CSMIP V1", "90 Deg", 1e-6 * GRAVITY),
+        ("geonet.v1a", "GeoNet", "N10E", 1e-4), ("bhrc.v1", "BHRC", "L1", 1e-6 * GRAVITY),
+        ("unam.txt", "UNAM", "N00E", 1e-6), ("csmnc.dat", "CSMNC", "EW", 2e-6),
+        ("npts.txt", "NPTS DT", None, 1e-6 * GRAVITY), ("wrapped.g3", "NPTS DT", None, 1e-6 * GRAVITY),
     ],
 )  # fmt: skip
 def test_a_record_comes_out_as_printed(name: str, form: str, channel: int | str | None, resolution: float) -> None:
@@ -108,6 +118,126 @@ def test_a_record_comes_out_as_printed(name: str, form: str, channel: int | str 
     assert motion.dt == 0.005
     np.testing.assert_allclose(times, 0.005 * np.arange(written.POINTS), atol=1e-15)
     np.testing.assert_allclose(acceleration, SERIES, rtol=0.0, atol=0.51 * resolution)
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "channel", "dt", "azimuth", "resolution"),
+    [
+        ("geonet.v2a", "GeoNet", "S16W", 0.02, 196.0, 1e-4), ("afad.txt", "AFAD", "N-S", 0.01, 0.0, 1e-8),
+        ("cwa.dat", "CWA", "N", 0.02, 0.0, 1e-5), ("sesame.saf", "SESAME SAF", "N", 0.02, 0.0, 1e-4),
+        ("usc.s0b", "CSMIP V2", "N08W", 0.02, 352.0, 1e-5), ("usc.s0a", "USC", "S05W", None, 185.0, 1e-4 * GRAVITY),
+        ("bhrc.v1", "BHRC", "T3", 0.005, 82.0, None), ("bhrc.v1", "BHRC", "V2", 0.005, None, None),
+        ("unam.txt", "UNAM", "N90W", 0.005, 270.0, None), ("geonet.v1a", "GeoNet", "N80W", 0.005, 280.0, None),
+    ],
+)  # fmt: skip
+def test_a_component_of_a_station_comes_out_as_printed(name, form, channel, dt, azimuth, resolution) -> None:
+    path = written.FOLDER / name
+    (found,) = (each for each in channels(path) if each.name == channel)
+    assert (identify(path).format, found.dt, found.azimuth) == (form, dt, azimuth)
+    assert (found.times is None) == (dt is not None)
+    if resolution is not None:
+        count = len(found.acceleration)
+        wanted = np.array(written.series(1, count)) / (1.0 if form == "SESAME SAF" else 100.0)
+        assert count == (105 if form == "CWA" else written.POINTS)
+        np.testing.assert_allclose(found.acceleration, wanted, rtol=0.0, atol=0.51 * resolution)
+
+
+def changed(name: str, old: str, new: str) -> str:
+    """A fixture with each of a text replaced by another."""
+    text = (written.FOLDER / name).read_text()
+    assert old in text
+    return text.replace(old, new)
+
+
+#: Of every format: a count, a step and a unit that the numbers contradict, and the sentence.
+CONTRADICTED = {
+    "nga.at2": [("NPTS=     37", "NPTS=     36", "NPTS specifies 36 values, but 37 follow; remove")],
+    "even.v1": [
+        ("37 points", "36 points", "the header specifies both 36 and 37 values"),
+        ("at .005 sec", "at .010 sec", "a sampling step of both 0.005 and 0.01 s"),
+        ("(units: g)", "(units: cm/s2)", "the header states a peak of 2.363 m/s^2, but the largest value is 0.00"),
+    ],
+    "two.v1": [("at 200 pts/sec", "at 100 pts/sec", "a sampling step of both 0.005 and 0.01 s")],
+    "two.v2": [("37 points", "38 points", "the header specifies 38 values, but 37 follow; download")],
+    "padded.smc": [("        37", "        31", "the header specifies 31 values, but 40 follow; remove")],
+    "usc.s0a": [
+        ("POINTS =     37", "POINTS =     38", "the header specifies 76 values, but 74 follow; download"),
+        ("SEC AND G/10", "SEC AND FURLONG", "the units 'FURLONG' are unknown"),
+    ],
+    "usc.s0b": [
+        ("37 POINTS", "36 POINTS", "the header specifies 36 values, but 37 follow; remove"),
+        ("AT   .020 SEC.", "AT   .020 SEC. IN UNITS G", "the header states a peak of 2.359 m/s^2, but"),
+    ],
+    "geonet.v1a": [
+        ("points  37", "points  36", "the header specifies both 36 and 37 values"),
+        ("of 0.005 s", "of 0.010 s", "37 values in steps of 0.01 s do not last the stated 0.18 s"),
+        ("1.00 mm/s/s", "1.00 cm/s/s", "but the largest value is"),
+    ],
+    "bhrc.v1": [
+        ("POINTS =     37", "POINTS =     36", "the header specifies 36 values, but "),
+        ("SECONDS AND G/10", "SECONDS AND LEAGUES", "the units 'LEAGUES' are unknown"),
+    ],
+    "cwa.dat": [
+        ("RecordLength(sec): 2", "RecordLength(sec): 3", "the duration specifies 600 values, but 420 follow"),
+        ("SampleRate(Hz): 50", "SampleRate(Hz): 40", "a sampling step of 0.025 s, but the times are in other steps"),
+        ("  235.852~", " 9235.852~", "the header states a peak of 92.36 m/s^2, but the largest value is 2.359 m/s^2"),
+    ],
+    "afad.txt": [
+        ("DATA          : 37", "DATA          : 36", "the header specifies 108 values, but 111 follow; remove"),
+        ("(sec) : 0.01", "(sec) : zero", "expected a positive number in 'SAMPLING INTERVAL (sec) : zero'"),
+        ("VALUES (gal)", "VALUES (furlong)", "the units 'furlong' are unknown"),
+    ],
+    "unam.txt": [
+        ("/37/37/37", "/33/33/33", "33 values in steps of 0.005 s do not last the stated 0.18 s"),
+        ("/0.005/0.005", "/0.01/0.01", "a sampling step of both 0.005 and 0.01 s"),
+        ("235.8518", "23.58518", "but the largest value is"),
+    ],
+    "csmnc.dat": [
+        ("POINTS:  37", "POINTS:  36", "the header specifies 36 values, but 37 follow; remove"),
+        ("OF:  0.005", "OF:  0.01", "37 values in steps of 0.01 s do not last the stated 0.185 s"),
+        ("235.852", "2358.52", "the header states a peak of 23.59 m/s^2, but the largest value is 2.359"),
+    ],
+    "sesame.saf": [
+        ("NDAT = 0000000037", "NDAT = 38", "the header specifies 114 values, but 111 follow; download"),
+        ("UNITS = m/s2", "UNITS = counts", "the file does not state its units"),
+        ("SAMP_FREQ = 50", "SAMP_FREQ = 0", "the sampling step must be positive"),
+    ],
+    "npts.txt": [("37 0.0050", "38 0.0050", "the header specifies 38 values, but 37 follow; download")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "case"), [(name, case) for name, cases in CONTRADICTED.items() for case in cases])
+def test_a_count_step_or_unit_that_the_numbers_contradict_is_refused(name: str, case, file) -> None:
+    old, new, sentence = case
+    text = changed(name, old, new)
+    with pytest.raises(RecordError) as caught:
+        channels(file(text))
+    assert sentence in str(caught.value)
+    assert caught.value.line is None or 0 < caught.value.line <= text.count("\n")
+
+
+def test_every_new_format_is_contradicted_in_a_test() -> None:
+    names = {identify(written.FOLDER / name).format for name in CONTRADICTED}
+    assert {form.name for form in formats.load_formats()} - names == {"COSMOS", "ESM", "K-NET/KiK-net"}  # tested below
+
+
+def test_the_examples_of_layouts_are_read_as_they_state(shared: Path) -> None:
+    folder, found = shared / "cases" / "records", {}
+    for path in sorted(folder.iterdir()):
+        found[path.name] = channels(path, **({"units": "g"} if path.name == "npts_dt.txt" else {}))
+    wanted = {
+        "afad.txt": 0.01,
+        "bhrc.V1": 0.005,
+        "csmip_equally_spaced.V1": 0.005,
+        "csmnc.dat": 0.005,
+        "geonet.V1A": 0.005,
+    }
+    for name, dt in (wanted | {"mexico_long_header.txt": 0.01, "npts_dt.txt": 0.01}).items():
+        assert {(each.dt, len(each.acceleration)) for each in found[name]} == {(dt, 60)}, name
+    assert [each.name for each in found["mexico_long_header.txt"]] == ["V", "N00E", "N90E"]
+    (smc,) = found["smc_padded.smc"]
+    assert smc.times is not None and len(smc.times) == 28
+    assert found["csmnc.dat"][0].acceleration.min() == pytest.approx(-0.9523526)
 
 
 def test_every_number_is_the_double_nearest_to_the_printed_one() -> None:
@@ -135,6 +265,24 @@ def test_film_records_keep_their_uneven_times() -> None:
     assert uneven.times is not None
     np.testing.assert_allclose(uneven.times, written.film_times(), atol=1e-12)
     assert uneven.motion().duration == pytest.approx(written.film_times()[-1])
+
+
+def test_an_instant_of_a_film_that_is_printed_twice_has_the_mean_of_its_values(file: Callable[[str], Path]) -> None:
+    times = [round(0.002 * k + 0.0005 * (k % 3 == 1), 4) for k in range(2000)]
+    values = written.series(1, 2000)
+    wanted = list(values)
+    for k in (500, 1501):
+        times[k] = times[k - 1]
+        wanted[k - 1] = 0.5 * (values[k - 1] + values[k])
+    kept = [k for k in range(2000) if k not in (500, 1501)]
+    pairs = [x for pair in zip(times, values, strict=True) for x in pair]
+    (channel,) = channels(file(written.smc(pairs, rate=None)))
+    assert channel.times is not None
+    np.testing.assert_allclose(channel.times, np.array(times)[kept], rtol=1e-12)
+    np.testing.assert_allclose(channel.acceleration, np.array(wanted)[kept] / 100.0, rtol=0.0, atol=1e-4)
+    for k in (502, 1503):
+        pairs[2 * k] = pairs[2 * (k - 1)]
+    assert "the time does not increase" in complaint(file(written.smc(pairs, rate=None)))
 
 
 def test_labels_of_a_channel() -> None:
@@ -337,12 +485,16 @@ def test_the_owner_at_the_end_of_a_title_of_at2_is_no_part_of_the_component(owne
     assert assign_clusters(list(components.values()), "station").tolist() == [0, 0, 0]
 
 
-def test_knet_counts_keep_their_offset() -> None:
+def test_counts_keep_their_offset_in_channels_and_lose_it_in_motions() -> None:
     (channel,) = channels(written.FOLDER / "knet.ns")
     expected = np.array(written.counts(1, 200)) * 3920.0 / 6182761.0 / 100.0
     np.testing.assert_allclose(channel.acceleration, expected, rtol=1e-15)
     assert channel.acceleration.mean() > 0.05
-    assert channel.metadata["offset"].startswith("kept")
+    assert channel.is_raw and np.array_equal(channel.motion("none").samples, channel.acceleration)
+    motion = read(written.FOLDER / "knet.ns")
+    np.testing.assert_allclose(motion.samples, expected - expected.mean(), atol=1e-14)
+    assert motion.history == ("baseline of degree 0 removed",)
+    assert not read(written.FOLDER / "esm.asc").history
     assert (channel.name, channel.azimuth, channel.dt) == ("N-S", 0.0, 0.01)
     (kik,) = channels(written.FOLDER / "kiknet.ew2")
     assert (kik.name, kik.azimuth, kik.dt) == ("E-W", 90.0, 0.005)
@@ -892,10 +1044,10 @@ FURLONG = "ACCELERATION TIME SERIES IN UNITS OF FURLONG"
         (fixture("two.v2c", "100 Integer-header", "100 Integr-header"), 1, "expected a line '... header"),
         (fixture("two.v1", "Uncorrected Accel", "Unocrrected Accel"), 1, "expected the title of the next channel"),
         (fixture("two.v2", "points of veloc", "pionts of veloc"), 1, "' 37 pio' is not a number"),
-        (fixture("two.v1", "at 200 pts", "at two pts"), 1, "the sampling step must be positive; got 0 s"),
+        (fixture("two.v1", "at 200 pts", "at two pts"), 1, "expected a positive number in ' 37 Accelerogram"),
         (fixture("pairs.v1", "100.005", "100.000"), 1, "the time does not increase from the row before"),
         (fixture("two.v2", "accel data equally spaced at  .005", "accel data equally spaced at  .0x5"), 1,
-          "the sampling step must be positive; got 0 s"),
+          "expected a positive number in ' 37 points of accel data equally spaced at .0x5 sec"),
         (fixture("esm.asc", "NDATA: 37", "NDATA: many"), 1, "line 13: expected a positive number in 'NDATA: many'"),
         *((fixture("esm.asc", f"{key}: {value}", f"{key}:"), 1, f"line {n}: the header does not contain {key}")
           for n, key, value in ((13, "NDATA", "37"), (24, "DATA_TYPE", "ACCELERATION"))),

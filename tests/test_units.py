@@ -18,7 +18,8 @@ G = 9.80665
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048, "in": 0.0254}
 ACCELERATIONS = {
     "g": G, "gs": G, "g10": 0.1 * G, "%g": 0.01 * G, "mg": 1e-3 * G, "ms2": 1.0, "mss": 1.0, "gal": 1e-2, "cms2": 1e-2,
-    "cmss": 1e-2, "mms2": 1e-3, "mmss": 1e-3, "ums2": 1e-6, "µms2": 1e-6, "μms2": 1e-6, "nms2": 1e-9, "fts2": 0.3048,
+    "cmss": 1e-2, "cmsss": 1e-2,
+    "mms2": 1e-3, "mmss": 1e-3, "ums2": 1e-6, "µms2": 1e-6, "μms2": 1e-6, "nms2": 1e-9, "fts2": 0.3048,
     "ftss": 0.3048, "ins2": 0.0254, "inss": 0.0254,
 }  # fmt: skip
 TIMES = {

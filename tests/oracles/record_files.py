@@ -259,6 +259,237 @@ def esm(values: list[float], *, dt: float = 0.005, kind: str = "ACCELERATION", u
     return "".join(f"{key}: {value}\n" for key, value in entries.items()) + "".join(f"{v:.6f}\n" for v in values)
 
 
+def csmip_v1_even(channels: list[tuple[int, str, list[float]]], rate: int = 200) -> str:
+    """V1 with a line of points and step, as processed in the nineties; the header states the largest value."""
+    text = ""
+    for number, name, values in channels:
+        peak = f"Units of uncor accel is g.                 Max  = {max(values, key=abs):7.3f} g, at  0.000 sec."
+        text += csmip_v1_header(number, name, len(values), peak)
+        text += (
+            f"{len(values):5d} points of accel data equally spaced at {fortran(1.0 / rate, 4, 3)} sec.  (units: g)\n"
+        )
+        text += rows([f"{v:9.6f}" for v in values], 8)
+        text += f"/&  ----------  END OF DATA FOR CHANNEL {number}  ----------\n"
+    return text
+
+
+def usc(times: list[float], values: list[float], component: str = "S05W") -> str:
+    """USC uncorrected: pairs (s, g/10) in 10F7.3 behind a blank."""
+    text = [
+        "FILE     0 OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:",
+        "TESTVILLE EARTHQUAKE                                                    20",
+        "JAN 02, 1999 -1800 GMT                                                  22",
+        "IBB000  99.100.0 N                                                      18",
+        "STATION USC# 0099   34 00 00N, 118 00 00W                               39",
+        "100 MAIN ST., TESTVILLE, CA                                             27",
+        f"COMP {component}                                                               9",
+        "TESTVILLE EARTHQUAKE   JAN 02, 1999 -1800 GMT                           45",
+        "EPICENTER -   34 00 00N, 118 00 00W                                     35",
+        "INSTR PERIOD =  .037 SEC  DAMPING =   .568  SENSITIVITY =   1.69CM/G    69",
+        f"NO. OF POINTS = {len(values):6d}      DURATION = {times[-1]:7.3f} SEC                      50",
+        "UNITS ARE SEC AND G/10                                                  22",
+        "RMS ACCLN. OF COMPLETE RECORD =     .211 G/10                           45",
+    ]
+    pairs = [f"{v:7.3f}" for pair in zip(times, values, strict=True) for v in pair]
+    numbers = rows(["    0"] * 100, 16) + rows(["      .000"] * 50, 8)
+    return "\n".join(text) + "\n" + numbers + "".join(f" {line}\n" for line in rows(pairs, 10).splitlines())
+
+
+def usc_corrected(values: list[float], dt: float = 0.02) -> str:
+    """USC corrected: acceleration (cm/s^2), velocity and displacement, the first without its units."""
+    text = ["CORRECTED ACCELEROGRAM  IIBB000  99.100.0 COMP N08W   FILE   0  CORRESPONDING T"]
+    text += usc([0.0, 1.0], [0.0, 0.0], "N08W").splitlines()[:13]
+    text += [
+        "ACCELEROGRAM IS BAND-PASS FILTERED BETWEEN  .225- .325 AND 25.00-27.00 HZ.",
+        f"{len(values):6d}  INSTRUMENT AND BASELINE CORRECTED DATA",
+        f"AT EQUALLY-SPACED INTERVALS OF    {fortran(dt, 4, 3)}  SEC.",
+        f"PEAK ACCELERATION = {max(values, key=abs):11.5f}  CMS/SEC/SEC AT    4.580   SEC.",
+        "PEAK   VELOCITY   =    12.05681    CMS/SEC   AT    4.500   SEC.",
+    ]
+    body = ""
+    for quantity, units, factor in (
+        ("ACC", "", 1.0),
+        ("VEL", "  IN UNITS CM/SEC", 0.1),
+        ("DIS", "  IN UNITS CM", 0.01),
+    ):
+        body += f"{len(values):6d} POINTS OF {quantity} DATA EQUALLY SPACED AT   {fortran(dt, 4, 3)} SEC.{units}\n"
+        body += rows([fortran(factor * v, 10, 3) for v in values], 8)
+    return "\n".join(text) + "\n" + rows(["    0"] * 100, 16) + rows(["      .000"] * 100, 8) + body
+
+
+def geonet(channels: list[tuple[str, list[float]]], dt: float = 0.005, *, corrected: bool = False) -> str:
+    """GeoNet V1A and V2A: mm/s^2 in 10F8.1; velocity and displacement follow a corrected acceleration."""
+    text = ""
+    for component, values in channels:
+        count, peak = len(values), max(values, key=abs)
+        stage = "Corrected" if corrected else "Uncorrected"
+        text += f"""{stage} accelerogram 19990102_180000_TST_20 Test Institute
+Site TST       42 00 00S  172 00 00E     Basalt file:  19990102_180000_TST
+Testville Town Hall
+Instrument Test_1
+Resolution: 24-bit   Instr Period: 0.0050 s   Damping: 0.700
+Accelerogram 19990102_180000_TST_20                 Processed 1999 January 03
+5 km south of Testville
+1999 January 02         18:00:00 UT
+Epicentre  42 00 00S 173 00 00E  Bearing S40E  Dist   25km  Depth   15km Mw 7.00
+Number of points  {count}    Duration {(count - 1) * dt:.2f} s
+"""
+        if corrected:
+            text += f"Instrument corrected data at {dt:.3f} sec intervals\nBand-pass filter bands are .10-.25 Hz\n"
+        else:
+            text += f"Raw readings in units of 1.00 mm/s/s  at intervals of {dt:.3f} s\nData is unfiltered\n"
+        text += f"Component {component}\nAcceleration:  Peak {peak:8.1f} mm/s/s at   0.15 s     RMS   20.89 mm/s/s\n"
+        text += "Velocity record\nDisplacement record\n"
+        parts = 3 if corrected else 1
+        counts = [count, 0, 0] + [count if k < parts else 0 for k in range(3)]
+        text += rows([f"{v:8d}" for v in [0] * 30 + counts + [0] * 4], 10) + rows([f"{v:8.2f}" for v in [0.0] * 60], 10)
+        for k in range(parts):
+            text += rows([f"{10.0**-k * v:8.1f}" for v in values], 10)
+    return text
+
+
+def bhrc(channels: list[tuple[str, list[float]]], dt: float = 0.005) -> str:
+    """BHRC V1: g/10 in 10E13.6; the header's numbers are cut at 70 characters."""
+    text = ""
+    for component, values in channels:
+        text += f"""* VOL1DS FILE:  1/01
+Inst Type = SSA-2
+Origin Time : 1999/01/02   18:00:00
+
+L
+
+COMP {component}
+Testville                 Station   38.0 N 47.0 E   Altitude 1000m   Azimuth L 352   T 82
+Epicenter 38.5 N 46.8 E
+INSTR PERIOD =  .019 SEC   DAMPING =  .640
+NO. OF POINTS = {len(values):6d}      DURATION = {len(values) * dt:7.3f}
+UNITS ARE SECONDS AND G/10
+
+"""
+        text += rows(["    0"] * 88, 14) + "".join(
+            f"{line[:70]}\n" for line in rows(["  .000000E+00"] * 50, 8).splitlines()
+        )
+        text += rows([exponent(v, 13, 6) for v in values], 10)
+    return text
+
+
+def cwa(components: dict[str, list[float]], rate: int = 50) -> str:
+    """CWA: times and gal in 4F10.3; some samples more than whole seconds."""
+    count = len(next(iter(components.values())))
+    peaks = "".join(f"#AmplitudeMAX. {name}: {max(v):8.3f}~ {min(v):8.3f}\n" for name, v in components.items())
+    head = f"""#Earthquake Information
+#Origin Time(GMT+08): 1999/01/02-18:00:00
+#Magnitude(Ml): 6.0
+
+#Station Information
+#StationCode: TST
+#StationName: Testville
+#InstrumentKind: FBA
+#StartTime(GMT+08): 1999/01/02-17:59:50.000
+#RecordLength(sec): {count // rate}
+#SampleRate(Hz): {rate}
+#AmplitudeUnit:  gal. DCoffset(corr)
+{peaks}#DataSequence: Time {"; ".join(f"{name}(+)" for name in components)}
+#Data: 4F10.3
+"""
+    table = zip(*components.values(), strict=True)
+    return head + "".join(
+        f"{k / rate:10.3f}" + "".join(f"{v:10.3f}" for v in row) + "\n" for k, row in enumerate(table)
+    )
+
+
+def afad(components: dict[str, list[float]], dt: float = 0.01) -> str:
+    """AFAD before 2020: gal in three columns."""
+    peaks = " ".join(f"({name}) {max(map(abs, v)):.6f}" for name, v in components.items())
+    head = f"""STRONG GROUND MOTION RECORDS OF TESTLAND
+PLACE                   : TESTVILLE TOWN HALL
+EARTHQUAKE DATE         : 1999/01/02 18:00:00 (GMT)
+STATION ID              : 0099
+RECORD TIME             : 02/01/1999 17:59:50.000000 (GMT)
+NUMBER OF DATA          : {len(next(iter(components.values())))}
+SAMPLING INTERVAL (sec) : {dt:g}
+RAW PGA VALUES (gal)    : {peaks}
+"""
+    names = "".join(f"{name:>13}" for name in components)
+    return (
+        head
+        + names
+        + "\n"
+        + "".join("".join(f"{v:13.6f}" for v in row) + "\n" for row in zip(*components.values(), strict=True))
+    )
+
+
+def unam(components: dict[str, list[float]], rate: int = 200) -> str:
+    """ASA 2.0: 109 lines of header, then gal in 3F10.4."""
+    count, channels = len(next(iter(components.values()))), range(len(components))
+    peaks = "/".join(f"{max(v, key=abs):.4f}" for v in components.values())
+    entries = {
+        "NOMBRE DE LA ESTACION": "PUEBLO DE PRUEBA",
+        "CLAVE DE LA ESTACION": "TST1",
+        "ORIENTACION C1-C6 (rumbo;orientacion)": "/" + "/".join(components),
+        "VEL. DE MUESTREO, C1-C6 (muestras/s)": "".join(f"/{rate}" for _ in channels),
+        "INTERVALO DE MUESTREO, C1-C6 (s)": "".join(f"/{1.0 / rate:g}" for _ in channels),
+        "INTERVALO DE MUESTREO, C7-C12 (s)": "",
+        "FECHA DEL SISMO [GMT]": "1999/01/02",
+        "HORA EPICENTRO (GMT)": "18:00:00",
+        "DURACION DEL REGISTRO (s), C1-C6": "".join(f"/{count / rate:.2f}" for _ in channels),
+        "NUM. TOTAL DE MUESTRAS, C1-C6": "".join(f"/{count}" for _ in channels),
+        "ACEL. MAX.(Gal), C1-C6": f"/{peaks}",
+        "UNIDADES DE LOS DATOS": "Gal (cm/s/s)",
+        "FORMATO DATOS (FORTRAN,10 campos/dato)": "3F10.4",
+    }
+    lines = ["*" * 86] + [f"{key:<39}: {value}" for key, value in entries.items()]
+    lines += [""] * (106 - len(lines)) + ["---------+" * 8]
+    lines += ["".join(f"{f'CANAL-{k + 1}':>10}" for k in channels), "".join(f"{name:>10}" for name in components)]
+    return "\n".join([*lines, ""]) + "".join(
+        "".join(f"{v:10.4f}" for v in row) + "\n" for row in zip(*components.values(), strict=True)
+    )
+
+
+def csmnc(values: list[float], dt: float = 0.005) -> str:
+    """CSMNC: cm/s^2, eight numbers to a line."""
+    peak = max(values, key=abs)
+    head = f"""099TST990102180000
+0990102180000 1999-01-02 18:0:0 BTM
+TESTVILLE EARTHQUAKE, TESTLAND
+EPICENTER  30.300N 103.000E DEPTH 13 KM
+MAGNITUDE  7.0(Ms)
+STATION: 99TST 30.400N 102.800E
+SITE CONDITION: ROCK
+INSTRUMENT TYPE: TEST
+OBSERVING POINT: GROUND
+COMP. EW
+UNCORRECTED ACCELERATION          UNIT: CM/SEC/SEC
+NO. OF POINTS:  {len(values)}  EQUALLY SPACED INTERVALS OF:  {dt:g}  SEC
+PEAK VALUE:    {peak:.3f}   AT   26.35 SEC    DURATION:  {len(values) * dt:g} SEC
+PRE-EVENT TIME:  20  SEC
+CSMNC
+
+"""
+    return head + rows([f"{v:14.6E}" for v in values], 8)
+
+
+def saf(components: dict[str, list[float]], rate: int = 50, units: str = "m/s2") -> str:
+    """SESAME ASCII format: keys with values, then three columns."""
+    names = "".join(f"CH{k}_ID = {name}\n" for k, name in enumerate(components))
+    head = f"""SESAME ASCII data format (saf) v. 1    (this line must not be modified)
+SAMP_FREQ = {rate}
+NDAT = {len(next(iter(components.values()))):010d}
+START_TIME = 1999 01 02 18 00 10.000
+# a remark
+STA_CODE = TST-02
+UNITS = {units}
+{names}####--------------------------------
+"""
+    return head + "".join(" ".join(f"{v:.6f}" for v in row) + "\n" for row in zip(*components.values(), strict=True))
+
+
+def npts_dt(values: list[float], dt: float = 0.005, per_line: int = 1) -> str:
+    """A title, count and step, and the values, as many programs write them."""
+    title = f"a motion, units g\n{len(values)} {dt:.4f}\n"
+    return title + rows([f"{v:12.6f}" for v in values], per_line)
+
+
 def counts(seed: int, points: int) -> list[int]:
     """Integers around an instrument's offset of 8000."""
     return [8000 + round(v * 1577.2) for v in series(seed, points)]
@@ -267,6 +498,11 @@ def counts(seed: int, points: int) -> list[int]:
 def in_g(values: list[float]) -> list[float]:
     """cm/s^2 to g."""
     return [v / 980.665 for v in values]
+
+
+def in_mm(values: list[float]) -> list[float]:
+    """cm/s^2 to mm/s^2."""
+    return [10.0 * v for v in values]
 
 
 def fixtures() -> dict[str, str]:
@@ -299,6 +535,22 @@ def fixtures() -> dict[str, str]:
         "kiknet.ew2": knet(counts(2, 400), direction="5", scale="2000(gal)/8388608", rate=200),
         "esm.asc": esm(series(1)),
         "velocity.asc": esm(series(1), kind="VELOCITY", units="cm/s"),
+        "even.v1": csmip_v1_even([(1, " 90 Deg", in_g(series(1))), (2, "Up", in_g(series(2)))]),
+        "padded.smc": smc([*series(1), 0.0, 0.0, 0.0], title="1 UNCORRECTED ACCELEROGRAM").replace(
+            "        40", "        37"
+        ),
+        "usc.s0a": usc(film_times(), [v / 98.0665 for v in series(1)]),
+        "usc.s0b": usc_corrected(series(1)),
+        "geonet.v1a": geonet([("N10E", in_mm(series(1))), ("N80W", in_mm(series(2))), ("Up", in_mm(series(3)))]),
+        "geonet.v2a": geonet([("S16W", in_mm(series(1))), ("Up", in_mm(series(3)))], 0.02, corrected=True),
+        "bhrc.v1": bhrc([("L1", [v / 98.0665 for v in series(1)]), ("V2", series(2)), ("T3", series(3))]),
+        "cwa.dat": cwa(dict(zip("UNE", (series(3, 105), series(1, 105), series(2, 105)), strict=True))),
+        "afad.txt": afad({"N-S": series(1), "E-W": series(2), "U-D": series(3)}),
+        "unam.txt": unam({"V": series(3), "N00E": series(1), "N90W": series(2)}),
+        "csmnc.dat": csmnc(series(1)),
+        "sesame.saf": saf({"V": series(3), "N": series(1), "E": series(2)}),
+        "npts.txt": npts_dt(in_g(series(1))),
+        "wrapped.g3": npts_dt(in_g(series(1)), per_line=5),
         "times.csv": "time (s), acceleration (g)\n"
         + "".join(f"{0.005 * k:.3f},{v / 980.665:.7e}\n" for k, v in enumerate(series(1))),
         "column.txt": "# acceleration, cm/s2\n" + "".join(f"{v:.6f}\n" for v in series(1)),

@@ -74,12 +74,12 @@ class _Table:
 
 
 def read_calibration(
-    path: Path, *, channel: str | None, dt: float | None, units: str | None
+    path: Path, *, channel: str | None, dt: float | None, units: str | None, **corrections: Any
 ) -> list[ShakeTest] | MeasuredHistory:
     """Read tests (see `read_tests`) or a history with columns `time_s` and `rotation_rad` or `rotation_deg`."""
     table = read_table(path)
     if {"motion", "overturned"} <= set(table.columns):
-        return _create_tests(table, channel=channel, dt=dt, units=units)
+        return _create_tests(table, channel=channel, dt=dt, units=units, **corrections)
     if {"rotation_rad", "rotation_deg"} <= set(table.columns):
         raise table.create_error("the table must contain either rotation_rad or rotation_deg, not both")
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
@@ -146,7 +146,7 @@ def _create_tests(table: _Table, **metadata: Any) -> list[ShakeTest]:
     return [ShakeTest(*row) for row in zip(motions, overturned, names, groups, strict=True)]
 
 
-def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
+def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any, **corrections: Any) -> tuple[Motion, ...]:
     """Read each row's motion, scaled and with its vertical. The row's channel, dt_s and units take precedence."""
     has_several = len({row["motion"] for _, row in table.rows}) > 1
     loaded: dict[tuple[object, ...], Motion] = {}
@@ -156,7 +156,7 @@ def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any) -> tu
         step = table.convert(line, row["dt_s"], float, "a number") if row.get("dt_s") else None
         cells = row.get("channel"), step, row.get("units")
         options = {"channel": cells[0] or channel, "dt": dt if step is None else step, "units": cells[2] or units}
-        options["several"] = has_several and not any(cells)
+        options |= corrections | {"several": has_several and not any(cells)}
         name, vertical = row["motion"], row.get("vertical") or ""
         try:
             if (key := (name, vertical, *cells)) not in loaded:
@@ -193,7 +193,13 @@ def _parse_finite(text: str) -> float:
 
 
 def read_tests(
-    path: str | Path, *, channel: str | None = None, dt: float | None = None, units: str | None = None
+    path: str | Path,
+    *,
+    channel: str | None = None,
+    dt: float | None = None,
+    units: str | None = None,
+    baseline: int | str | None = None,
+    highpass: float | None = None,
 ) -> list[ShakeTest]:
     r"""Read tests of a specimen from a CSV table, one per row.
 
@@ -205,7 +211,7 @@ def read_tests(
         false). Optional columns are "scale" (factor on the motion), "vertical" (file or channel of the vertical
         component), "channel", "dt_s" (step, s) and "units" (for files that do not state them), "name" and "group" (see
         `ShakeTest`). A column "specimen" must contain one specimen throughout. Other columns are ignored.
-    channel, dt, units : optional
+    channel, dt, units, baseline, highpass : optional
         As for `rocking.read`, for rows that do not state them.
 
     Returns
@@ -236,17 +242,16 @@ def read_tests(
     table = read_table(checks.path(path, "path of a table", RecordError))
     if not {"motion", "overturned"} <= {*table.columns}:
         raise table.create_error(f"the columns must include motion and overturned; got {','.join(table.columns)}")
-    return _create_tests(table, channel=channel, dt=dt, units=units)
+    corrections = {"baseline": baseline, "highpass": highpass}
+    return _create_tests(table, channel=channel, dt=dt, units=units, **corrections)
 
 
-def read_observed(
-    path: Path, measure: Measure, *, channel: str | None = None, dt: float | None = None, units: str | None = None
-) -> dict[str, Any]:
+def read_observed(path: Path, measure: Measure, **options: Any) -> dict[str, Any]:
     """Read a table of observed outcomes as arguments of `fit_fragility`.
 
     The table has a column "overturned" (a count with a column "trials"), and either an intensity (`HEADINGS`) or a
     motion (see `read_tests`). Column "group" labels outcomes that belong together. Outcomes under one motion, and
-    groups with a common motion, always do. A row without label belongs to no group.
+    groups with a common motion, always do. A row without label belongs to no group. Options apply to the files.
     """
     table = read_table(path, normalise_heading)
     columns = table.columns
@@ -263,7 +268,7 @@ def read_observed(
     if intensities:
         observed |= _pair_with_intensity(table, intensities[0], measure)
     else:
-        observed |= _pair_with_motions(table, measure, channel=channel, dt=dt, units=units)
+        observed |= _pair_with_motions(table, measure, **{"channel": None, "dt": None, "units": None, **options})
     outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(table.rows)))))
     return observed | {"description": f"{format_count(outcomes, 'observed outcome')} in {path.name}"}
 

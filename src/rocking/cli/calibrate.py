@@ -97,7 +97,7 @@ def calibrate(
             arguments[name] = HOUSNER if text == HOUSNER else read_bounds(text, name, quantity)
     rotation = None if initial_rotation is None else read_tilt(initial_rotation, "initial_rotation")
     with output.folder() as folder:
-        table = read_calibration(data, **file.metadata())
+        table = read_calibration(data, **file.metadata(), **file.corrections())
         conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
         if isinstance(table, MeasuredHistory):
             conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
@@ -181,7 +181,7 @@ def validate(
         Seed of the simulations for bands and probabilities.
     """
     with output.folder() as folder:
-        rows = read_tests(tests, **file.metadata())
+        rows = read_tests(tests, **file.metadata(), **file.corrections())
         options: dict[str, Any] = {"outlier_probability": outlier_probability, "bins": bins, "seed": seed}
         validation = run_validation(rows, **block.blocks(model), **options)
         result = validation.to_dict()

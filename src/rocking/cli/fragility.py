@@ -124,7 +124,7 @@ def fragility(
     with output.folder() as folder:
         records: dict[str, Any] = {}
         if outcomes is not None:
-            observed = read_observed(outcomes, measure.intensity_measure, **motion.metadata())
+            observed = read_observed(outcomes, measure.intensity_measure, **motion.metadata(), **motion.corrections())
             _check_hazard(curve, observed["measure"])
             fitted = fit_fragility(**observed, confidence=confidence)
         else:

@@ -199,13 +199,17 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
 _FILE_OPTIONS: Final = {name: write_option_name(name) for name in ("channel", "dt", "units")}
 
 
-@_with_inputs(*_FILE_OPTIONS)
+@_with_inputs(*_FILE_OPTIONS, "baseline", "highpass")
 class FileOptions(InputOptions):
-    """Metadata that a record file lacks."""
+    """Metadata that a record file lacks, and corrections of its numbers."""
 
     def metadata(self) -> dict[str, Any]:
         """Return channel, step and units as arguments."""
         return dict.fromkeys(_FILE_OPTIONS) | self.read_values(*_FILE_OPTIONS)
+
+    def corrections(self) -> dict[str, Any]:
+        """Return baseline and corner frequency as arguments."""
+        return self.read_values("baseline", "highpass")
 
     def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
         """Return the scaled motion of a record or pulse, with notes."""
@@ -216,9 +220,10 @@ class FileOptions(InputOptions):
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
-                motion = motion.with_vertical(load_vertical(vertical, name, **self.metadata()))
+                motion = motion.with_vertical(load_vertical(vertical, name, **self.metadata(), **self.corrections()))
         else:
-            motion = load_motion(name, **self.metadata(), vertical=vertical, several=several)
+            options = self.metadata() | self.corrections()
+            motion = load_motion(name, **options, vertical=vertical, several=several)
         notes = motion_notes(motion)
         for sentence in (*notes, *vertical_notes(motion)):
             note(f"{name}: {sentence}")

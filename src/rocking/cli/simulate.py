@@ -203,9 +203,9 @@ def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:
             reject_redundant_arguments(name, **file.metadata())
         return shipped(name)
     source = sys.stdin.buffer if name == STANDARD_INPUT else name
-    listing = contents(source, **file.metadata(), several=several)
+    listing = contents(source, **file.metadata(), **file.corrections(), several=several)
     for motion, entry in zip(listing.motions, listing.entries, strict=True):
-        for sentence in reading_notes(motion):
+        for sentence in (*reading_notes(motion), *motion.history):
             note(f"{name}, channel {entry['channel']}: {sentence}")
     return listing
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 import fnmatch
 import glob
 import itertools
 import os
+import re
 import sys
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -16,11 +18,13 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.core.progress import note
 from rocking.core.tables import add_unit, format_table, round_decimal
 from rocking.errors import MotionError, OptionError, RecordError
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
-from rocking.records.formats.source import Request
+from rocking.records.formats.channel import remove_baseline
+from rocking.records.formats.source import Request, list_archive, split_archive
 
 #: One motion, several, or a mapping from names to motions.
 Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
@@ -94,6 +98,9 @@ def _describe_wrong_type(value: Any) -> str:
     return f"a Motion is required, not {type_name}; create one with Motion.from_samples(array, dt), in m/s^2 and s"
 
 
+#: Name of a record with a factor.
+_FACTOR = re.compile(r"(?s)(.+) x ([+-]?\d[\d.]*(?:[eE][+-]?\d+)?)")
+
 #: Name of a record on standard input.
 STANDARD_INPUT = "-"
 
@@ -103,19 +110,41 @@ def load_motion(
 ) -> Motion:
     """Return the scaled motion of a record file ("-" is standard input), or of a shipped record if no file exists.
 
-    Channel, dt and units are optional. With `several`, they apply to several files: files that state step and units
-    keep them, and the name of a single channel does not matter.
+    Channel, dt, units, baseline and highpass are optional. With `several`, the first three apply to several files:
+    files that state step and units keep them, and the name of a single channel does not matter. A name may end with a
+    factor, as in "a.at2 x 1.5".
     """
     several = several or (vertical is not None and _is_file_or_record(vertical))
+    name, factor = split_factor(name)
+    metadata, corrections = _split_options(options)
     if is_shipped(name):
-        reject_redundant_arguments(name, **({} if several else options))
-        motion = catalogue.load(name)
+        reject_redundant_arguments(name, **({} if several else metadata))
+        original = catalogue.load(name)
+        motion = remove_baseline(original, *corrections)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        motion = formats.read_channel(file, Request.create(**options, several=several)).motion()
+        channel = formats.read_channel(file, Request.create(**metadata, several=several))
+        original, motion = channel.motion("none"), channel.motion(*corrections)
+    if motion.history:
+        peaks = " to ".join(
+            f"{each.pga:.4g} m/s^2 ({each.pga / STANDARD_GRAVITY:.4g} g)" for each in (original, motion)
+        )
+        note(f"{name}: {' and '.join(motion.history)}, which changes the peak acceleration from {peaks}")
     if vertical is not None:
         motion = motion.with_vertical(load_vertical(vertical, name, several=several, **options))
-    return motion if scale == 1.0 else motion.scaled(scale)
+    return motion if scale * factor == 1.0 else motion.scaled(scale * factor)
+
+
+def _split_options(options: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+    """Return the options of a request, and baseline and highpass."""
+    names = ("baseline", "highpass")
+    return {name: value for name, value in options.items() if name not in names}, [options.get(name) for name in names]
+
+
+def split_factor(name: str) -> tuple[str, float]:
+    """Return the name and the factor of a record such as "a.at2 x 1.5"."""
+    match = None if os.path.exists(name) else _FACTOR.fullmatch(name)  # noqa: PTH110 - see `path_exists`
+    return (match[1], float(match[2])) if match else (name, 1.0)
 
 
 def load_vertical(name: str, record: str, *, several: bool = False, **options: Any) -> Motion:
@@ -123,15 +152,18 @@ def load_vertical(name: str, record: str, *, several: bool = False, **options: A
     options = {key: value for key, value in options.items() if key != "channel"}  # the channel of the horizontal motion
     if _is_file_or_record(name):
         return load_motion(name, several=True, **options)
+    metadata, corrections = _split_options(options)
     if record == STANDARD_INPUT or not path_exists(record):
         text = f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels"
         raise RecordError(f"{text}; check the name")
-    return formats.read_channel(record, Request.create(**options, several=several), vertical=name).motion()
+    channel = formats.read_channel(record, Request.create(**metadata, several=several), vertical=name)
+    return channel.motion(*corrections)
 
 
 def _is_file_or_record(vertical: str) -> bool:
     """Return whether a vertical motion is a file or shipped record, not a channel of the horizontal file."""
-    return os.path.isfile(vertical) or vertical in catalogue.names()  # noqa: PTH113 - see `path_exists`
+    is_file = os.path.isfile(vertical) or split_archive(vertical) is not None  # noqa: PTH113 - see `path_exists`
+    return is_file or vertical in catalogue.names()
 
 
 def reject_redundant_arguments(name: str, **arguments: object) -> None:
@@ -142,8 +174,9 @@ def reject_redundant_arguments(name: str, **arguments: object) -> None:
 
 
 def path_exists(name: str | Path) -> bool:
-    """Return whether a file or folder exists (False for overlong names)."""
-    return os.path.exists(name)  # noqa: PTH110 - Path.exists() raises then
+    """Return whether a file (also in a ZIP archive, or with a factor) or folder exists (False for overlong names)."""
+    name, _ = split_factor(str(name))
+    return os.path.exists(name) or split_archive(name) is not None  # noqa: PTH110 - Path.exists() raises then
 
 
 def is_shipped(name: str) -> bool:
@@ -160,13 +193,42 @@ def _find_records(name: str) -> list[str]:
     if os.path.isdir(name):  # noqa: PTH112 - see `path_exists`
         matches = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
     elif not glob.has_magic(name) or path_exists(name):
-        return [name]
+        matches = [name]
     else:
         matches = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
         matches = matches or fnmatch.filter(catalogue.names(), name)
     if not matches:
         raise RecordError("no file or shipped record matches this name; check the folder and the name", path=name)
-    return matches
+    return [record for match in matches for record in (_unfold(match) or [match])]
+
+
+def _unfold(name: str) -> list[str]:
+    """Return the records in a ZIP archive, or those of a selection with factors, or none for another file."""
+    suffix = Path(name).suffix.lower() if os.path.isfile(name) else ""  # noqa: PTH113 - see `path_exists`
+    if suffix != ".csv":
+        return list_archive(name) if suffix == ".zip" else []
+    with Path(name).open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        text = file.read(2**20)
+    rows = csv.reader(text.splitlines(), delimiter=";" if text.count(";") > text.count(",") else ",")
+    for row in rows:
+        heading = [cell.strip().lower() for cell in row]
+        files = [k for k, cell in enumerate(heading) if re.search("file|^record$", cell) and "vert" not in cell]
+        factors = [k for k, cell in enumerate(heading) if re.search("scale|scaling|^factor$", cell)]
+        if files and factors:
+            # A blank line ends the selection.
+            selected = itertools.takewhile(lambda row: any(map(str.strip, row)), rows)
+            return [record for row in selected for record in _scale_files(name, rows.line_num, row, files, factors[0])]
+    return []
+
+
+def _scale_files(name: str, line: int, row: list[str], files: list[int], factor: int) -> Iterator[str]:
+    """Yield the files in a row of a selection with their factor."""
+    text = row[factor].strip() if len(row) > factor else ""
+    if not _FACTOR.fullmatch(f"- x {text}"):
+        raise RecordError(f"the scale factor must be a number; got {text!r}", path=name, line=line, value=text)
+    for cell in (row[k].strip() for k in files if len(row) > k and row[k].strip()):
+        sibling = str(Path(name).parent / cell)
+        yield f"{sibling if path_exists(sibling) else cell} x {text}"
 
 
 @dataclass(frozen=True)
@@ -258,6 +320,8 @@ def contents(
     channel: str | None = None,
     dt: float | None = None,
     units: str | None = None,
+    baseline: int | str | None = None,
+    highpass: float | None = None,
     several: bool = False,
 ) -> Contents:
     """List the acceleration channels of a file, with its format.
@@ -268,6 +332,8 @@ def contents(
         As for `rocking.read`.
     channel, dt, units : str or float, optional
         As for `rocking.read`. By default all channels are listed.
+    baseline, highpass : int, str or float, optional
+        As for `rocking.read`.
     several : bool
         Whether the arguments apply to several files. Files that state step and units then keep them.
 
@@ -290,8 +356,10 @@ def contents(
     >>> [entry["pga_g"] for entry in contents(path).entries]
     [0.5]
     """
-    identification, channels = formats.read_content(file, Request.create(dt, units, channel, several=several))
-    motions = tuple(component.motion() for component in channels)
+    source, factor = split_factor(file) if isinstance(file, str) else (file, 1.0)
+    identification, channels = formats.read_content(source, Request.create(dt, units, channel, several=several))
+    motions = tuple(component.motion(baseline, highpass) for component in channels)
+    motions = motions if factor == 1.0 else tuple(motion.scaled(factor) for motion in motions)
     name = "standard input" if hasattr(file, "read") else os.fsdecode(file)
     facts = {"file": name, "format": identification.format, "reason": identification.reason}
     title = f"{name}: {identification.format}, since {identification.reason}"

@@ -56,7 +56,7 @@ ACCELERATION_UNITS = _index_by_spelling(
         Unit("%g", STANDARD_GRAVITY, 100.0): "%g",
         Unit("mg", STANDARD_GRAVITY, 1000.0): "mg",
         Unit("m/s2", 1.0, 1.0): "ms2 mss",
-        Unit("cm/s2", 1.0, 100.0): "cms2 cmss gal",
+        Unit("cm/s2", 1.0, 100.0): "cms2 cmss cmsss gal",
         Unit("mm/s2", 1.0, 1000.0): "mms2 mmss",
         Unit("um/s2", 1.0, 1e6): "ums2 µms2 μms2",
         Unit("nm/s2", 1.0, 1e9): "nms2",

@@ -52,7 +52,7 @@ _RESTRAINT_KEYS: Final = tuple(f"{name}s" if name in FORCES else name for name i
 #: Tables of a file and their keys.
 SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
     "blocks": ("csv", *BLOCK, *_RESTRAINT_KEYS),
-    "motions": ("records", "channel", "vertical", "units", "dt", "skip_unreadable", "pulses"),
+    "motions": ("records", "channel", "vertical", "units", "dt", "baseline", "highpass", "skip_unreadable", "pulses"),
     "scales": (*_MEASURES, "period", "damping", "polarity"),
     "simulation": ("model", "chattering", "duration"),
 }
@@ -63,7 +63,7 @@ _VALUE_TYPES: Final[Mapping[str, tuple[Any, str]]] = {
     **dict.fromkeys(("one_sided", "skip_unreadable"), (bool, "true or false")),
     **{f"{name}s": ([dict], f"tables, [[blocks.{name}s]]") for name in FORCES},
     "pulses": ([dict], "tables, [[motions.pulses]]"),
-    "channel": (str | int, "text or a whole number"),
+    **dict.fromkeys(("channel", "baseline"), (str | int, "text or a whole number")),
     "records": ([str], "a list of texts"),
 }
 
@@ -320,7 +320,7 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
 
 def _load_record(tables: Tables, path: str, *, several: bool) -> Motion:
     entries = tables.table("motions")
-    metadata = {name: entries[name] for name in ("dt", "units") if name in entries}
+    metadata = {name: entries[name] for name in ("dt", "units", "baseline", "highpass") if name in entries}
     if "channel" in entries:
         metadata["channel"] = str(entries["channel"])
     if "vertical" in entries:  # a file beside the study file, or any other name

@@ -1,27 +1,21 @@
-"""Readers of strong-motion records: PEER AT2, CSMIP V1 and V2, COSMOS, SMC, K-NET, ESM, text, ObsPy's formats.
+"""Readers of strong-motion records: declared formats with a header, text tables, workbooks, and ObsPy's formats.
 
-The format is recognised from the content, never from the file name. Numbers are converted to m/s^2 (g = 9.80665 m/s^2)
-without filter, baseline correction or offset removal.
+The format is recognised from the content, never from the file name. Numbers are converted to m/s^2 (g = 9.80665 m/s^2).
 """
 
 from __future__ import annotations
 
 import os
-from typing import BinaryIO, Final
+from typing import BinaryIO
 
 from rocking.errors import RecordError, describe_install
 from rocking.motion.motion import Motion
-from rocking.records.formats import csmip, headed, table, through_obspy
+from rocking.records.formats import table, through_obspy
 from rocking.records.formats.channel import Channel, Identification, Recognised
+from rocking.records.formats.declared import load_formats
 from rocking.records.formats.source import Request, Source, open_source
 
 __all__ = ["Channel", "Identification", "channels", "identify", "read"]
-
-
-#: Formats with a header, in the order of recognition. Add a new format here.
-FORMATS: Final = (headed.AT2, csmip.COSMOS, csmip.V1, csmip.V2, headed.SMC, headed.ESM, headed.KNET)
-#: The last two accept content without a recognised header.
-_RECOGNISERS: Final = (*(form.recognise for form in FORMATS), table.recognise_table, through_obspy.recognise_with_obspy)
 
 
 def read(
@@ -30,15 +24,19 @@ def read(
     channel: int | str | None = None,
     dt: float | None = None,
     units: str | None = None,
+    baseline: int | str | None = None,
+    highpass: float | None = None,
 ) -> Motion:
     r"""Read one channel of a record file as a motion.
 
     Parameters
     ----------
     path : str, path or binary file
-        File in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, text table of one column
-        (accelerations), two (times, accelerations) or more named by a heading (times, then channels), or any file that
-        ObsPy reads if the `formats` extra is installed. The format is recognised from the content.
+        File in PEER AT2, CSMIP V1 or V2, COSMOS, GeoNet, BHRC, USC, USGS SMC, K-NET/KiK-net, ESM, CWA, AFAD, UNAM,
+        CSMNC, SESAME SAF or NPTS DT format, text table or workbook of one column (accelerations), two (times,
+        accelerations) or more named by a heading (times, then channels), rows of accelerations, or any file that ObsPy
+        reads if the `formats` extra is installed. The format is recognised from the content. A file in a ZIP archive is
+        named archive.zip/file, unless it is the only one.
     channel : int or str, optional
         Number or name of the channel, required only if the file contains several.
     dt : float, optional
@@ -47,12 +45,16 @@ def read(
     units : {"g", "m/s2", "cm/s2", "gal", "mm/s2", "mg"}, optional
         Units of the accelerations, which override a heading. Required only if the file does not state them: ObsPy's
         formats, and text tables without a heading such as "acceleration (cm/s2)" or "a_g".
+    baseline : int or "none", optional
+        Degree of the polynomial in time that is fitted and subtracted. By default the mean of counts with an instrument
+        offset, as in K-NET files, is removed, and nothing from other files; "none" keeps the numbers.
+    highpass : float, optional
+        Corner frequency of a high-pass filter, Hz (`Motion.processed`).
 
     Returns
     -------
     Motion
-        Motion in m/s^2, linear between the samples, from time 0. A constant instrument offset, as in K-NET files, is
-        kept.
+        Motion in m/s^2, linear between the samples, from time 0. Its `history` states what was removed.
 
     Raises
     ------
@@ -60,10 +62,11 @@ def read(
         If the file is missing, unreadable or inconsistent, its format is unknown, a number is damaged, or the channel
         is unknown or not specified. The message contains file, line and correction.
     MotionError
-        If `dt` is not a positive number, or the samples do not form a motion.
+        If `dt` is not a positive number, the samples do not form a motion, or `baseline` or `highpass` is invalid.
 
     See Also
     --------
+    rocking.records.group_components : read all components, grouped by station and event.
     rocking.records.contents : list the channels of a file.
     rocking.records.load : load a shipped record.
     rocking.Motion.processed : filter or trim a motion.
@@ -78,7 +81,7 @@ def read(
     >>> motion.duration, motion.pga
     (0.02, 4.903325)
     """
-    return read_channel(path, Request.create(dt, units, channel)).motion()
+    return read_channel(path, Request.create(dt, units, channel)).motion(baseline, highpass)
 
 
 def read_channel(path: str | os.PathLike[str] | BinaryIO, request: Request, vertical: str | None = None) -> Channel:
@@ -168,19 +171,20 @@ def identify(path: str | os.PathLike[str]) -> Identification:
 
 
 def _recognise_format(source: Source) -> Recognised:
-    recognised = next((recognised for recognise in _RECOGNISERS if (recognised := recognise(source)) is not None), None)
+    # The last ones accept content without a recognised header.
+    others = (table.recognise_table, through_obspy.recognise_with_obspy, table.recognise_wrapped)
+    recognisers = (*(form.recognise for form in load_formats()), *others)
+    recognised = next((recognised for recognise in recognisers if (recognised := recognise(source)) is not None), None)
     if recognised is None:
         raise _unknown_format_error(source)
     return recognised
 
 
 def _unknown_format_error(source: Source) -> RecordError:
-    if table_error := table.unreadable_table_error(source):
-        return table_error
     text = f"the format of this text is unknown: none of its first {table.HEADING_LINES} lines contains only numbers"
     advice = "use the complete file, with times in seconds"
     if source.is_binary:
-        text, advice = "the format of this binary file is unknown", "unpack an archive, save a workbook as CSV"
+        text, advice = "the format of this binary file is unknown", "unpack an archive, save a sheet as CSV"
     if not through_obspy.is_obspy_installed():
         advice += f", or if it is MiniSEED, SAC or another format that ObsPy reads, {describe_install('formats')}"
     return source.error(f"{text}; {advice}")

@@ -11,7 +11,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import RecordError
+from rocking.errors import MotionError, RecordError
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
 from rocking.records.formats.source import Request, Source
@@ -150,7 +150,7 @@ class Channel:
     number : int
         Channel number in the file, counted from 1 if the file states none.
     acceleration : ndarray, shape (n,)
-        Acceleration, m/s^2, including a constant instrument offset.
+        Acceleration, m/s^2, as in the file, including a constant instrument offset.
     dt : float or None
         Sampling step, s, or None for uneven samples.
     times : ndarray, shape (n,), or None
@@ -165,6 +165,8 @@ class Channel:
         Other facts: format, file, location, retained content, ...
     start : float or None
         Instant of the first sample by the file's clock, s, or None if unknown.
+    is_raw : bool
+        Whether the numbers are counts with the offset of an instrument, as in K-NET files, which `motion` removes.
 
     See Also
     --------
@@ -187,6 +189,7 @@ class Channel:
     event: str = ""
     metadata: Mapping[str, str] = field(default_factory=dict)
     start: float | None = None
+    is_raw: bool = False
 
     def __repr__(self) -> str:
         sampling = f"in steps of {self.dt:g} s" if self.dt is not None else "at uneven times"
@@ -200,18 +203,26 @@ class Channel:
         """Number and name, for lists of channels."""
         return f"{self.number} {self.name!r}"
 
-    def motion(self) -> Motion:
+    def motion(self, baseline: int | str | None = None, highpass: float | None = None) -> Motion:
         """Return the channel as a motion, linear between samples, from time 0.
+
+        Parameters
+        ----------
+        baseline : int or "none", optional
+            Degree of the polynomial that is fitted and subtracted. By default the mean of raw counts is removed (degree
+            0), and nothing from other files.
+        highpass : float, optional
+            Corner frequency of a high-pass filter, Hz.
 
         Returns
         -------
         Motion
-            Motion whose description contains the metadata of the file.
+            Motion whose description contains the metadata of the file, and whose `history` states the changes.
 
         Raises
         ------
         MotionError
-            If there are fewer than two samples, or they are too large for a motion.
+            If there are fewer than two samples, or they are too large for a motion, or an argument is invalid.
         """
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
         text = ", ".join(f"{key} {value}" for key, value in {**self.metadata, **facts}.items() if value)
@@ -221,8 +232,24 @@ class Channel:
         description = Description("record", text=text, origin=Origin(channel=self.name, **fields))
         if self.dt is None:
             assert self.times is not None
-            return Motion.from_points(self.times, self.acceleration, name=name, description=description)
-        return Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
+            motion = Motion.from_points(self.times, self.acceleration, name=name, description=description)
+        else:
+            motion = Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
+        return remove_baseline(motion, 0 if baseline is None and self.is_raw else baseline, highpass)
+
+
+def remove_baseline(motion: Motion, baseline: int | str | None, highpass: float | None) -> Motion:
+    """Return a motion without its baseline ("none" and None keep it), high-pass filtered."""
+    degree = int(baseline) if isinstance(baseline, str) and baseline.isdecimal() else baseline
+    if isinstance(degree, str) and degree != "none":
+        text = f"{{}} must be the degree of a polynomial (0 removes the mean) or none; got {degree!r}"
+        raise MotionError(text, "baseline", value=baseline)
+    steps: dict[str, Any] = {} if degree in (None, "none") else {"baseline": degree}
+    steps |= {} if highpass is None else {"band_pass": (highpass, None)}
+    if steps and motion.dt is None:
+        name = "baseline" if "baseline" in steps else "highpass"
+        raise MotionError("{} requires samples at even steps; resample the record in Python first", name)
+    return motion.processed(**steps) if steps else motion
 
 
 #: Numbers that represent missing values: nines before and after the point, marks of well logs and SAC, limits of 16 and

@@ -5,27 +5,40 @@ Line ends in the text of a file are made uniform, and errors refer to one of its
 
 from __future__ import annotations
 
+import contextlib
+import csv
+import errno
+import io
 import math
 import os
 import re
 import stat
+import zipfile
+import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from typing import BinaryIO, NamedTuple
 
 from rocking.core import checks
-from rocking.errors import MotionError, RecordError, escape_braces
+from rocking.errors import MotionError, RecordError, describe_install, escape_braces
 from rocking.records import catalogue
 from rocking.records.units import UNIT_NAMES, Unit, choose_unit, find_unit
 
 #: Largest accepted file, bytes, a hundred times the longest strong-motion records.
 SIZE_LIMIT = 512 * 2**20
 
+#: Largest accepted file in an archive, bytes, because a small archive may unpack to any size.
+_MEMBER_LIMIT = 64 * 2**20
+
 #: Decoded length of header lines, which limits the cost of files without line ends.
 LINE_LIMIT = 512
 
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n")
 _VISIBLE = re.compile(rb"\S")
+_ZIP_MARK = b"PK\3\4"
+_ARCHIVE_ERRORS = (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error)
+#: Members of archives that are no records: folders, hidden files, documents and pictures.
+_NO_RECORD = re.compile(r"(?i)/$|(?:^|/)(?:\.|__MACOSX)|\.(?:pdf|docx?|html?|png|jpe?g|gif|ps|eps|kml|xml)$")
 
 
 class Line(NamedTuple):
@@ -114,19 +127,99 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     else:
         name = os.fsdecode(path)
     try:
-        raw = _read_bytes(name) if read is None else read(SIZE_LIMIT + 1)
-    except (OSError, ValueError) as error:
+        name, raw = _unpack(name, _read_bytes(name) if read is None else read(SIZE_LIMIT + 1))
+    except (OSError, ValueError, *_ARCHIVE_ERRORS) as error:
         raise unreadable_file_error(name, error) from error
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
         raise RecordError(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
-    data = _normalise_text(raw)
+    data = _normalise_text(_read_workbook(name, raw) if _is_workbook(raw) else raw)
     if not data.strip():
         raise RecordError("this file is empty; download the record again", path=name)
     return Source(name, raw, data)
 
 
+def split_archive(name: str) -> tuple[str, str] | None:
+    """Return the ZIP archive and the member of a name such as records.zip/file.at2, or None."""
+    for match in re.finditer(r"(?i)\.zip[/\\]", name):
+        if os.path.isfile(archive := name[: match.end() - 1]):  # noqa: PTH113
+            return archive, name[match.end() :]
+    return None
+
+
+def list_archive(name: str) -> list[str]:
+    """Return the names of the files in a ZIP archive, also in archives within it, or none for another file."""
+    try:
+        return [f"{name}/{member}" for member in _list_members(_read_bytes(name))]
+    except (OSError, ValueError, *_ARCHIVE_ERRORS) as error:
+        raise unreadable_file_error(name, error) from error
+
+
+def _is_workbook(raw: bytes) -> bool:
+    return raw.startswith(_ZIP_MARK) and b"xl/workbook.xml" in raw
+
+
+def _list_members(raw: bytes, depth: int = 3) -> list[str]:
+    """Return the files of a ZIP archive that may be records, also of archives within it, or none of other files."""
+    members: list[str] = []
+    if depth == 0 or not raw.startswith(_ZIP_MARK) or _is_workbook(raw):
+        return members
+    with contextlib.suppress(ValueError, *_ARCHIVE_ERRORS), zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        for name in sorted(name for name in archive.namelist() if not _NO_RECORD.search(name)):
+            inner = _list_members(_extract(raw, name), depth - 1) if name.lower().endswith(".zip") else []
+            members += [f"{name}/{member}" for member in inner] or [name]
+    return members
+
+
+def _extract(raw: bytes, member: str) -> bytes:
+    """Return a member of a ZIP archive, also of an archive within it."""
+    with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        if member in archive.namelist():
+            with archive.open(member) as file:
+                content = file.read(_MEMBER_LIMIT + 1)
+            if len(content) > _MEMBER_LIMIT:
+                limit = _MEMBER_LIMIT // 2**20
+                raise RecordError(f"this file in an archive is larger than {limit} MiB; unpack it", path=member)
+            return content
+    for match in re.finditer(r"(?i)\.zip/", member):
+        return _extract(_extract(raw, member[: match.end() - 1]), member[match.end() :])
+    raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), member)
+
+
+def _unpack(name: str, raw: bytes) -> tuple[str, bytes]:
+    """Return the name and content of the only file in a ZIP archive, or those of another file."""
+    members = _list_members(raw)
+    if len(members) > 1:
+        listing = escape_braces(", ".join(f"{name}/{member}" for member in members[:10]))
+        raise RecordError(f"this archive contains {len(members)} files; give one of {listing}", path=name)
+    return (f"{name}/{members[0]}", _extract(raw, members[0])) if members else (name, raw)
+
+
+def _read_workbook(name: str, raw: bytes) -> bytes:
+    """Return the first sheet of a workbook as comma-separated text."""
+    try:
+        import openpyxl
+    except ImportError:
+        raise RecordError(f"this workbook requires openpyxl: {describe_install('excel')}", path=name) from None
+    text = io.StringIO()
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            if sum(info.file_size for info in archive.infolist()) > _MEMBER_LIMIT:
+                raise ValueError
+        workbook = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
+        for row in workbook.worksheets[0].iter_rows(values_only=True):
+            cells = ["" if cell is None else cell.isoformat() if hasattr(cell, "isoformat") else cell for cell in row]
+            csv.writer(text).writerow(cells)
+    except Exception as error:  # openpyxl raises any exception from a damaged file
+        raise RecordError(
+            "this workbook is damaged or too large; save it again, or save it as CSV", path=name
+        ) from error
+    return re.sub(r"(?m),+\r?$", "", text.getvalue()).encode()
+
+
 def _read_bytes(name: str) -> bytes:
+    if member := split_archive(name):
+        return _extract(_read_bytes(member[0]), member[1])
     status = os.stat(name)  # noqa: PTH116 - Path() would turn an empty name into the current folder
     if not stat.S_ISREG(status.st_mode):
         text = "this is a folder" if stat.S_ISDIR(status.st_mode) else "this is not a regular file"
@@ -143,7 +236,9 @@ def _normalise_text(raw: bytes) -> bytes:
     data = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     # A form feed at the start of a line is a page break and does not occupy a column.
     data = data.removeprefix(b"\f").replace(b"\n\f", b"\n").replace(b"\f", b" ")
-    return data.rstrip(b"\x00\x1a")
+    # Some programs fill up the last row of numbers with zero bytes.
+    data = data.rstrip(b"\x00\x1a")
+    return re.sub(rb"\x00+(?=\n)", b"", data) if b"\x00" in data else data
 
 
 @dataclass(frozen=True)

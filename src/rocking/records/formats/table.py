@@ -9,19 +9,37 @@ above, are ambiguous and rejected.
 
 from __future__ import annotations
 
+import functools
 import itertools
+import math
 import re
 from collections.abc import Iterator, Sequence
-from decimal import Decimal
+from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import RecordError, escape_braces
-from rocking.records.formats.channel import Channel, Recognised, create_channel, find_first_fault, resolve_timing
-from rocking.records.formats.engine import NUMBER, convert_tokens, invalid_number_error, parse_token
+from rocking.errors import escape_braces
+from rocking.records.formats.channel import (
+    Channel,
+    Recognised,
+    create_channel,
+    find_first_fault,
+    fit_even_step,
+    resolve_timing,
+)
+from rocking.records.formats.engine import (
+    NUMBER,
+    Count,
+    compute_rounding,
+    convert_tokens,
+    invalid_number_error,
+    parse_token,
+    read_values,
+)
 from rocking.records.formats.heading import RULE, Heading, parse_heading
 from rocking.records.formats.source import Line, Request, Source
 
@@ -55,6 +73,11 @@ _STEP_STATEMENT: Final = re.compile(
     r"(?:[^:=]*[:=])?(.*)",
     re.IGNORECASE,
 )
+#: Time of the day at the start of a row, possibly after a date, and its name in a heading.
+_CLOCK: Final = re.compile(
+    rb"(?m)^[ \t\"]*(?:(\d{4})[-/](\d\d?)[-/](\d\d?)[T ])?(\d{1,2}):(\d\d):(\d\d)([.,]\d+)?Z?\"?(?=[ \t,;])"
+)
+_CLOCK_HEADING: Final = re.compile(rb"(?i)[(\[](?:[ymd]+[-/][ymd]+[-/][ymd]+[t ])?hh:mm:ss[.\w]*[)\]]")
 #: Title of a table that ObsPy reads.
 OBSPY_TITLE: Final = "TIMESERIES "
 
@@ -217,14 +240,13 @@ class _TextTable(NamedTuple):
 
 def _is_step(number: str, dt: float) -> bool:
     """Return whether a printed number may be a step (s): in s or ms, or as a rate, rounded as printed."""
-    printed = Decimal(number.upper().replace("D", "E"))
-    rounded = min(float(f"0.5e{printed.as_tuple().exponent}"), 0.03 * abs(float(printed)))
-    return any(abs(candidate - float(printed)) <= rounded for candidate in (dt, 1e3 * dt, 1.0 / dt))
+    printed, rounding = parse_token(number.encode()) or 0.0, compute_rounding(number)
+    return any(abs(candidate - printed) <= rounding for candidate in (dt, 1e3 * dt, 1.0 / dt))
 
 
 def recognise_table(source: Source) -> Recognised | None:
     """Recognise rows of one or two numbers after comments and headings, or of more numbers with named columns."""
-    table = _find_table(source)
+    table = _find_table(_convert_clock_times(source))
     if table is None or (table.columns > 2 and not table.heading.has_names):
         return None
     numbers_text = f"{table.columns} numbers, between them {_DELIMITERS[table.delimiter]}"
@@ -233,13 +255,51 @@ def recognise_table(source: Source) -> Recognised | None:
     return Recognised("text table", reason, table.read)
 
 
-def unreadable_table_error(source: Source) -> RecordError | None:
-    """Return the reason why an apparent table cannot be read, or None for other content."""
+def recognise_wrapped(source: Source) -> Recognised | None:
+    """Recognise rows of more numbers without a heading, which are one series if its step is specified."""
     table = _find_table(source)
     if table is None:
         return None
-    text = f"each line holds {table.columns} numbers, not one (acceleration) or two (time, acceleration)"
-    return source.error(f"{text}; keep only these, or name all {table.columns} columns in a heading line", table.start)
+    reason = f"from line {source.find_line_number(table.start)} on each line holds {table.columns} numbers"
+    return Recognised("wrapped numbers", reason, functools.partial(_read_wrapped, table))
+
+
+def _read_wrapped(table: _TextTable, request: Request) -> list[Channel]:
+    """Read all numbers row by row as one series."""
+    source, start = table.source, table.start
+    text = f"each line holds {table.columns} numbers"
+    advice = f"name all {table.columns} columns in a heading line"
+    if request.dt is None:
+        text += ", not one (acceleration) or two (time, acceleration); keep only these"
+        raise source.error(f"{text}, {advice}, or give {{}} if they are one series", start, "dt")
+    values = read_values(source, start, len(source.data), None, Count(0.0, start, max_surplus=math.inf))
+    first = values[: -1 : table.columns]
+    if len(first) > 2 and find_first_fault(first) is None and fit_even_step(first) is not None:
+        raise source.error(f"{text}, of which the first ones seem to be times; {advice}", start)
+    unit, name = request.resolve_unit(source, None, start), Path(source.path).stem
+    return [create_channel(source, "wrapped numbers", values, unit, start, dt=request.dt, name=name, number=1)]
+
+
+def _convert_clock_times(source: Source) -> Source:
+    """Return a file with the seconds since midnight instead of times such as 2024-01-31T23:59:59.99 or 23:59:59.99."""
+    first = _CLOCK.search(source.data)
+    if first is None:
+        return source
+    first_day = _number_day(first)
+
+    def convert(match: re.Match[bytes]) -> bytes:
+        hours, minutes, seconds = (int(match[k]) for k in (4, 5, 6))
+        whole = 86400 * (_number_day(match) - first_day) + 3600 * hours + 60 * minutes + seconds
+        return b"%d" % whole + (match[7] or b"")
+
+    return replace(source, data=_CLOCK_HEADING.sub(b"(s)", _CLOCK.sub(convert, source.data)))
+
+
+def _number_day(match: re.Match[bytes]) -> int:
+    try:
+        return date(*(int(match[k]) for k in (1, 2, 3))).toordinal() if match[1] else 0
+    except ValueError:
+        return 0
 
 
 def _find_table(source: Source) -> _TextTable | None:

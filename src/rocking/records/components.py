@@ -1,0 +1,139 @@
+"""Components of one station and event, from files, archives and shipped records."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from rocking.core.progress import note
+from rocking.errors import RecordError, escape_braces
+from rocking.motion.description import Origin
+from rocking.motion.motion import Motion
+from rocking.records import catalogue, formats
+from rocking.records.formats.source import Request
+from rocking.records.named import expand_record_names, is_shipped, split_factor
+
+#: Names of vertical components.
+_VERTICAL: Final = re.compile(r"(?i)-?(?:up|u|ud|u-d|v\d?|vert\w*|z|down|dwn|dn|[BCDEHS][HLN]Z)(?:\W|$)")
+
+
+@dataclass(frozen=True, repr=False)
+class Components:
+    """Components of one station and event.
+
+    Attributes
+    ----------
+    station, event : str
+        Station (or file, if it states none) and event.
+    horizontals : tuple of Motion
+        Horizontal components in the order of the files.
+    vertical : Motion or None
+        Vertical component.
+
+    See Also
+    --------
+    rocking.records.group_components : Group the components of files and archives.
+    rocking.Motion.rotated : Compute the component along an azimuth.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> (station,) = rocking.records.group_components("el-centro-meloland-*")
+    >>> [motion.name for motion in station.pair], station.vertical.name
+    (['el-centro-meloland-360', 'el-centro-meloland-270'], 'el-centro-meloland-up')
+    """
+
+    station: str
+    event: str
+    horizontals: tuple[Motion, ...]
+    vertical: Motion | None = None
+
+    def __repr__(self) -> str:
+        vertical = "" if self.vertical is None else " and the vertical one"
+        return f"<Components: {self.station}, {self.event}: {len(self.horizontals)} horizontal{vertical}>"
+
+    @property
+    def pair(self) -> tuple[Motion, Motion]:
+        """The two horizontal components.
+
+        Raises
+        ------
+        RecordError
+            If there are not two.
+        """
+        if len(self.horizontals) != 2:
+            names = ", ".join(motion.name for motion in self.horizontals) or "none"
+            raise RecordError(f"{self.station} has {len(self.horizontals)} horizontal components, not two: {names}")
+        return self.horizontals[0], self.horizontals[1]
+
+
+def group_components(
+    names: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    *,
+    dt: float | None = None,
+    units: str | None = None,
+    baseline: int | str | None = None,
+    highpass: float | None = None,
+) -> tuple[Components, ...]:
+    """Read all channels of records and group those of one station and event.
+
+    Parameters
+    ----------
+    names : str, path, or iterable of these
+        Files, folders, patterns, ZIP archives and shipped records.
+    dt, units, baseline, highpass : optional
+        As for `rocking.read`, for files that do not state step and units.
+
+    Returns
+    -------
+    tuple of Components
+        Components in the order of the files. Channels at different places of a building or depths of a borehole, and
+        files in different formats or steps, are separate. Files that cannot be read are skipped with a note.
+
+    Raises
+    ------
+    RecordError
+        If no file can be read.
+
+    See Also
+    --------
+    rocking.read : Read one channel as a motion.
+    rocking.response_rose : Simulate a body in all directions under pairs of components.
+
+    Examples
+    --------
+    >>> [group.station for group in group_components("ridgecrest-*")]
+    ['CI.CLC China Lake, G2 Tower Rd.', 'CI.TOW2 Tower 2']
+    """
+    groups: dict[tuple[object, ...], list[Motion]] = {}
+    single = [names] if isinstance(names, (str, os.PathLike)) else names
+    reasons = []
+    for record in expand_record_names([os.fspath(name) for name in single]):
+        name, factor = split_factor(record)
+        try:
+            request = Request.create(dt, units, several=True)
+            channels = [] if is_shipped(name) else formats.read_content(name, request)[1]
+        except RecordError as error:
+            reasons.append(str(error))
+            continue
+        motions = [channel.motion(baseline, highpass) for channel in channels] or [catalogue.load(name)]
+        places = [f"{each.metadata.get('location', '')}{each.name.partition(' b')[2]}" for each in channels] or [""]
+        for motion, place in zip(motions, places, strict=True):
+            origin = motion.description.origin or Origin()
+            key = (origin.station or name, origin.event, origin.format, motion.dt, place)
+            groups.setdefault(key, []).append(motion if factor == 1.0 else motion.scaled(factor))
+    for reason in reasons:
+        if not groups:
+            raise RecordError(f"no record could be read; the first: {escape_braces(reason)}")
+        note(f"skipped: {reason}")
+    return tuple(_create_components(str(key[0]), str(key[1]), motions) for key, motions in groups.items())
+
+
+def _create_components(station: str, event: str, motions: list[Motion]) -> Components:
+    are_vertical = [_VERTICAL.match((motion.description.origin or Origin()).channel) is not None for motion in motions]
+    horizontals = tuple(itertools.compress(motions, [not each for each in are_vertical]))
+    return Components(station, event, horizontals, next(itertools.compress(motions, are_vertical), None))
