@@ -45,7 +45,7 @@ OUTCOME = np.dtype(
 
 #: Step budget of a simulation, besides a few steps for every piece of its motion.
 BUDGET: Final = 3_000_000
-_BUDGET_PER_PIECE: Final = 4
+BUDGET_PER_PIECE: Final = 4
 
 #: Steps per call of a kernel, for one body and for each of many: milliseconds until an interrupt.
 SLICE: Final = 50_000
@@ -171,7 +171,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
     bodies = setup.bodies.select(task.bodies)
     ground, records, settings, states = replace(setup, bodies=bodies).prepare(task.motion, task.factor)
     factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(states)).copy()
-    states["budget"] = _FIRST_SLICE + _BUDGET_PER_PIECE * len(ground.pieces)
+    states["budget"] = _FIRST_SLICE + BUDGET_PER_PIECE * len(ground.pieces)
     step = find_common_step(task.motion)
     for group, substeps in _group_bodies(ground, factors, records, task.motion, setup.model):
         if cancelled is not None and cancelled.is_set():
@@ -257,7 +257,7 @@ def _resume_marches(
 
 def count_slices(ground: Ground) -> int:
     """Return the number of slices in the budget of a simulation."""
-    return math.ceil((BUDGET + _BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
+    return math.ceil((BUDGET + BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
 
 
 def detect_complete_chattering(ground: Ground, factors: Floats, records: Records, states: Records) -> Flags:

@@ -1,0 +1,100 @@
+// What happens in a case: its response, how certain the outcome is, and the moments that decide it.
+
+import {DATA, GRAVITY} from "./kernels.js";
+import {bodyOf, durationOf, groundAt, shakingOf, startOf} from "./motions.js";
+
+/** Relative changes of the motion, or of the tilt, whose outcomes decide whether a case is certain. */
+const CHANGES = [0, -3e-6, -1.5e-6, 1.5e-6, 3e-6];
+/** Points of a history. */
+const POINTS = 900;
+/** What is shown after the end, and of a record at which the block hardly moves, s. */
+const AFTERWARDS = 0.5, LONGEST = 40;
+/** Steps of a search before it is refined, and halvings. */
+const STEPS = 80, HALVINGS = 30;
+
+/** @typedef {import("./motions.js").Case} Case */
+/** @typedef {{time: number, kind: "lift" | "peak" | "balance" | "gone" | "flat" | "rest"}} Moment */
+
+/** Simulate a case, and read what its pictures and sentences need. @param {import("./kernels.js").Kernels} kernels @param {Case} given */
+export function respond(kernels, given) {
+  const body = bodyOf(given, kernels.exports), shaking = shakingOf(given), start = startOf(given);
+  const response = kernels.march(body, shaking, start, true);
+  const falls = CHANGES.map((change) => (change === 0 ? response : kernels.march(
+    body, {...shaking, factor: shaking.factor * (1 + change)}, start && {...start, u: start.u * (1 + change)},
+  )).overturned);
+  const {overturned, end} = response, duration = durationOf(shaking.pieces);
+  const until = overturned ? end + AFTERWARDS : Math.max(Math.min(duration, LONGEST), response.lastRest + AFTERWARDS, given.tilt ? end : 0);
+  const times = Float64Array.from({length: POINTS}, (_, k) => (until * k) / (POINTS - 1));
+  const traced = kernels.trace(body, shaking, response, times), ground = groundAt(shaking, times);
+  const rotation = times.map((time, k) => (overturned && time >= end ? Math.sign(traced[3 * k - 3] || 1) * (Math.PI / 2) : traced[3 * k]));
+  const velocity = times.map((_, k) => traced[3 * k + 1]);
+  const picture = {times, rotation, velocity, ...ground, until, duration};
+  return {given, body, shaking, start, ...response, falling: falls.filter(Boolean).length, runs: falls.length, picture, moments: momentsOf(kernels, body, shaking, response, picture)};
+}
+
+/** @typedef {ReturnType<typeof respond>} Shown */
+
+/** State at one moment. @param {import("./kernels.js").Kernels} kernels @param {any} body @param {any} shaking @param {any} response @param {number} time */
+function stateAt(kernels, body, shaking, response, time) {
+  const [rotation, velocity] = kernels.trace(body, shaking, response, [time]), sign = rotation < 0 || (rotation === 0 && velocity < 0) ? -1 : 1;
+  return {side: sign > 0 ? 0 : 1, u: sign * rotation, v: sign * velocity};
+}
+
+/** The last number in [low, high] for which something holds at low and not at high. @param {number} low @param {number} high @param {(at: number) => boolean} holds */
+function last(low, high, holds) {
+  for (let k = 0; k < HALVINGS; k += 1) {
+    const middle = (low + high) / 2;
+    if (holds(middle)) low = middle; else high = middle;
+  }
+  return low;
+}
+
+/** The moments that decide, in order of time. @param {import("./kernels.js").Kernels} kernels @param {any} body @param {any} shaking
+ * @param {ReturnType<import("./kernels.js").Kernels["march"]>} response @param {any} picture @returns {Moment[]} */
+function momentsOf(kernels, body, shaking, response, {times, rotation}) {
+  /** @type {Moment[]} */
+  const moments = [], {UPLIFT, REST} = DATA.events, lifted = response.events.find(({kind}) => kind === UPLIFT);
+  if (lifted && lifted.time > 0) moments.push({time: lifted.time, kind: "lift"});
+  const rest = response.events.findLast(({kind}) => kind === REST);
+  if (!response.overturned) {
+    if (response.peak > 0) moments.push({time: response.peakTime, kind: "peak"});
+    if (rest) moments.push({time: rest.time, kind: "rest"});
+    return moments.sort((one, other) => one.time - other.time);
+  }
+  const side = rotation[rotation.length - 1] > 0 ? 0 : 1, {alpha} = body.sides[side];
+  const beyond = times.findLastIndex((/** @type {number} */ _, /** @type {number} */ k) => (side ? -rotation[k] : rotation[k]) < alpha);
+  const inside = (/** @type {number} */ at) => { const state = stateAt(kernels, body, shaking, response, at); return state.side !== side || state.u < alpha; };
+  if (beyond >= 0 && beyond + 1 < times.length) moments.push({time: last(times[beyond], times[beyond + 1], inside), kind: "balance"});
+  const gone = noReturn(kernels, body, shaking, response);
+  if (gone > 0) moments.push({time: gone, kind: "gone"});
+  moments.push({time: response.end, kind: "flat"});
+  return moments.sort((one, other) => one.time - other.time);
+}
+
+/** The last moment at which the block would not have fallen, if the ground had stopped then; 0 if there is none.
+ * @param {import("./kernels.js").Kernels} kernels @param {any} body @param {any} shaking @param {any} response */
+function noReturn(kernels, body, shaking, response) {
+  if (!shaking.pieces) return 0;
+  const stands = (/** @type {number} */ time) => !kernels.march(body, {pieces: null, factor: 1}, stateAt(kernels, body, shaking, response, time)).overturned;
+  const first = response.firstUplift;
+  for (let k = STEPS - 1; k >= 0; k -= 1) {
+    const time = first + ((response.end - first) * k) / STEPS;
+    if (stands(time)) return last(time, first + ((response.end - first) * (k + 1)) / STEPS, stands);
+  }
+  return 0;
+}
+
+/** Smallest amplitude that overturns the block, m/s², among levels up to a largest one; null without one. It is refined to
+ * a millionth. @param {import("./kernels.js").Kernels} kernels @param {Case} given */
+export function criticalOf(kernels, given) {
+  const body = bodyOf(given, kernels.exports), {pieces, factor} = shakingOf(given);
+  if (!pieces) return null;
+  const stands = (/** @type {number} */ amplitude) => !kernels.march(body, {pieces, factor: (factor * amplitude) / given.amplitude}).overturned;
+  const low = upliftOf(body, kernels.exports), high = Math.max(20 * low, 2 * given.amplitude);
+  const level = (/** @type {number} */ k) => low * (high / low) ** (k / STEPS);
+  for (let k = 1; k <= STEPS; k += 1) if (!stands(level(k))) return last(level(k - 1), level(k), stands);
+  return null;
+}
+
+/** Smallest acceleration that lifts a block, m/s². @param {import("./kernels.js").Body} body @param {any} libm */
+export const upliftOf = ({sides, model}, libm) => GRAVITY * Math.min(...sides.map(({alpha}) => (model === "linear" ? alpha : libm.tan(alpha))));
