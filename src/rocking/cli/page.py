@@ -25,7 +25,8 @@ def page(
     out
         File to write.
     records
-        Names of the shipped records in the page, separated by commas, by default el-centro-meloland-270 and ridgecrest-clc-090.
+        Names of the shipped records in the page, separated by commas, by default el-centro-meloland-270 and
+        ridgecrest-clc-090.
     """
     from rocking.explorer.standalone import RECORDS, build_page
 

@@ -190,7 +190,8 @@ def load(name: str) -> Motion:
 def read_differences(record: Record) -> Integers:
     """Read the second differences of the published integers of a record."""
     with (_DATA_FOLDER / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        return archive[record.direction].astype(np.int64)
+        differences: Integers = archive[record.direction].astype(np.int64)
+    return differences
 
 
 def _read_catalogue() -> dict[str, dict[str, Any]]:

@@ -10,13 +10,15 @@ import {Workers} from "./workers.js";
 import {openKernels} from "./kernels.js";
 import {limited, readCase, writeCase} from "./case.js";
 import {respond, upliftOf} from "./response.js";
+import {groundAt} from "./motions.js";
 import {described, headline, margin, reasons} from "./sentences.js";
 import {one, put} from "./dom.js";
 import {fixed} from "../numbers.js";
 
 /** Pause before the address changes and slow parts are computed again, ms. */
 const SETTLED = 200;
-/** Time after which a change of reduced motion is stepped, ms. */
+/** What is said before the first answer. */
+const HINT = "Drag its top, its side, its mass or the pulse. Or tilt the block and let it go.";
 const PANELS = ["numbers", "map", "phase", "tours"];
 
 class Page {
@@ -37,7 +39,7 @@ class Page {
     for (const [id, guess] of /** @type {[string, boolean][]} */ ([["yes", true], ["no", false]])) {
       one(id).addEventListener("click", () => { this.guess = guess; this.play(); });
     }
-    one("time").addEventListener("input", () => this.seek((Number(/** @type {HTMLInputElement} */ (one("time")).value) / 1000) * this.shown.picture.until));
+    one("time").addEventListener("input", () => this.seek(this.shown.picture.from + (Number(/** @type {HTMLInputElement} */ (one("time")).value) / 1000) * (this.shown.picture.until - this.shown.picture.from)));
     for (const name of PANELS) document.querySelector(`[data-panel=${name}]`)?.addEventListener("click", () => this.open(this.panel === name ? null : name));
     one("close").addEventListener("click", () => this.open(null));
     addEventListener("keydown", (event) => this.key(event));
@@ -119,7 +121,7 @@ class Page {
     put(one("ask"), {hidden: open ? "" : null});
     one("answer").classList.toggle("waiting", !open);
     this.strip.svg.classList.toggle("waiting", !open);
-    if (!open) { one("headline").textContent = ""; one("why").replaceChildren(); return; }
+    if (!open) { one("headline").textContent = HINT; one("why").replaceChildren(); return; }
     const falls = this.shown.falling > this.shown.runs / 2, verdict = headline(this.shown);
     const judged = this.guess === undefined ? "" : this.guess === falls ? "You were right. " : "You were wrong. ";
     const strong = document.createElement("strong");
@@ -131,17 +133,17 @@ class Page {
 
   /** @param {number} time */
   seek(time) {
-    const {picture, body, shaking} = this.shown;
-    this.time = Math.min(Math.max(time, 0), picture.until);
-    const {times, rotation, velocity, acceleration, displacement} = picture, place = (this.time / picture.until) * (times.length - 1);
+    const {times, rotation, velocity, displacement, from, until} = this.shown.picture;
+    this.time = Math.min(Math.max(time, from), until);
+    const place = ((this.time - from) / (until - from)) * (times.length - 1);
     const k = Math.min(times.length - 2, Math.floor(place)), part = place - k;
     const at = (/** @type {Float64Array} */ values) => values[k] + (values[k + 1] - values[k]) * part;
-    void [body, shaking];
-    this.scene.paint({rotation: at(rotation), velocity: at(velocity), acceleration: at(acceleration), displacement: at(displacement)}, this.time === 0 && !this.playing);
+    const [acceleration] = groundAt(this.shown.shaking, [this.time]).acceleration;
+    this.scene.paint({rotation: at(rotation), velocity: at(velocity), acceleration, displacement: at(displacement)}, this.time === from && !this.playing);
     this.strip.follow();
     this.panels[this.panel ?? ""]?.follow?.();
     const slider = /** @type {HTMLInputElement} */ (one("time")), said = `${fixed(this.time, 2)} s`;
-    slider.value = String((1000 * this.time) / picture.until);
+    slider.value = String((1000 * (this.time - from)) / (until - from));
     slider.setAttribute("aria-valuetext", said);
     one("clock").textContent = said;
     if (!this.playing) one("described").textContent = described(this.shown, this.time, at(rotation));
@@ -150,7 +152,7 @@ class Page {
   /** Go to the start, where all can be dragged. */
   rewind() {
     this.stop();
-    this.seek(0);
+    this.seek(this.shown.picture.from);
   }
 
   /** Let a tilted block go. */
@@ -162,7 +164,7 @@ class Page {
   toggle() { if (this.playing) this.stop(); else this.play(); }
 
   play() {
-    if (this.time >= this.shown.picture.until - 1e-9 || !this.answered) this.time = 0;
+    if (this.time >= this.shown.picture.until - 1e-9 || !this.answered) this.time = this.shown.picture.from;
     this.playing = true;
     one("play").textContent = "Pause";
     put(one("ask"), {hidden: ""});

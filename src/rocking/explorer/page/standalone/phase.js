@@ -17,7 +17,7 @@ export class Phase {
     this.texts = draw("g", {class: "axes"});
     this.svg = draw("svg", {role: "img", "aria-label": "Angular velocity against rotation"}, [this.axes, this.limit, this.curve, this.texts, this.dot]);
     one("phase").append(make("h2", {}, ["Phase plane"]), this.svg, make("p", {class: "soft"}, [
-      "Rotation divided by slenderness, and angular velocity divided by p and slenderness. On still ground, a block outside the dashed lines falls.",
+      "Rotation divided by slenderness, and angular velocity divided by p and slenderness. On still ground, a block beyond a dashed line falls to that side.",
     ]));
     new ResizeObserver(() => this.update()).observe(this.svg);
   }
@@ -34,7 +34,8 @@ export class Phase {
     if (!width || !shown) return;
     Object.assign(this, {width, height});
     const {sides, model} = shown.body, {rotation, velocity} = shown.picture, unit = (/** @type {number} */ turned) => sides[turned >= 0 ? 0 : 1];
-    const points = Array.from(rotation, (turned, k) => this.at(/** @type {number} */ (turned) / unit(turned).alpha, velocity[k] / (unit(turned).p * unit(turned).alpha)));
+    const inside = rotation.findIndex((/** @type {number} */ turned) => Math.abs(turned) > REACH * unit(turned).alpha);
+    const points = Array.from(inside < 0 ? rotation : rotation.slice(0, inside), (turned, k) => this.at(/** @type {number} */ (turned) / unit(turned).alpha, velocity[k] / (unit(turned).p * unit(turned).alpha)));
     put(this.curve, {d: line(points.map(([x]) => x), points.map(([, y]) => y)), class: `curve ${shown.overturned ? "over" : ""}`});
     const [left, top] = this.at(-REACH, SPEED), [right, bottom] = this.at(REACH, -SPEED), [middle, level] = this.at(0, 0);
     put(this.axes, {d: `M${left} ${level}H${right}M${middle} ${top}V${bottom}`});
@@ -47,14 +48,14 @@ export class Phase {
     }
     put(this.limit, {d: path});
     const text = (/** @type {number} */ x, /** @type {number} */ y, /** @type {string} */ words, anchor = "middle") => draw("text", {x, y, "text-anchor": anchor}, [words]);
-    this.texts.replaceChildren(...[-1, 1].map((each) => text(this.at(each, 0)[0], level + 16, each > 0 ? "balance" : "balance")), text(right, level - 8, "rotation", "end"), text(middle + 8, top + 4, "angular velocity", "start"));
+    this.texts.replaceChildren(...[-1, 1].map((each) => text(this.at(each, 0)[0], level + 16, "balance")), text(right, level - 8, "rotation", "end"), text(middle + 8, top + 4, "angular velocity", "start"));
     this.follow();
   }
 
   follow() {
     const {shown, time} = this.page;
     if (!this.width) return;
-    const {times, rotation, velocity, until} = shown.picture, k = Math.round((time / until) * (times.length - 1)), {alpha, p} = shown.body.sides[rotation[k] >= 0 ? 0 : 1];
+    const {times, rotation, velocity, from, until} = shown.picture, k = Math.round(((time - from) / (until - from)) * (times.length - 1)), {alpha, p} = shown.body.sides[rotation[k] >= 0 ? 0 : 1];
     const [cx, cy] = this.at(rotation[k] / alpha, velocity[k] / (p * alpha));
     put(this.dot, {cx, cy});
   }

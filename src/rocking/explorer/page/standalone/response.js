@@ -7,8 +7,8 @@ import {bodyOf, durationOf, groundAt, shakingOf, startOf} from "./motions.js";
 const CHANGES = [0, -3e-6, -1.5e-6, 1.5e-6, 3e-6];
 /** Points of a history. */
 const POINTS = 900;
-/** What is shown after the end, and of a record at which the block hardly moves, s. */
-const AFTERWARDS = 0.5, LONGEST = 40;
+/** What is shown after the end, and before a record lifts the block, s. */
+const AFTERWARDS = 0.5, BEFORE = 2;
 /** Steps of a search before it is refined, and halvings. */
 const STEPS = 80, HALVINGS = 30;
 
@@ -23,13 +23,24 @@ export function respond(kernels, given) {
     body, {...shaking, factor: shaking.factor * (1 + change)}, start && {...start, u: start.u * (1 + change)},
   )).overturned);
   const {overturned, end} = response, duration = durationOf(shaking.pieces);
-  const until = overturned ? end + AFTERWARDS : Math.max(Math.min(duration, LONGEST), response.lastRest + AFTERWARDS, given.tilt ? end : 0);
-  const times = Float64Array.from({length: POINTS}, (_, k) => (until * k) / (POINTS - 1));
-  const traced = kernels.trace(body, shaking, response, times), ground = groundAt(shaking, times);
-  const rotation = times.map((time, k) => (overturned && time >= end ? Math.sign(traced[3 * k - 3] || 1) * (Math.PI / 2) : traced[3 * k]));
-  const velocity = times.map((_, k) => traced[3 * k + 1]);
-  const picture = {times, rotation, velocity, ...ground, until, duration};
+  const [from, until] = windowOf(given, shaking, response, duration), times = Float64Array.from({length: POINTS}, (_, k) => from + ((until - from) * k) / (POINTS - 1));
+  const traced = kernels.trace(body, shaking, response, times), {displacement} = groundAt(shaking, times);
+  // A record is drawn with all its samples, so that no peak is missed.
+  const corners = given.motion in DATA.records && shaking.pieces ? Float64Array.from(shaking.pieces.breaks).filter((time) => time >= from && time <= until) : times;
+  const ground = {times: corners, acceleration: groundAt(shaking, corners).acceleration};
+  const flat = overturned ? (response.events[response.events.length - 1].side * Math.PI) / 2 : 0, isOver = (/** @type {number} */ time) => overturned && time >= end;
+  const rotation = times.map((time, k) => (isOver(time) ? flat : traced[3 * k])), velocity = times.map((time, k) => (isOver(time) ? 0 : traced[3 * k + 1]));
+  const picture = {times, rotation, velocity, displacement, ground, from, until};
   return {given, body, shaking, start, ...response, falling: falls.filter(Boolean).length, runs: falls.length, picture, moments: momentsOf(kernels, body, shaking, response, picture)};
+}
+
+/** The part that is shown: of a record that in which the block moves, or the strongest. @param {Case} given @param {import("./kernels.js").Shaking} shaking @param {any} response @param {number} duration */
+function windowOf({motion, tilt}, {pieces}, {overturned, uplifts, end, firstUplift, lastRest}, duration) {
+  if (!(motion in DATA.records) || !pieces) return [0, overturned ? end + AFTERWARDS : Math.max(duration, lastRest + AFTERWARDS, tilt ? end : 0)];
+  if (uplifts) return [Math.max(0, Math.floor(firstUplift - BEFORE)), overturned ? end + AFTERWARDS : lastRest + AFTERWARDS];
+  let peak = 0;
+  pieces.rows.forEach((row, k) => { if (Math.abs(row[0]) > Math.abs(pieces.rows[peak][0])) peak = k; });
+  return [Math.max(0, pieces.breaks[peak] - 2 * BEFORE), pieces.breaks[peak] + 2 * BEFORE];
 }
 
 /** @typedef {ReturnType<typeof respond>} Shown */

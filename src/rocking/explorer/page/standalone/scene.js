@@ -88,7 +88,7 @@ export class Scene {
     this.floor = height - BELOW;
     if (!this.held || !this.scale) {
       const reach = Math.hypot(given.width, given.height);
-      this.scale = Math.min((this.floor - ABOVE) / reach, width / (2.4 * given.height + given.width));
+      this.scale = Math.min((this.floor - ABOVE) / reach, width / (1.7 * given.height));
     }
     this.paint();
   }
@@ -102,9 +102,11 @@ export class Scene {
     const {scale, floor} = this, {width, height, offset} = given;
     const moved = still.matches ? 0 : this.displacement(state.displacement), free = Math.max(0, this.width / 2 - scale * Math.hypot(width, height) * 0.9);
     const shift = Math.max(-free, Math.min(free, scale * moved));
-    this.middle = this.width / 2 + shift;
-    this.background(scale * moved - shift);
-    const wide = scale * width, tall = scale * height, pivot = ((state.rotation >= 0 ? 1 : -1) * wide) / 2, angle = (state.rotation * 180) / Math.PI;
+    const wide = scale * width, tall = scale * height, outside = Math.max(0, tall + wide / 2 + 12 - this.width / 2); // of what lies beside it
+    const pan = -Math.sin(state.rotation) * Math.min(outside, tall / 2 + wide / 2);
+    this.middle = this.width / 2 + shift + pan;
+    this.background(scale * moved - shift - pan);
+    const pivot = ((state.rotation >= 0 ? 1 : -1) * wide) / 2, angle = (state.rotation * 180) / Math.PI;
     put(this.body, {x: -wide / 2, y: -tall, width: wide, height: tall});
     put(this.whole, {transform: `translate(${this.middle + pivot} ${floor}) rotate(${angle}) translate(${-pivot} 0)`});
     const place = scale * offset;
@@ -151,7 +153,7 @@ export class Scene {
 
   /** What does not move with the ground, and the ground. @param {number} behind */
   background(behind) {
-    const {scale, floor, width, middle} = this, step = stepOf(width / scale, 7), pixels = step * scale;
+    const {scale, floor, width, middle} = this, step = stepOf(width / scale, 11), pixels = step * scale;
     let path = "";
     for (let x = width / 2 - behind - Math.ceil((width / 2 - behind) / pixels) * pixels; x < width; x += pixels) path += `M${x.toFixed(1)} 0V${floor}`;
     for (let y = floor - pixels; y > 0; y -= pixels) path += `M0 ${y.toFixed(1)}H${width}`;

@@ -26,7 +26,7 @@ export function margin({given, falling, runs}, critical) {
 export function reasons({moments, overturned, uplift, given, peak, body, impacts, picture}) {
   const found = (/** @type {string} */ kind) => moments.find((/** @type {any} */ each) => each.kind === kind);
   const lift = found("lift"), list = [], alpha = Math.max(...body.sides.map((/** @type {any} */ side) => side.alpha));
-  if (lift) list.push({time: lift.time, words: `It lifts, because the ground acceleration exceeds ${inG(uplift)}: half its width divided by the height of its mass, times g.`});
+  if (lift) list.push({time: lift.time, words: `It lifts, because the ground acceleration exceeds ${inG(uplift)}${given.offset ? "" : given.model === "linear" ? ", its slenderness" : ", its width divided by its height"}.`});
   if (!lift && !given.tilt) return [{time: 0, words: `It does not move, because the acceleration stays below ${inG(uplift)}.`}];
   if (given.tilt) list.push({time: 0, words: `It is let go at a tilt of ${short((100 * Math.abs(given.tilt)) / alpha, 3)} % of its balance.`});
   if (!overturned) {

@@ -6,7 +6,7 @@ import {isRecord, lengthOf, rateFor} from "./case.js";
 import {fixed, short} from "../numbers.js";
 import {written} from "../ticks.js";
 
-const LEFT = 50, RIGHT = 12, TOP = 16, GAP = 22, BOTTOM = 24;
+const LEFT = 58, RIGHT = 22, TOP = 18, GAP = 36, BOTTOM = 24;
 /** Share of the upper part. */
 const UPPER = 0.45;
 /** Ends of the axis of time, s. */
@@ -37,7 +37,7 @@ export class Strip {
   }
 
   /** @param {PointerEvent} event */
-  timeAt(event) { return ((event.clientX - this.svg.getBoundingClientRect().left - LEFT) / (this.width - LEFT - RIGHT)) * this.end; }
+  timeAt(event) { return this.from + ((event.clientX - this.svg.getBoundingClientRect().left - LEFT) / (this.width - LEFT - RIGHT)) * this.span; }
 
   /** @param {PointerEvent} event */
   hold(event) {
@@ -51,7 +51,7 @@ export class Strip {
   reshape(event, held) {
     const {given} = held, amplitude = given.amplitude + ((held.y - event.clientY) / this.unit) * this.sign;
     if (isRecord(given.motion)) { this.page.change({amplitude}); return; }
-    const time = Math.max(held.time * 0.1, held.time + ((event.clientX - held.x) / (this.width - LEFT - RIGHT)) * this.end);
+    const time = Math.max(held.time * 0.1, held.time + ((event.clientX - held.x) / (this.width - LEFT - RIGHT)) * this.span);
     this.page.change({amplitude, rate: rateFor(given, held.length * (held.time > 0 ? time / held.time : 1))});
   }
 
@@ -61,8 +61,9 @@ export class Strip {
     if (!width || !shown) return;
     const {picture, uplift} = shown;
     Object.assign(this, {width, height});
-    if (!this.held || !this.end) {
-      this.end = ENDS.find((each) => each >= picture.until * 0.999) ?? picture.until;
+    if (!this.held || !this.span) {
+      this.from = picture.from;
+      this.span = ENDS.find((each) => each >= (picture.until - picture.from) * 0.999) ?? picture.until - picture.from;
       this.most = Math.max(1.25 * Math.abs(given.amplitude), 1.5 * uplift);
     }
     const inner = height - TOP - GAP - BOTTOM;
@@ -74,17 +75,17 @@ export class Strip {
   }
 
   /** @param {number} time */
-  x(time) { return LEFT + (time / this.end) * (this.width - LEFT - RIGHT); }
+  x(time) { return LEFT + ((time - this.from) / this.span) * (this.width - LEFT - RIGHT); }
 
   paint() {
     const {shown, given} = this.page;
     if (!this.width || !shown) return;
-    const {times, acceleration, rotation} = shown.picture, alpha = Math.max(...shown.body.sides.map((/** @type {any} */ side) => side.alpha));
+    const {times, rotation, ground: {times: corners, acceleration}} = shown.picture, alpha = Math.max(...shown.body.sides.map((/** @type {any} */ side) => side.alpha));
     const span = shown.overturned ? 1.35 : 1.15, visible = (/** @type {number} */ each) => Math.max(-span, Math.min(span, each));
     const x = times.map((/** @type {number} */ time) => this.x(time));
     const y = (/** @type {number} */ turned) => this.middle - (visible(turned / alpha) / span) * this.tall;
     const stillGround = !shown.shaking.pieces;
-    put(this.area, {d: stillGround ? "" : `${line(x, acceleration.map((/** @type {number} */ each) => this.upper - each * this.unit))}V${this.upper}H${LEFT}Z`});
+    put(this.area, {d: stillGround ? "" : `${line(corners.map((/** @type {number} */ time) => this.x(time)), acceleration.map((/** @type {number} */ each) => this.upper - each * this.unit))}V${this.upper}H${LEFT}Z`});
     put(this.curve, {d: line(x, rotation.map((/** @type {number} */ each) => y(each))), class: `curve ${shown.overturned ? "over" : ""}`});
     const [plus, minus] = shown.body.sides.map((/** @type {any} */ side) => side.alpha), right = this.width - RIGHT;
     put(this.band, {x: LEFT, y: y(plus), width: right - LEFT, height: y(-minus) - y(plus)});
@@ -96,8 +97,8 @@ export class Strip {
     if (!isRecord(given.motion)) { // the first time at which the peak is reached
       const first = acceleration.findIndex((/** @type {number} */ each) => Math.abs(each) > 0.999 * Math.abs(acceleration[peak]));
       peak = Math.max(first, 0);
-      this.knobTime = given.motion === "rectangular" ? lengthOf(given) : times[peak];
-    } else this.knobTime = times[peak];
+      this.knobTime = given.motion === "rectangular" ? lengthOf(given) : corners[peak];
+    } else this.knobTime = corners[peak];
     this.sign = Math.sign(acceleration[peak]) || 1;
     put(this.knob, {transform: `translate(${this.x(this.knobTime)} ${this.upper - this.sign * given.amplitude * this.unit})`, visibility: stillGround ? "hidden" : "visible"});
     this.moments(shown, y);
@@ -107,13 +108,14 @@ export class Strip {
   /** @param {boolean} stillGround @param {(turned: number) => number} y @param {number} plus @param {number} minus */
   axis(stillGround, y, plus, minus) {
     const text = (/** @type {number} */ x, /** @type {number} */ top, /** @type {string} */ words, anchor = "end", kind = "") => draw("text", {x, y: top, "text-anchor": anchor, class: kind}, [words]);
-    const step = stepOf(this.end, Math.max(3, this.width / 110)), ticks = Array.from({length: Math.floor(this.end / step + 1e-9) + 1}, (_, k) => k * step);
+    const step = stepOf(this.span, Math.max(3, this.width / 110)), first = Math.ceil(this.from / step - 1e-9);
+    const ticks = Array.from({length: Math.floor((this.from + this.span) / step + 1e-9) - first + 1}, (_, k) => (first + k) * step);
     const right = this.width - RIGHT, {uplift} = this.page.shown, foot = this.height - BOTTOM + 4;
     const texts = written(ticks);
     this.axes.replaceChildren(
       draw("path", {d: `M${LEFT} ${this.upper}H${right}M${LEFT} ${this.middle}H${right}${ticks.map((each) => `M${this.x(each)} ${foot - 4}v4`).join("")}`}),
-      text(LEFT, 11, stillGround ? "ground at rest: the block is let go" : "ground, g", "start"), text(LEFT, TOP + (this.height - TOP - GAP - BOTTOM) * UPPER + GAP - 5, "rotation", "start"),
-      text(LEFT - 6, this.upper - uplift * this.unit + 4, short(uplift / GRAVITY, 2)), text(LEFT - 6, this.upper + 4, "0"),
+      text(LEFT, 11, stillGround ? "the ground is at rest while the block is tilted" : "ground, g", "start"), text(LEFT, TOP + (this.height - TOP - GAP - BOTTOM) * UPPER + 14, "rotation", "start"),
+      text(LEFT - 6, this.upper - uplift * this.unit + 4, short(uplift / GRAVITY, 2)), text(LEFT - 6, this.upper + 4, uplift * this.unit > 12 ? "0" : ""),
       text(LEFT - 6, y(plus) + 4, "balance"), text(LEFT - 6, y(-minus) + 4, "balance"), text(LEFT - 6, this.middle + 4, "0"),
       ...ticks.map((each, k) => text(this.x(each), foot + 14, k === ticks.length - 1 ? `${texts[k]} s` : texts[k], "middle")),
     );
@@ -122,12 +124,13 @@ export class Strip {
   /** @param {any} shown @param {(turned: number) => number} y */
   moments({moments, picture: {times, rotation}}, y) {
     let beyond = -Infinity, row = 0;
+    const [from, until] = [times[0], times[times.length - 1]];
     this.marks.replaceChildren(...moments.flatMap((/** @type {any} */ {time, kind}) => {
-      const k = Math.min(times.length - 1, Math.max(0, Math.round((time / times[times.length - 1]) * (times.length - 1)))), x = this.x(time), name = NAMES[kind];
+      const k = Math.min(times.length - 1, Math.max(0, Math.round(((time - from) / (until - from)) * (times.length - 1)))), x = this.x(time), name = NAMES[kind];
       row = x < beyond ? row + 1 : 0;
       beyond = x + 8 * name.length;
       const side = x > this.width - 70 ? "end" : "start";
-      const top = this.middle - this.tall + 10 + 13 * row;
+      const top = this.middle - this.tall - 6 + 13 * row;
       return [
         draw("path", {class: "stem", d: `M${x} ${top + 3}V${y(rotation[k])}`}), draw("circle", {class: `dot ${kind}`, cx: x, cy: y(rotation[k]), r: 4.5}),
         draw("text", {x: x + (side === "end" ? -4 : 4), y: top, "text-anchor": side}, [name]),
