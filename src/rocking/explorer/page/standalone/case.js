@@ -6,7 +6,7 @@ import {whole} from "../numbers.js";
 /** @typedef {import("./motions.js").Case} Case */
 
 /** The case of an empty address: its pulse nearly topples the block. */
-export const FIRST = "width=0.4&height=1.6&motion=one-sine:amplitude=2.93,frequency=1";
+export const FIRST = "width=0.4&height=1.6&motion=one-sine:amplitude=3.01,frequency=1";
 
 /** Smallest and largest number of each quantity. @type {Record<string, [number, number]>} */
 export const LIMITS = {width: [0.02, 50], height: [0.02, 50], restitution: [0.05, 1], amplitude: [0.01, 100], rate: [0.02, 50], cycles: [0.5, 20], tilt: [-1.4, 1.4]};
@@ -59,7 +59,7 @@ export function readCase(text) {
   const [named, list = ""] = (fields.get("motion") ?? first.get("motion") ?? "").split(":");
   const known = isRecord(named) || named === "sine" || named in DATA.pulses, motion = known ? named : "one-sine";
   const parameters = new Map(list.split(",").map((each) => /** @type {[string, string]} */ (each.split("="))));
-  const amplitude = isRecord(motion) ? number(fields.get("pga"), DATA.records[motion].pga) : number(parameters.get("amplitude"), 2.93);
+  const amplitude = isRecord(motion) ? number(fields.get("pga"), DATA.records[motion].pga) : number(parameters.get("amplitude"), 3.01);
   return limited({
     width: size("width"), height: size("height"), offset: number(fields.get("offset"), 0), restitution: fields.has("restitution") ? number(fields.get("restitution"), 0.9) : null,
     model: fields.get("model") === "linear" ? "linear" : "nonlinear", motion, amplitude, cycles: number(parameters.get("cycles"), 1),

@@ -59,7 +59,8 @@ export class Numbers {
       ]),
       make("details", {}, [make("summary", {}, ["About"]), make("p", {}, [
         `Computed in this browser by the kernels of rocking ${DATA.version} (${DATA.fingerprint}), compiled to WebAssembly. Every impact is located, and rests are proven. Angles use the C library of `
-        + "this page. The system's library may differ in the last bit, and so may times after about 12 digits. In records of several minutes, the number of impacts may differ.",
+        + "this page. The system's library may differ in the last bit, and so may times after about 12 digits. In records of several minutes, the number of impacts may differ. "
+        + "The smallest amplitude that overturns the block is searched among amplitudes 0.5 % apart, and then refined.",
       ])]),
     );
   }

@@ -2,7 +2,7 @@
 // settings come from the package (DATA): here numbers are put into records, and read from them.
 
 /** What the package says of its kernels (`describe_computation`). @type {any} */
-export const DATA = JSON.parse(typeof TEXT === "string" ? TEXT : document.getElementById("data")?.textContent ?? "{}");
+export const DATA = JSON.parse(/** @type {any} */ (globalThis).TEXT ?? document.getElementById("data")?.textContent ?? "{}");
 
 /** Standard gravity, m/s². @type {number} */
 export const GRAVITY = DATA.gravity;
@@ -14,6 +14,9 @@ export const GRAVITY = DATA.gravity;
 /** @typedef {{pieces: Pieces | null, factor: number}} Shaking */
 
 const WIDTHS = /** @type {Record<string, number>} */ ({f8: 8, i8: 8, i4: 4, b1: 1});
+
+/** Pieces of a ground that does not move. @type {Pieces} */
+const STILL = {breaks: [0], rows: [], error: 0};
 
 /** @param {string} text */
 const fromHex = (text) => Uint8Array.from(text.match(/../g) ?? [], (each) => parseInt(each, 16));
@@ -35,8 +38,8 @@ export class Kernels {
     this.memory = exports.memory;
     this.start = (exports.__heap_base.value + 15) & ~15;
     this.top = this.floor = this.start;
-    /** @type {any} */
-    this.still = {pieces: {breaks: [0], rows: [], error: 0}, factor: 1};
+    /** @type {Pieces | null} */
+    this.pieces = null;
   }
 
   get view() { return new DataView(this.memory.buffer); }
@@ -93,12 +96,12 @@ export class Kernels {
 
   /** Arguments of a ground under these pieces; those of the last one remain in memory. @param {Shaking} shaking @returns {number[]} */
   ground({pieces, factor}) {
-    const chosen = pieces ?? this.still.pieces;
+    const chosen = pieces ?? STILL;
     if (this.pieces !== chosen) {
       this.top = this.start;
       const count = chosen.rows.length, width = Math.max(2, chosen.rows[0]?.length ?? 0), stretches = Math.ceil((count + 1) / DATA.ground.stretch);
       const flat = new Float64Array(count * width), {first} = DATA.ground, columns = first + width;
-      chosen.rows.forEach((row, k) => flat.set(row, k * width));
+      chosen.rows.forEach((/** @type {ArrayLike<number>} */ row, /** @type {number} */ k) => flat.set(row, k * width));
       const rows = this.take(8 * (count + 1) * columns), bounds = this.take(16 * stretches);
       this.slots = [rows, count + 1, columns, bounds, stretches, 1, 2, chosen.error, width, first, 1, 1];
       this.floor = this.top;

@@ -31,6 +31,8 @@ class Page {
     this.answered = location.hash.length > 1;
     /** @type {any} */
     this.shown = null;
+    /** @type {import("./motions.js").Case | null} */
+    this.pending = null;
     this.workers = new Workers();
     this.scene = new Scene(this);
     this.strip = new Strip(this);
@@ -66,7 +68,7 @@ class Page {
     if (this.frame) return;
     this.frame = requestAnimationFrame(() => {
       this.frame = 0;
-      this.given = /** @type {any} */ (this.pending);
+      this.given = this.pending ?? this.given;
       this.pending = null;
       this.compute();
     });

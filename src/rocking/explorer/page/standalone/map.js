@@ -1,7 +1,7 @@
 // The overturning spectrum: which pulses overturn this block, by their length and height. Workers compute it from coarse to
 // fine while one watches; the case can be dragged over it, and the block follows.
 
-import {make, one, put} from "./dom.js";
+import {make, one} from "./dom.js";
 import {GRAVITY} from "./kernels.js";
 import {isRecord, lengthOf, rateFor} from "./case.js";
 import {short} from "../numbers.js";
@@ -19,6 +19,12 @@ export class MapView {
   constructor(page) {
     this.page = page;
     this.canvas = make("canvas", {tabindex: 0, role: "application", "aria-label": "Map of pulses: arrow keys change length and amplitude", on: {keydown: (/** @type {KeyboardEvent} */ event) => this.key(event)}});
+    this.shape = ""; // what the map is of
+    /** @type {Float32Array | null} */
+    this.values = null;
+    /** @type {number[]} */
+    this.lengths = [];
+    this.tallest = this.stale = 0;
     this.words = make("p", {class: "soft", role: "status"});
     one("map").append(make("h2", {}, ["Which pulses overturn it?"]), this.canvas, this.words, make("p", {class: "legend"}, [
       make("i", {class: "key stands"}), "stands, darker the more it turns ", make("i", {class: "key falls"}), "falls",
@@ -41,10 +47,10 @@ export class MapView {
   settle() {
     const {given, shown} = this.page;
     this.words.textContent = this.possible ? this.words.textContent : "A map needs a pulse, and a block that starts upright.";
-    if (!this.possible) { this.key_ = ""; this.page.workers.drop("column"); this.values = null; this.paint(); return; }
+    if (!this.possible) { this.shape = ""; this.page.workers.drop("column"); this.values = null; this.paint(); return; }
     const {width, height, offset, restitution, model, motion, cycles} = given, key = JSON.stringify([width, height, offset, restitution, model, motion, cycles]);
-    if (key === this.key_) return;
-    this.key_ = key;
+    if (key === this.shape) return;
+    this.shape = key;
     const period = (2 * Math.PI) / shown.body.sides[0].p;
     this.lengths = [SHORTEST_PULSE * period, LONGEST_PULSE * period];
     this.tallest = TALLEST_PULSE * shown.uplift;
@@ -52,7 +58,7 @@ export class MapView {
   }
 
   /** Length of a pulse in a column, and amplitude in a row. @param {number} place from 0 to 1 */
-  length(place) { const [low, high] = /** @type {number[]} */ (this.lengths); return low * (high / low) ** place; }
+  length(place) { const [low, high] = this.lengths; return low * (high / low) ** place; }
 
   /** @param {string} key @param {any} given */
   async fill(key, given) {
@@ -64,19 +70,20 @@ export class MapView {
     for (const stride of STRIDES) {
       const asked = [];
       for (let column = 0; column < COLUMNS; column += stride) {
+        /** @type {number[]} */
         const rows = [];
         for (let row = 0; row < ROWS; row += stride) if (column % before || row % before) rows.push(row);
-        const amplitudes = rows.map((row) => (this.tallest ?? 0) * ((row + 0.5) / ROWS)), rate = rateFor(given, this.length((column + 0.5) / COLUMNS));
+        const amplitudes = rows.map((row) => this.tallest * ((row + 0.5) / ROWS)), rate = rateFor(given, this.length((column + 0.5) / COLUMNS));
         asked.push(workers.ask({kind: "column", given: {...given, rate}, amplitudes}).then((/** @type {number[]} */ found) => {
-          if (this.key_ !== key) return;
+          if (this.shape !== key) return;
           found.forEach((value, k) => {
             for (let x = column; x < Math.min(column + stride, COLUMNS); x += 1) for (let y = rows[k]; y < Math.min(rows[k] + stride, ROWS); y += 1) values[y * COLUMNS + x] = value;
           });
-          this.stale ??= requestAnimationFrame(() => { this.stale = undefined; this.colours(); this.paint(); });
+          this.stale ||= requestAnimationFrame(() => { this.stale = 0; this.colours(); this.paint(); });
         }));
       }
       await Promise.all(asked);
-      if (this.key_ !== key) return;
+      if (this.shape !== key) return;
       before = stride;
     }
     document.body.dataset.map = "complete";
@@ -107,13 +114,13 @@ export class MapView {
     pen.font = "12px system-ui, sans-serif";
     const ink = css("ink");
     pen.fillStyle = pen.strokeStyle = ink;
-    if (!this.values || !this.lengths) { pen.strokeRect(LEFT_AXIS, 0.5, w - 1, h); return; }
+    if (!this.values) { pen.strokeRect(LEFT_AXIS, 0.5, w - 1, h); return; }
     pen.imageSmoothingEnabled = false;
     pen.drawImage(this.picture, LEFT_AXIS, 0, w, h);
     pen.strokeStyle = css("line");
     pen.strokeRect(LEFT_AXIS + 0.5, 0.5, w - 1, h);
     pen.textAlign = "center";
-    const [low, high] = this.lengths, tallest = /** @type {number} */ (this.tallest);
+    const [low, high] = this.lengths, {tallest} = this;
     for (const tick of [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10]) {
       if (tick < low || tick > high) continue;
       pen.fillText(short(tick), LEFT_AXIS + (w * Math.log(tick / low)) / Math.log(high / low), h + 14);
@@ -141,10 +148,10 @@ export class MapView {
 
   /** @param {PointerEvent} event */
   move(event) {
-    if (!this.lengths || !this.values) return;
+    if (!this.values) return;
     const box = this.canvas.getBoundingClientRect(), within = (/** @type {number} */ each) => Math.min(1, Math.max(0, each));
     const across = within((event.clientX - box.left - LEFT_AXIS) / (box.width - LEFT_AXIS)), up = within(1 - (event.clientY - box.top) / (box.height - BELOW_AXIS));
-    this.page.change({amplitude: Math.max(up, 0.005) * /** @type {number} */ (this.tallest), rate: rateFor(this.page.given, this.length(across))});
+    this.page.change({amplitude: Math.max(up, 0.005) * this.tallest, rate: rateFor(this.page.given, this.length(across))});
   }
 
   /** @param {KeyboardEvent} event */
@@ -152,8 +159,8 @@ export class MapView {
     const {given} = this.page, fine = event.shiftKey ? 0.1 : 1, up = {ArrowUp: 1, ArrowDown: -1}[event.key], right = {ArrowRight: 1, ArrowLeft: -1}[event.key];
     if (!this.values || (!up && !right)) return;
     event.preventDefault();
-    const [low, high] = /** @type {number[]} */ (this.lengths);
-    if (up) this.page.change({amplitude: given.amplitude + (fine * up * /** @type {number} */ (this.tallest)) / ROWS});
+    const [low, high] = this.lengths;
+    if (up) this.page.change({amplitude: given.amplitude + (fine * up * this.tallest) / ROWS});
     if (right) this.page.change({rate: rateFor(given, lengthOf(given) * (high / low) ** ((fine * right) / COLUMNS))});
   }
 }

@@ -26,7 +26,7 @@ export function piecesOf({motion, rate, cycles}) {
   if (motion === "still") return null;
   const key = `${motion} ${motion in DATA.records ? "" : `${rate} ${cycles}`}`;
   if (!made.has(key)) {
-    if (made.size > 20) made.delete(made.keys().next().value);
+    if (made.size > 20) made.delete([...made.keys()][0]);
     made.set(key, motion in DATA.records ? record(DATA.records[motion]) : pulse(motion, rate, cycles));
   }
   return made.get(key);
@@ -85,7 +85,7 @@ export function groundAt({pieces, factor}, times) {
       velocity += ends[1];
       row += 1;
     }
-    const after = times[k] - breaks[row], [a, v, d] = row < rows.length ? integrals(rows[row], after) : [0, 0, 0];
+    const after = times[k] - breaks[row], [a, , d] = row < rows.length ? integrals(rows[row], after) : [0, 0, 0];
     out.acceleration[k] = factor * a;
     out.displacement[k] = factor * (place + velocity * after + d);
   }

@@ -10,6 +10,7 @@ export class Phase {
   /** @param {any} page */
   constructor(page) {
     this.page = page;
+    this.width = this.height = 0;
     this.axes = draw("path", {class: "axes"});
     this.limit = draw("path", {class: "separatrix"});
     this.curve = draw("path", {class: "curve"});

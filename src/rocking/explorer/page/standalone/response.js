@@ -9,6 +9,8 @@ const CHANGES = [0, -3e-6, -1.5e-6, 1.5e-6, 3e-6];
 const POINTS = 900;
 /** What is shown after the end, and before a record lifts the block, s. */
 const AFTERWARDS = 0.5, BEFORE = 2;
+/** Ratio of the amplitudes that are tried, and the largest one in units of that of uplift. */
+const LEVEL = 1.005, MOST_UPLIFTS = 20;
 /** Steps of a search before it is refined, and halvings. */
 const STEPS = 80, HALVINGS = 30;
 
@@ -67,9 +69,9 @@ function momentsOf(kernels, body, shaking, response, {times, rotation}) {
   const moments = [], {UPLIFT, REST} = DATA.events, lifted = response.events.find(({kind}) => kind === UPLIFT);
   if (lifted && lifted.time > 0) moments.push({time: lifted.time, kind: "lift"});
   const rest = response.events.findLast(({kind}) => kind === REST);
+  if (rest) moments.push({time: rest.time, kind: "rest"});
   if (!response.overturned) {
     if (response.peak > 0) moments.push({time: response.peakTime, kind: "peak"});
-    if (rest) moments.push({time: rest.time, kind: "rest"});
     return moments.sort((one, other) => one.time - other.time);
   }
   const side = rotation[rotation.length - 1] > 0 ? 0 : 1, {alpha} = body.sides[side];
@@ -95,15 +97,17 @@ function noReturn(kernels, body, shaking, response) {
   return 0;
 }
 
-/** Smallest amplitude that overturns the block, m/s², among levels up to a largest one; null without one. It is refined to
- * a millionth. @param {import("./kernels.js").Kernels} kernels @param {Case} given */
+/** Smallest amplitude that overturns the block, m/s², among levels of half a per cent and that of the case, up to 20 times
+ * that of uplift; null without one. It is then refined. @param {import("./kernels.js").Kernels} kernels @param {Case} given */
 export function criticalOf(kernels, given) {
   const body = bodyOf(given, kernels.exports), {pieces, factor} = shakingOf(given);
   if (!pieces) return null;
   const stands = (/** @type {number} */ amplitude) => !kernels.march(body, {pieces, factor: (factor * amplitude) / given.amplitude}).overturned;
-  const low = upliftOf(body, kernels.exports), high = Math.max(20 * low, 2 * given.amplitude);
-  const level = (/** @type {number} */ k) => low * (high / low) ** (k / STEPS);
-  for (let k = 1; k <= STEPS; k += 1) if (!stands(level(k))) return last(level(k - 1), level(k), stands);
+  const low = upliftOf(body, kernels.exports), high = MOST_UPLIFTS * low, falls = !stands(given.amplitude);
+  for (let before = low, level = low * LEVEL; before < high; before = level, level *= LEVEL) {
+    const isOwn = falls && given.amplitude > before && given.amplitude <= level;
+    if (isOwn || !stands(level)) return last(before, isOwn ? given.amplitude : level, stands);
+  }
   return null;
 }
 

@@ -17,9 +17,15 @@ const UPRIGHT = 0.02;
 const still = window.matchMedia("(prefers-reduced-motion: reduce)");
 
 export class Scene {
-  /** @param {{change: (patch: Partial<import("./motions.js").Case>, rough?: boolean) => void, settle: () => void, release: () => void, readonly shown: any, readonly given: any, rewind: () => void}} page */
+  /** @param {{change: (patch: Partial<import("./motions.js").Case>, rough?: boolean) => void, settle: () => void, release: () => void, readonly shown: any, readonly given: any, time: number, rewind: () => void}} page */
   constructor(page) {
     this.page = page;
+    this.width = this.floor = this.middle = 0;
+    this.held = this.begin = false;
+    /** @type {any} */
+    this.state = null;
+    /** Displacements of records. @type {Record<string, Float64Array>} */
+    this.lines = {};
     /** @type {SVGSVGElement} */
     this.svg = one("scene");
     this.grid = draw("path", {class: "grid"});
@@ -73,7 +79,7 @@ export class Scene {
 
   /** Turn the block about a corner so that the point that was touched follows the pointer. @param {PointerEvent} event @param {any} held */
   tilt(event, held) {
-    const box = this.svg.getBoundingClientRect(), x = (each) => (each - box.left - this.middle) / this.scale, y = (/** @type {number} */ each) => (this.floor - (each - box.top)) / this.scale;
+    const box = this.svg.getBoundingClientRect(), x = (/** @type {number} */ each) => (each - box.left - this.middle) / this.scale, y = (/** @type {number} */ each) => (this.floor - (each - box.top)) / this.scale;
     const side = event.clientX >= held.x ? 1 : -1, corner = (side * held.width) / 2;
     const angle = Math.atan2(x(event.clientX) - corner, Math.max(y(event.clientY), 0.05)) - Math.atan2(x(held.x) - corner, Math.max(y(held.y), 0.05));
     const tilt = held.tilt + angle;
@@ -93,7 +99,7 @@ export class Scene {
     this.paint();
   }
 
-  /** Draw the block at a moment. @param {{rotation: number, velocity: number, acceleration: number, displacement: number}} [state] @param {boolean} [begin] whether it can be dragged */
+  /** Draw the block at a moment. @param {any} [state] its rotation, velocity, and the acceleration and displacement of the ground @param {boolean} [begin] whether it can be dragged */
   paint(state = this.state, begin = this.begin) {
     this.state = state;
     this.begin = begin;
@@ -102,8 +108,8 @@ export class Scene {
     const {scale, floor} = this, {width, height, offset} = given;
     const moved = still.matches ? 0 : this.displacement(state.displacement), free = Math.max(0, this.width / 2 - scale * Math.hypot(width, height) * 0.9);
     const shift = Math.max(-free, Math.min(free, scale * moved));
-    const wide = scale * width, tall = scale * height, outside = Math.max(0, tall + wide / 2 + 12 - this.width / 2); // of what lies beside it
-    const pan = -Math.sin(state.rotation) * Math.min(outside, tall / 2 + wide / 2);
+    const wide = scale * width, tall = scale * height, outside = Math.max(0, tall + wide / 2 + 12 + Math.abs(shift) - this.width / 2); // of what lies beside it
+    const pan = -Math.sin(state.rotation) * outside;
     this.middle = this.width / 2 + shift + pan;
     this.background(scale * moved - shift - pan);
     const pivot = ((state.rotation >= 0 ? 1 : -1) * wide) / 2, angle = (state.rotation * 180) / Math.PI;
@@ -133,7 +139,7 @@ export class Scene {
     const {p, alpha} = this.page.shown.body.sides[rotation >= 0 ? 0 : 1], barrier = 1 - Math.cos(alpha);
     const stored = (Math.cos(alpha - Math.abs(rotation)) - Math.cos(alpha)) / barrier, moving = (velocity * velocity) / (2 * p * p * barrier);
     const tall = Math.min(130, 0.4 * this.floor), x = this.width - 34, y = 34 + tall, unit = tall / 1.5, of = (/** @type {number} */ each) => Math.max(0, Math.min(1.5, each)) * unit;
-    put(/** @type {any} */ (this.bars.firstChild), {x: x - 9, y: y - tall, width: 18, height: tall});
+    put(this.bars.firstChild, {x: x - 9, y: y - tall, width: 18, height: tall});
     put(this.stored, {x: x - 9, y: y - of(stored), width: 18, height: of(stored)});
     put(this.moving, {x: x - 9, y: y - of(Math.max(0, stored) + moving), width: 18, height: of(Math.max(0, stored) + moving) - of(stored)});
     put(this.needed, {d: `M${x - 15} ${y - unit}h30`});
@@ -145,9 +151,8 @@ export class Scene {
     const {given, shown} = this.page;
     if (!isRecord(given.motion) || given.tilt) return computed;
     const {drawn, pga} = DATA.records[given.motion];
-    this.lines ??= /** @type {Record<string, Float64Array>} */ ({});
     this.lines[given.motion] ??= Float64Array.from(drawn.differences, ((sum) => (/** @type {number} */ each) => (sum += each) * drawn.unit)(0));
-    const values = this.lines[given.motion], place = (this.page.time ?? 0) / drawn.step, k = Math.floor(place);
+    const values = this.lines[given.motion], place = this.page.time / drawn.step, k = Math.floor(place);
     return k + 1 < values.length && shown ? (given.amplitude / pga) * (values[k] + (values[k + 1] - values[k]) * (place - k)) : 0;
   }
 

@@ -18,6 +18,9 @@ export class Strip {
   /** @param {any} page */
   constructor(page) {
     this.page = page;
+    this.width = this.height = this.span = this.from = this.unit = this.upper = this.middle = this.tall = this.knobTime = this.most = 0;
+    this.sign = 1;
+    this.held = false;
     /** @type {SVGSVGElement} */
     this.svg = one("strip");
     this.axes = draw("g", {class: "axes"});

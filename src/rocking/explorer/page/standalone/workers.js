@@ -5,7 +5,7 @@ const MOST = 4;
 
 export class Workers {
   constructor() {
-    const text = `const TEXT = ${JSON.stringify(document.getElementById("data")?.textContent)};\n${document.getElementById("core")?.textContent}\nserve();`;
+    const text = `self.TEXT = ${JSON.stringify(document.getElementById("data")?.textContent)};\n${document.getElementById("core")?.textContent}\nserve();`;
     this.address = URL.createObjectURL(new Blob([text], {type: "text/javascript"}));
     /** @type {{worker: Worker, busy: boolean}[]} */
     this.workers = [];
