@@ -23,7 +23,7 @@ import sys
 import sysconfig
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -156,12 +156,12 @@ def _make(folder: Path) -> None:
         print("ziglang was not found: without it there is no standalone page, and all else works", file=sys.stderr)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         steps = [("lower", "0"), ("lower", "1"), ("level", "-")]
-        lowered = [pool.submit(_run, folder, *step) for step in steps]
-        prepared = [pool.submit(_link_page, folder, zig)] if zig else []  # compiles the C library
+        lowered: list[Future[Any]] = [pool.submit(_run, folder, *step) for step in steps]
+        prepared: list[Future[Any]] = [pool.submit(_link_page, folder, zig)] if zig else []  # compiles the C library
         for each in lowered:
             each.result()
         levels = LEVELS if EVERY_LEVEL else [*dict.fromkeys([LEVELS[0], (folder / "level").read_text("utf-8")])]
-        optimised = [pool.submit(_run, folder, "optimise", level) for level in levels]
+        optimised: list[Future[Any]] = [pool.submit(_run, folder, "optimise", level) for level in levels]
         prepared += [pool.submit(_run, folder, "page", "-")] if zig else []
         for each in [*optimised, *prepared]:
             each.result()
