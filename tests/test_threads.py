@@ -31,6 +31,18 @@ def test_of_several_errors_that_of_the_first_item_is_raised(threads):
         next(found)
 
 
+def test_a_single_item_needs_no_thread(monkeypatch):
+    def refused(self):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", refused)
+    with set_options(threads=4):
+        assert [*map_in_threads(lambda each: -each, iter([3]))] == [-3]
+        assert [*map_in_threads(lambda each: -each, [])] == []
+        with pytest.raises(RuntimeError, match="new thread"):
+            next(map_in_threads(lambda each: -each, iter([3, 4])))
+
+
 def test_items_are_taken_a_few_ahead_of_the_results():
     taken = []
     items = (taken.append(each) or each for each in itertools.count())

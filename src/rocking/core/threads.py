@@ -107,11 +107,13 @@ def map_in_threads(
     error. On an early exit, for example an interrupt, `cancelled` is set, running work is awaited, and other work is
     discarded.
     """
-    count = min(thread_count(), len(items) if isinstance(items, Sized) else 2**16)
-    if count < 2:
-        yield from map(function, items)
+    count, remaining = min(thread_count(), len(items) if isinstance(items, Sized) else 2**16), iter(items)
+    first = [*itertools.islice(remaining, min(count, 2))]
+    remaining = itertools.chain(first, remaining)
+    if len(first) < 2:  # a system without threads can do this
+        yield from map(function, remaining)
         return
-    remaining, pending = iter(items), deque[Future[Output]]()
+    pending = deque[Future[Output]]()
     pool = ThreadPoolExecutor(count)
     try:
         while True:
