@@ -14,6 +14,7 @@ import re
 from collections.abc import Sequence
 from enum import IntEnum
 from importlib import resources
+from itertools import product
 from pathlib import PurePosixPath
 from typing import Any, Final
 
@@ -23,7 +24,7 @@ from rocking import pulses
 from rocking.block import Block
 from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, VERSION
-from rocking.engine.schemes import Certified
+from rocking.engine.schemes import Certified, VelocityThreshold
 from rocking.engine.tasks import BUDGET, BUDGET_PER_PIECE, SLICE, Setup
 from rocking.errors import InvalidOption, KernelsError
 from rocking.explorer.simulated import MAX_DRAWN_PERIOD
@@ -148,12 +149,11 @@ def _describe_layout(kind: np.dtype[np.void], prefix: str = "", start: int = 0) 
 def _build_templates() -> dict[str, str]:
     """Return the bytes of records as the package prepares them, for the page to change: hexadecimal."""
     templates = {"state": state.new_states(1, 0).tobytes().hex()}
-    for model in MODELS:
-        for is_recorded in (False, True):
-            setup = Setup(Block(width=0.4, height=2.0).as_bodies(), model, Certified())
-            run = setup.prepare(None, record=is_recorded)
-            templates[f"settings {model} {'record' if is_recorded else 'state'}"] = run.settings.tobytes().hex()
-            templates[f"block {model}"] = run.records.tobytes().hex()
+    for model, scheme, is_recorded in product(MODELS, (Certified(), VelocityThreshold(1.0)), (False, True)):
+        run = Setup(Block(width=0.4, height=2.0).as_bodies(), model, scheme).prepare(None, record=is_recorded)
+        key = f"{model} {scheme.name}"
+        templates[f"settings {key} {'record' if is_recorded else 'state'}"] = run.settings.tobytes().hex()
+        templates[f"block {key}"] = run.records.tobytes().hex()
     return templates
 
 

@@ -9,7 +9,7 @@ import {whole} from "../numbers.js";
 export const FIRST = "width=0.4&height=1.6&motion=one-sine:amplitude=3.01,frequency=1";
 
 /** Smallest and largest number of each quantity. @type {Record<string, [number, number]>} */
-export const LIMITS = {width: [0.02, 50], height: [0.02, 50], restitution: [0.05, 1], amplitude: [0.01, 100], rate: [0.02, 50], cycles: [0.5, 20], tilt: [-1.4, 1.4]};
+export const LIMITS = {width: [0.02, 50], height: [0.02, 50], restitution: [0.05, 1], amplitude: [0.01, 100], rate: [0.02, 50], cycles: [0.5, 20], threshold: [1e-9, 0.5], tilt: [-1.4, 1.4]};
 /** Largest ratio of width and height, beyond which no rigid block continues to rock. */
 const STOCKIEST = 1.25;
 
@@ -47,6 +47,7 @@ export function writeCase(given) {
   Object.assign(fields, {motion: isRecord(motion) ? motion : `${motion}:${parameters.join(",")}`});
   if (isRecord(motion)) Object.assign(fields, {pga: whole(given.amplitude)});
   if (given.tilt) Object.assign(fields, {initial_rotation: whole(given.tilt)});
+  if (given.threshold !== null) Object.assign(fields, {chattering: `velocity=${whole(given.threshold)}`});
   if (given.model !== "nonlinear") Object.assign(fields, {model: given.model});
   return Object.entries(fields).map(([name, value]) => `${name}=${value}`).join("&");
 }
@@ -59,10 +60,11 @@ export function readCase(text) {
   const [named, list = ""] = (fields.get("motion") ?? first.get("motion") ?? "").split(":");
   const known = isRecord(named) || named === "sine" || named in DATA.pulses, motion = known ? named : "one-sine";
   const parameters = new Map(list.split(",").map((each) => /** @type {[string, string]} */ (each.split("="))));
+  const [scheme, limit] = (fields.get("chattering") ?? "").split("=");
   const amplitude = isRecord(motion) ? number(fields.get("pga"), DATA.records[motion].pga) : number(parameters.get("amplitude"), 3.01);
   return limited({
     width: size("width"), height: size("height"), offset: number(fields.get("offset"), 0), restitution: fields.has("restitution") ? number(fields.get("restitution"), 0.9) : null,
     model: fields.get("model") === "linear" ? "linear" : "nonlinear", motion, amplitude, cycles: number(parameters.get("cycles"), 1),
-    rate: number(parameters.get(byFrequency(motion) ? "frequency" : "duration"), 1), tilt: number(fields.get("initial_rotation"), 0),
+    threshold: scheme === "velocity" ? number(limit, 0.01) : null, rate: number(parameters.get(byFrequency(motion) ? "frequency" : "duration"), 1), tilt: number(fields.get("initial_rotation"), 0),
   });
 }

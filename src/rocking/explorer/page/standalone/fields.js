@@ -25,6 +25,7 @@ const QUANTITIES = [
   {name: "height", text: "Height", unit: "m", ends: [0.2, 6], of: (given) => given.height, patch: (height) => ({height})},
   {name: "offset", text: "Mass off the middle", unit: "m", ends: [-0.1, 0.1], of: (given) => given.offset, patch: (offset) => ({offset})},
   {name: "restitution", text: "Restitution", unit: "", ends: [0.5, 1], of: (given, page) => given.restitution ?? page.shown.body.sides[0].restitution, patch: (restitution) => ({restitution})},
+  {name: "threshold", text: "Threshold of rest (0: proof)", unit: "", ends: [0, 0.1], of: (given) => given.threshold ?? 0, patch: (threshold) => ({threshold: threshold > 0 ? threshold : null})},
   {name: "tilt", text: "Tilt at the start", unit: "°", ends: [-20, 20], of: (given) => given.tilt / DEGREE, patch: (tilt) => ({tilt: tilt * DEGREE})},
   {name: "amplitude", text: "Amplitude", unit: "g", ends: [0, 1], of: (given) => given.amplitude / GRAVITY, patch: (amplitude) => ({amplitude: amplitude * GRAVITY})},
   {name: "a", text: "a, amplitude / uplift", unit: "", ends: [0, 5], of: (given, page) => given.amplitude / page.shown.uplift, patch: (a, given, page) => ({amplitude: a * page.shown.uplift})},
@@ -55,7 +56,7 @@ export class Numbers {
       make("label", {class: "choice"}, ["Equation ", this.model]), this.derived,
       make("p", {}, [
         make("button", {type: "button", on: {click: () => this.copy()}}, ["Copy link"]), " ",
-        make("button", {type: "button", on: {click: () => page.change({restitution: null, offset: 0, tilt: 0})}}, ["Plain block"]), " ", this.copied,
+        make("button", {type: "button", on: {click: () => page.change({restitution: null, threshold: null, offset: 0, tilt: 0})}}, ["Plain block"]), " ", this.copied,
       ]),
       make("details", {}, [make("summary", {}, ["About"]), make("p", {}, [
         `Computed in this browser by the kernels of rocking ${DATA.version} (${DATA.fingerprint}), compiled to WebAssembly. Every impact is located, and rests are proven. Angles use the C library of `

@@ -9,11 +9,14 @@ export const GRAVITY = DATA.gravity;
 
 /** @typedef {{breaks: ArrayLike<number>, rows: ArrayLike<number>[], error: number}} Pieces polynomials between breakpoints, m/s² */
 /** @typedef {{p: number, alpha: number, restitution: number}} Side */
-/** @typedef {{sides: Side[], model: string}} Body */
+/** @typedef {{sides: Side[], model: string, threshold: number | null}} Body threshold of rest, as a share of p alpha; null: by proof */
 /** @typedef {{side: number, u: number, v: number}} Start */
 /** @typedef {{pieces: Pieces | null, factor: number}} Shaking */
 
 const WIDTHS = /** @type {Record<string, number>} */ ({f8: 8, i8: 8, i4: 4, b1: 1});
+
+/** Name of the templates of a body. @param {Body} body */
+const kindOf = ({model, threshold}) => `${model} ${threshold === null ? "certified" : "velocity"}`;
 
 /** Pieces of a ground that does not move. @type {Pieces} */
 const STILL = {breaks: [0], rows: [], error: 0};
@@ -114,14 +117,15 @@ export class Kernels {
   }
 
   /** The record of a block. @param {Body} body */
-  block({sides, model}) {
-    const at = this.put(templates[`block ${model}`]), linear = model === "linear", {sin, cos, tan} = this.exports;
+  block(body) {
+    const {sides, model, threshold} = body, at = this.put(templates[`block ${kindOf(body)}`]), linear = model === "linear", {sin, cos, tan} = this.exports;
     const fields = {
       stiffness: sides.map(({p}) => p * p), slenderness: sides.map(({alpha}) => alpha),
       sine: sides.map(({alpha}) => sin(alpha)), cosine: sides.map(({alpha}) => cos(alpha)),
       threshold: sides.map(({alpha}) => (linear ? alpha : tan(alpha))),
       threshold_slope: sides.map(({p, alpha}) => (linear ? p * p : p * p * cos(alpha))),
       restitution: sides.map(({restitution}) => restitution),
+      ...(threshold === null ? {} : {rest_limit: sides.map(({p, alpha}) => threshold * p * alpha)}),
     };
     for (const [name, values] of Object.entries(fields)) this.set("block", at, name, values);
     return at;
@@ -131,7 +135,7 @@ export class Kernels {
    * @param {Start | null} [start] @param {boolean} [recorded] whether the rotation is wanted afterwards */
   march(body, shaking, start = null, recorded = false) {
     const ground = this.ground(shaking), block = this.block(body), scratch = this.take(DATA.layouts.scratch.size);
-    const settings = this.put(templates[`settings ${body.model} ${recorded ? "record" : "state"}`]), state = this.put(templates.state);
+    const settings = this.put(templates[`settings ${kindOf(body)} ${recorded ? "record" : "state"}`]), state = this.put(templates.state);
     if (start) for (const [name, value] of Object.entries({...start, peak: start.u})) this.set("state", state, name, value);
     const {size} = DATA.layouts.table, {slice, total, per_piece: each} = DATA.budget;
     let rows = recorded ? 256 + 2 * ground[1] : 0, table = this.take(rows * size), ending = DATA.endings.PAUSED;
@@ -166,7 +170,7 @@ export class Kernels {
   trace(body, shaking, response, times) {
     const ground = this.ground(shaking), block = this.block(body), {size} = DATA.layouts.node, count = response.nodes.length / size;
     if (!count) return new Float64Array(3 * times.length);
-    const settings = this.put(templates[`settings ${body.model} record`]), nodes = this.put(response.nodes), at = this.doubles(times);
+    const settings = this.put(templates[`settings ${kindOf(body)} record`]), nodes = this.put(response.nodes), at = this.doubles(times);
     const rows = this.take(8 * times.length), out = this.take(24 * times.length), scratch = this.take(DATA.layouts.scratch.size);
     const {view} = this, [offset] = DATA.layouts.node.fields.time;
     for (let k = 0, row = 0; k < times.length; k += 1) {

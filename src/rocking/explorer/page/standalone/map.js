@@ -48,7 +48,7 @@ export class MapView {
     const {given, shown} = this.page;
     this.words.textContent = this.possible ? this.words.textContent : "A map needs a pulse, and a block that starts upright.";
     if (!this.possible) { this.shape = ""; this.page.workers.drop("column"); this.values = null; this.paint(); return; }
-    const {width, height, offset, restitution, model, motion, cycles} = given, key = JSON.stringify([width, height, offset, restitution, model, motion, cycles]);
+    const {amplitude: _amplitude, rate: _rate, ...shape} = given, key = JSON.stringify(shape);
     if (key === this.shape) return;
     this.shape = key;
     const period = (2 * Math.PI) / shown.body.sides[0].p;

@@ -3,11 +3,11 @@
 import {DATA, GRAVITY} from "./kernels.js";
 
 /** A case: sizes in m, amplitude in m/s², rate in Hz or s, tilt in rad. @typedef {{width: number, height: number, offset: number,
- *  restitution: number | null, model: string, motion: string, amplitude: number, rate: number, cycles: number, tilt: number}} Case */
+ *  restitution: number | null, model: string, threshold: number | null, motion: string, amplitude: number, rate: number, cycles: number, tilt: number}} Case */
 
 /** Both sides of a rectangular block whose centre of mass may be off its middle. @param {Case} given @param {any} libm
  * @returns {import("./kernels.js").Body} */
-export function bodyOf({width, height, offset, restitution, model}, libm) {
+export function bodyOf({width, height, offset, restitution, model, threshold}, libm) {
   const b = width / 2, h = height / 2, s = offset, arms = [b - s, b + s], radii = arms.map((arm) => libm.hypot(arm, h));
   const gyration = (b * b + h * h) / 3 - s * s, inertias = radii.map((radius) => gyration + radius * radius), numerator = gyration + h * h - arms[0] * arms[1];
   const sides = arms.map((arm, k) => {
@@ -15,7 +15,7 @@ export function bodyOf({width, height, offset, restitution, model}, libm) {
     const p = Math.sqrt(s === 0 ? (0.75 * GRAVITY) / radii[k] : (GRAVITY * radii[k]) / inertias[k]);
     return {p, alpha, restitution: restitution ?? (s === 0 ? 1 - 1.5 * (sine * sine) : numerator / inertias[1 - k])};
   });
-  return {sides, model};
+  return {sides, model, threshold};
 }
 
 /** Pieces by the text of their motion: those of the last ones. @type {Map<string, any>} */

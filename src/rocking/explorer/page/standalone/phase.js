@@ -34,6 +34,7 @@ export class Phase {
     const {clientWidth: width, clientHeight: height} = this.svg, {shown} = this.page;
     if (!width || !shown) return;
     Object.assign(this, {width, height});
+    put(this.svg, {viewBox: `0 0 ${width} ${height}`});
     const {sides, model} = shown.body, {rotation, velocity} = shown.picture, unit = (/** @type {number} */ turned) => sides[turned >= 0 ? 0 : 1];
     const inside = rotation.findIndex((/** @type {number} */ turned) => Math.abs(turned) > REACH * unit(turned).alpha);
     const points = Array.from(inside < 0 ? rotation : rotation.slice(0, inside), (turned, k) => this.at(/** @type {number} */ (turned) / unit(turned).alpha, velocity[k] / (unit(turned).p * unit(turned).alpha)));

@@ -90,6 +90,7 @@ export class Scene {
   fit() {
     const {clientWidth: width, clientHeight: height} = this.svg, {given} = this.page;
     if (!width || !given) return;
+    put(this.svg, {viewBox: `0 0 ${width} ${height}`}); // paper has another width
     this.width = width;
     this.floor = height - BELOW;
     if (!this.held || !this.scale) {

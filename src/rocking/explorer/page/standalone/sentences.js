@@ -32,7 +32,8 @@ export function reasons({moments, overturned, uplift, given, peak, body, impacts
   if (!overturned) {
     const top = found("peak"), rest = found("rest");
     if (top && !given.tilt) list.push({time: top.time, words: `It turns the most: ${fixed((100 * peak) / alpha, 1)} % of the way to its balance.`});
-    if (rest) list.push({time: rest.time, words: `It rests again. ${impacts} impacts were computed one by one; the others follow in a time that is proven to be finite.`});
+    if (rest) list.push({time: rest.time, words: given.threshold === null
+      ? `It rests again. ${impacts} impacts were computed one by one; the others follow in a time that is proven to be finite.` : `It rests again after ${impacts} impacts, because it is slower than the threshold.`});
     return list;
   }
   const gone = found("gone"), balance = found("balance"), flat = found("flat");

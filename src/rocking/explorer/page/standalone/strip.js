@@ -64,6 +64,7 @@ export class Strip {
     if (!width || !shown) return;
     const {picture, uplift} = shown;
     Object.assign(this, {width, height});
+    put(this.svg, {viewBox: `0 0 ${width} ${height}`});
     if (!this.held || !this.span) {
       this.from = picture.from;
       this.span = ENDS.find((each) => each >= (picture.until - picture.from) * 0.999) ?? picture.until - picture.from;

@@ -42,6 +42,14 @@ const TOURS = [
     question: "A program that takes small steps in time may miss this rest. Would its block fall, too?",
   },
   {
+    title: "The error of a threshold",
+    steps: [
+      {words: "This block stands. Each of its rests is proven.", case: "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=4.903325", play: true, mark: "#strip"},
+      {words: "Many programs put a block to rest when its velocity is below a threshold: here 0.02 of p times slenderness. Now it falls, which is wrong.", case: "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=4.903325&chattering=velocity=0.02", mark: "#headline"},
+    ],
+    question: "Does a smaller threshold always correct the outcome? Try it under Numbers.",
+  },
+  {
     title: "A stronger pulse may save it",
     steps: [
       {words: "Pulses in the coloured region overturn the block. The edge of this region is not a simple line.", case: "width=0.4&height=1.6&motion=one-sine:amplitude=4.4,frequency=2", panel: "map", mark: "#map canvas"},
