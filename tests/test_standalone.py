@@ -157,6 +157,16 @@ def test_the_file_is_small_whole_and_refuses_what_it_cannot_hold(html, monkeypat
         standalone.build_page([])
 
 
+def test_the_command_writes_the_file(built, run, tmp_path):
+    path = tmp_path / "block.html"
+    code, out, err = run("page", "--records", "", "--out", path)
+    assert (code, err) == (0, "")
+    assert out == f"written to {path}: {path.stat().st_size // 1000} kB; open it in a browser\n"
+    assert path.read_text("utf-8") == standalone.build_page([])
+    code, out, err = run("page", "--out", tmp_path / "nowhere" / "block.html", "--records", "")
+    assert code == 2 and "cannot be written" in err and out == ""
+
+
 def test_without_webassembly_the_page_is_refused(monkeypatch):
     manifest = library.read_manifest() | {"page": None}
     monkeypatch.setattr(library, "read_manifest", lambda: manifest)

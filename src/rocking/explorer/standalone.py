@@ -117,7 +117,7 @@ def _bundle(path: str, seen: list[str]) -> tuple[str, list[str]]:
 
 def _read_webassembly() -> bytes:
     entry = library.read_manifest().get("page")
-    if compiled.UNCOMPILED or not entry:
+    if not entry:
         raise InvalidOption(
             "this installation of rocking has no WebAssembly for the page, because ziglang was not available when it "
             "was built; install rocking again where ziglang can be installed, and without ROCKING_PAGE=0"
@@ -148,13 +148,21 @@ def _describe_layout(kind: np.dtype[np.void], prefix: str = "", start: int = 0) 
 
 def _build_templates() -> dict[str, str]:
     """Return the bytes of records as the package prepares them, for the page to change: hexadecimal."""
-    templates = {"state": state.new_states(1, 0).tobytes().hex()}
+    templates = {"state": _write_bytes(state.new_states(1, 0))}
     for model, scheme, is_recorded in product(MODELS, (Certified(), VelocityThreshold(1.0)), (False, True)):
         run = Setup(Block(width=0.4, height=2.0).as_bodies(), model, scheme).prepare(None, record=is_recorded)
         key = f"{model} {scheme.name}"
-        templates[f"settings {key} {'record' if is_recorded else 'state'}"] = run.settings.tobytes().hex()
-        templates[f"block {key}"] = run.records.tobytes().hex()
+        templates[f"settings {key} {'record' if is_recorded else 'state'}"] = _write_bytes(run.settings)
+        templates[f"block {key}"] = _write_bytes(run.records)
     return templates
+
+
+def _write_bytes(record: state.Record) -> str:
+    """Write the bytes of a record, with zeros between its fields."""
+    copied = np.zeros(1, record.dtype)
+    for name in record.dtype.names:
+        copied[name] = record[name]
+    return copied.tobytes().hex()
 
 
 def _list_codes(kind: type[IntEnum]) -> dict[str, int]:
