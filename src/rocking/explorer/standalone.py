@@ -61,7 +61,7 @@ def build_page(names: Sequence[str] = RECORDS) -> str:
     html = _read("standalone/index.html")
     core, seen = _bundle("standalone/jobs.js", [])
     parts = {
-        "STYLE": _read("standalone/style.css"),
+        "STYLE": _read("colours.css") + _read("standalone/style.css"),
         "DATA": json.dumps(describe_computation(names), separators=(",", ":")),
         "CORE": core,
         "APP": _bundle("standalone/main.js", seen)[0],
