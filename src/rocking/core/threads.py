@@ -107,18 +107,21 @@ def map_in_threads(
     error. On an early exit, for example an interrupt, `cancelled` is set, running work is awaited, and other work is
     discarded.
     """
-    count, remaining = min(thread_count(), len(items) if isinstance(items, Sized) else 2**16), iter(items)
-    first = [*itertools.islice(remaining, min(count, 2))]
-    remaining = itertools.chain(first, remaining)
-    if len(first) < 2:  # a system without threads can do this
-        yield from map(function, remaining)
+    count = min(thread_count(), len(items) if isinstance(items, Sized) else 2**16)
+    if count < 2:
+        yield from map(function, items)
         return
-    pending = deque[Future[Output]]()
+    remaining, pending = iter(items), deque[Future[Output]]()
     pool = ThreadPoolExecutor(count)
     try:
         while True:
             for item in itertools.islice(remaining, LOOKAHEAD * count - len(pending)):
-                pending.append(pool.submit(function, item))
+                try:
+                    pending.append(pool.submit(function, item))
+                except RuntimeError as error:
+                    if pending or "start new thread" not in str(error):
+                        raise
+                    yield from map(function, itertools.chain([item], remaining))  # a system without threads
             if not pending:
                 return
             yield pending.popleft().result()
