@@ -389,6 +389,31 @@ def test_a_case_in_the_address_is_shown_again(opened):
     page = opened(address)
     page.until("document.body.dataset.settled", "computed")
     assert dict(parse_qsl(page.js("location.hash.slice(1)"))) == dict(parse_qsl(address))
+    page = opened(f"{FALLING}&ask=1")
+    page.page.click("#yes")
+    page.says("headline", "You were right. It falls.")
     page = opened("width=nonsense&motion=unknown:amplitude=x&height=1e9")
     page.until("document.body.dataset.settled", "computed")
     assert numbers(page) == {"width": 0.4, "height": 50.0, "amplitude": 3.01, "frequency": 1.0}
+
+
+@pytest.mark.browser
+def test_without_workers_the_page_computes_by_itself(browser, page_file):
+    context = browser.new_context()
+    context.add_init_script("window.Worker = class { constructor() { throw new Error('refused'); } };")
+    page = Watched(context.new_page())
+    page.page.goto(page_file.as_uri())
+    page.until("document.body.dataset.settled", "the critical amplitude is computed")
+    page.page.click("#no")
+    page.says("headline", "0.3091 g")
+    context.close()
+
+
+@pytest.mark.browser
+def test_a_browser_without_webassembly_is_told(browser, page_file):
+    context = browser.new_context()
+    context.add_init_script("WebAssembly.instantiate = () => Promise.reject(new Error('refused'));")
+    page = Watched(context.new_page())
+    page.page.goto(page_file.as_uri())
+    page.says("headline", "This browser cannot run the kernels (refused).")
+    context.close()

@@ -15,6 +15,8 @@ import {described, headline, margin, reasons} from "./sentences.js";
 import {one, put} from "./dom.js";
 import {fixed} from "../numbers.js";
 
+/** An address that asks for the outcome first. */
+const ASKED = /[#&]ask=1\b/;
 /** Pause before the address changes and slow parts are computed again, ms. */
 const SETTLED = 200;
 /** What is said before the first answer. */
@@ -28,7 +30,7 @@ class Page {
     this.given = readCase(location.hash.slice(1));
     this.time = 0;
     this.playing = false;
-    this.answered = location.hash.length > 1;
+    this.answered = location.hash.length > 1 && !ASKED.test(location.hash);
     /** @type {any} */
     this.shown = null;
     /** @type {import("./motions.js").Case | null} */
@@ -204,4 +206,6 @@ class Page {
   }
 }
 
-void openKernels().then((kernels) => new Page(kernels));
+openKernels().then((kernels) => new Page(kernels)).catch((/** @type {Error} */ error) => {
+  one("headline").textContent = `This browser cannot run the kernels (${error.message}). Use a current version of Chromium, Firefox or Safari.`;
+});
