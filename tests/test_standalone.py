@@ -3,6 +3,8 @@
 import base64
 import gzip
 import re
+import runpy
+from pathlib import Path
 from urllib.parse import parse_qsl
 
 import numpy as np
@@ -155,6 +157,16 @@ def test_the_file_is_small_whole_and_refuses_what_it_cannot_hold(html, monkeypat
         InvalidOption, match=r"at most 20 kB compressed, but would have \d+ kB; choose fewer or shorter"
     ):
         standalone.build_page([])
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_a_build_without_the_page_needs_no_ziglang(wanted, monkeypatch):
+    monkeypatch.setenv("ROCKING_PAGE", str(int(wanted)))
+    libraries = runpy.run_path(str(Path(__file__).parents[1] / "compiling" / "libraries.py"))
+    assert libraries["_made"]()["page"] is wanted
+    monkeypatch.setitem(libraries["dependencies"].__globals__, "is_current", lambda: False)
+    assert (libraries["ZIG"] in libraries["dependencies"]()) is wanted
+    assert {*libraries["REQUIREMENTS"]} <= {*libraries["dependencies"]()}
 
 
 def test_the_command_writes_the_file(built, run, tmp_path):
@@ -345,7 +357,9 @@ def test_fields_show_and_send_every_digit(opened):
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844)], ids=["desk", "phone"])
+@pytest.mark.parametrize(
+    ("width", "height"), [pytest.param(1280, 800, marks=pytest.mark.thorough), (390, 844)], ids=["desk", "phone"]
+)
 def test_tours_point_at_what_is_on_the_screen(opened, width, height):
     page = opened("", width, height)
     page.page.click("[data-panel=tours]")
@@ -368,7 +382,9 @@ def test_tours_point_at_what_is_on_the_screen(opened, width, height):
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark"), (1920, "dark")])
+@pytest.mark.parametrize(
+    ("width", "scheme"), [(1280, "light"), (390, "dark"), pytest.param(1920, "dark", marks=pytest.mark.thorough)]
+)
 def test_no_panel_has_a_barrier(opened, width, scheme):
     page = opened(FALLING, width, 844, color_scheme=scheme, bypass_csp=True, reduced_motion="reduce")
     page.js(tool("axe-core/axe.min.js").read_text("utf-8") + "; 1")

@@ -5,8 +5,8 @@ import {DATA, GRAVITY} from "./kernels.js";
 import {isRecord} from "./case.js";
 import {short} from "../numbers.js";
 
-/** Pixels below the ground, and above the block. */
-const BELOW = 46, ABOVE = 26;
+/** Pixels below the ground at most, the share of the picture that they have at most, and pixels above the block. */
+const BELOW = 46, SHARE_BELOW = 0.18, ABOVE = 22;
 /** Radius of a handle, and of what a finger touches. */
 const HANDLE = 8, TOUCH = 24;
 /** Length of the arrow of a push of 1 g in block heights. */
@@ -20,7 +20,7 @@ export class Scene {
   /** @param {{change: (patch: Partial<import("./motions.js").Case>, rough?: boolean) => void, settle: () => void, release: () => void, readonly shown: any, readonly given: any, time: number, rewind: () => void}} page */
   constructor(page) {
     this.page = page;
-    this.width = this.floor = this.middle = 0;
+    this.width = this.floor = this.below = this.middle = 0;
     this.held = this.begin = false;
     /** @type {any} */
     this.state = null;
@@ -92,7 +92,8 @@ export class Scene {
     if (!width || !given) return;
     put(this.svg, {viewBox: `0 0 ${width} ${height}`}); // paper has another width
     this.width = width;
-    this.floor = height - BELOW;
+    this.below = Math.min(BELOW, SHARE_BELOW * height);
+    this.floor = height - this.below;
     if (!this.held || !this.scale) {
       const reach = Math.hypot(given.width, given.height);
       this.scale = Math.min((this.floor - ABOVE) / reach, width / (1.7 * given.height));
@@ -139,6 +140,7 @@ export class Scene {
   energy({rotation, velocity}) {
     const {p, alpha} = this.page.shown.body.sides[rotation >= 0 ? 0 : 1], barrier = 1 - Math.cos(alpha);
     const stored = (Math.cos(alpha - Math.abs(rotation)) - Math.cos(alpha)) / barrier, moving = (velocity * velocity) / (2 * p * p * barrier);
+    put(this.bars, {visibility: this.floor < 180 ? "hidden" : "visible"});
     const tall = Math.min(130, 0.4 * this.floor), x = this.width - 34, y = 34 + tall, unit = tall / 1.5, of = (/** @type {number} */ each) => Math.max(0, Math.min(1.5, each)) * unit;
     put(this.bars.firstChild, {x: x - 9, y: y - tall, width: 18, height: tall});
     put(this.stored, {x: x - 9, y: y - of(stored), width: 18, height: of(stored)});
@@ -164,11 +166,11 @@ export class Scene {
     for (let x = width / 2 - behind - Math.ceil((width / 2 - behind) / pixels) * pixels; x < width; x += pixels) path += `M${x.toFixed(1)} 0V${floor}`;
     for (let y = floor - pixels; y > 0; y -= pixels) path += `M0 ${y.toFixed(1)}H${width}`;
     put(this.grid, {d: path});
-    put(this.earth, {x: 0, y: floor, width, height: BELOW});
+    put(this.earth, {x: 0, y: floor, width, height: this.below});
     let hatch = `M0 ${floor}H${width}`;
     for (let x = (((middle % 18) + 18) % 18) - 18; x < width + 18; x += 18) hatch += `M${(x + 9).toFixed(1)} ${floor + 3}l-9 11`;
     put(this.hatch, {d: hatch});
-    put(this.scaleText, {x: width - 10, y: floor + 34});
-    this.scaleText.textContent = `grid ${short(step)} m`;
+    put(this.scaleText, {x: width - 10, y: floor + this.below - 7});
+    this.scaleText.textContent = this.below < 34 ? "" : `grid ${short(step)} m`;
   }
 }
