@@ -357,6 +357,26 @@ def test_fields_show_and_send_every_digit(opened):
 
 
 @pytest.mark.browser
+def test_the_keyboard_reaches_all_and_returns(opened):
+    page = opened(FALLING)
+    keys, on = page.page.keyboard, "document.activeElement.dataset.panel ?? document.activeElement.id"
+    keys.press("Tab")
+    assert page.js(on) == "numbers"
+    keys.press("Enter")
+    assert page.js(on) == "close" and page.page.locator("#numbers").is_visible()
+    keys.press("Tab")
+    assert page.js(on) == "motion"
+    keys.press("Escape")
+    assert page.js(on) == "numbers" and page.page.locator("#panel").is_hidden()
+    for name in ("map", "phase", "tours", "play", "time"):
+        keys.press("Tab")
+        assert page.js(on) == name
+    keys.press("End")
+    page.until("document.getElementById('clock').textContent === '2.78 s'", "the time line is at its end")
+    assert page.page.get_attribute("#time", "aria-valuetext") == "2.78 s"
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize(
     ("width", "height"), [pytest.param(1280, 800, marks=pytest.mark.thorough), (390, 844)], ids=["desk", "phone"]
 )

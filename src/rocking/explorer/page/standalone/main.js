@@ -44,8 +44,13 @@ class Page {
       one(id).addEventListener("click", () => { this.guess = guess; this.play(); });
     }
     one("time").addEventListener("input", () => this.seek(this.shown.picture.from + (Number(/** @type {HTMLInputElement} */ (one("time")).value) / 1000) * (this.shown.picture.until - this.shown.picture.from)));
-    for (const name of PANELS) document.querySelector(`[data-panel=${name}]`)?.addEventListener("click", () => this.open(this.panel === name ? null : name));
-    one("close").addEventListener("click", () => this.open(null));
+    for (const name of PANELS) {
+      document.querySelector(`[data-panel=${name}]`)?.addEventListener("click", (event) => {
+        this.open(this.panel === name ? null : name);
+        if (this.panel && /** @type {MouseEvent} */ (event).detail === 0) /** @type {HTMLElement} */ (one("close")).focus(); // a key has opened it
+      });
+    }
+    one("close").addEventListener("click", () => this.leave());
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("hashchange", () => { if (location.hash.slice(1) !== this.written) this.show(readCase(location.hash.slice(1))); });
     this.compute();
@@ -56,7 +61,7 @@ class Page {
   /** @param {KeyboardEvent} event */
   key(event) {
     if (event.target instanceof HTMLElement && event.target.closest("input, select, textarea, button, a, summary, canvas")) {
-      if (event.key === "Escape" && this.panel) { const name = this.panel; this.open(null); /** @type {any} */ (document.querySelector(`[data-panel=${name}]`)).focus(); }
+      if (event.key === "Escape" && this.panel) this.leave();
       return;
     }
     if (event.key === " ") { event.preventDefault(); this.toggle(); }
@@ -191,6 +196,13 @@ class Page {
   stop() {
     this.playing = false;
     one("play").textContent = "Play";
+  }
+
+  /** Close the panel; the keyboard returns to the button that opened it. */
+  leave() {
+    const button = /** @type {HTMLElement | null} */ (document.querySelector(`[data-panel=${this.panel}]`));
+    this.open(null);
+    button?.focus();
   }
 
   /** @param {string | null} name */
