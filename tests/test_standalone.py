@@ -13,7 +13,7 @@ from explorer_browser import Watched, launched, tool
 
 import rocking
 from rocking import pulses
-from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.errors import OptionError, RecordError
 from rocking.explorer import standalone
 from rocking.kernels import library, state
 from rocking.simulation.simulate import compute_response
@@ -150,12 +150,10 @@ def test_the_file_is_small_whole_and_refuses_what_it_cannot_hold(html, monkeypat
     assert len(gzip.compress(html.encode())) <= standalone.MAX_SIZE
     assert not re.search(r"/\*[A-Z]+\*/|^(?:import|export) ", html, re.MULTILINE)
     assert not re.search(r"""(?:src|href)=["'](?!data:)""", html)
-    with pytest.raises(UnreadableRecord, match="no shipped record is named 'nowhere'"):
+    with pytest.raises(RecordError, match="no shipped record is named 'nowhere'"):
         standalone.build_page(["nowhere"])
     monkeypatch.setattr(standalone, "MAX_SIZE", 20_000)
-    with pytest.raises(
-        InvalidOption, match=r"at most 20 kB compressed, but would have \d+ kB; choose fewer or shorter"
-    ):
+    with pytest.raises(OptionError, match=r"at most 20 kB compressed, but would have \d+ kB; choose fewer or shorter"):
         standalone.build_page([])
 
 
@@ -182,7 +180,7 @@ def test_the_command_writes_the_file(built, run, tmp_path):
 def test_without_webassembly_the_page_is_refused(monkeypatch):
     manifest = library.read_manifest() | {"page": None}
     monkeypatch.setattr(library, "read_manifest", lambda: manifest)
-    with pytest.raises(InvalidOption, match="no WebAssembly for the page, because ziglang was not available"):
+    with pytest.raises(OptionError, match="no WebAssembly for the page, because ziglang was not available"):
         standalone.build_page()
 
 

@@ -26,7 +26,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, VERSION
 from rocking.engine.schemes import Certified, VelocityThreshold
 from rocking.engine.tasks import BUDGET, BUDGET_PER_PIECE, SLICE, Setup
-from rocking.errors import InvalidOption, KernelsError
+from rocking.errors import KernelsError, OptionError
 from rocking.explorer.simulated import MAX_DRAWN_PERIOD
 from rocking.kernels import compiled, ground, library, state
 from rocking.motion.motion import Motion
@@ -55,7 +55,7 @@ def build_page(names: Sequence[str] = RECORDS) -> str:
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If a record is unknown, the page would be too large, or this installation has no WebAssembly.
     """
     html = _read("standalone/index.html")
@@ -70,7 +70,7 @@ def build_page(names: Sequence[str] = RECORDS) -> str:
     size = len(gzip.compress(page.encode()))
     if size > MAX_SIZE:
         limit = f"at most {MAX_SIZE // 1000} kB compressed, but would have {size // 1000} kB"
-        raise InvalidOption(f"the page must have {limit}; choose fewer or shorter {{}}", "records")
+        raise OptionError(f"the page must have {limit}; choose fewer or shorter {{}}", "records")
     return page
 
 
@@ -118,7 +118,7 @@ def _bundle(path: str, seen: list[str]) -> tuple[str, list[str]]:
 def _read_webassembly() -> bytes:
     entry = library.read_manifest().get("page")
     if not entry:
-        raise InvalidOption(
+        raise OptionError(
             "this installation of rocking has no WebAssembly for the page, because ziglang was not available when it "
             "was built; install rocking again where ziglang can be installed, and without ROCKING_PAGE=0"
         )
