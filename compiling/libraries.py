@@ -23,7 +23,7 @@ import sys
 import sysconfig
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +34,21 @@ OUT = KERNELS / "built"
 #: The compiler, and packages that the kernels' sources import: exactly, since constraints do not reach isolated builds.
 REQUIREMENTS = ["numba==0.68.1", "llvmlite==0.50.0", "numpy==2.4.6", "lazy-loader==0.6"]
 
-#: The linker where there is no C compiler.
+#: The linker of WebAssembly with its C library, and of libraries where there is no C compiler.
 ZIG = "ziglang==0.17.0"
 
+#: Kernels in the WebAssembly of the standalone page, and functions of the C library that the page calls.
+PAGE_KERNELS = ("march.march", "trace.trace", "ground.write_pieces")
+PAGE_FUNCTIONS = ("sin", "cos", "tan", "atan2", "hypot")
+
 MACHINE = {"amd64": "x86_64", "aarch64": "arm64"}.get(platform.machine().lower(), platform.machine().lower())
+
+#: Whether the page's WebAssembly is wanted, as it is by default wherever ziglang can be installed.
+PAGE = (
+    os.environ.get("ROCKING_PAGE") != "0"
+    and MACHINE in ("x86_64", "arm64")
+    and sys.platform in ("linux", "darwin", "win32")
+)
 
 #: Levels of the processor as LLVM names them, the one that every machine has first.
 LEVELS = {"x86_64": ["x86-64", "x86-64-v3", "x86-64-v4"]}.get(MACHINE, ["generic"])
@@ -64,8 +75,7 @@ def dependencies() -> list[str]:
     """List the packages that the build needs besides hatchling: none where the libraries are current."""
     if is_current():
         return []
-    zig = not _c_compiler() and MACHINE in ("x86_64", "arm64") and sys.platform in ("linux", "darwin", "win32")
-    return [*REQUIREMENTS, *([ZIG] if zig else [])]
+    return [*REQUIREMENTS, *([ZIG] if PAGE else [])]
 
 
 def build() -> list[Path]:
@@ -82,7 +92,7 @@ def build() -> list[Path]:
         manifest = json.loads((OUT / "manifest.json").read_text("utf-8"))
         if manifest["text"] != sources("hash_text"):  # comments have changed, and nothing else
             _put_manifest(manifest | {"text": sources("hash_text")})
-    return [OUT / "manifest.json", *(OUT / each["file"] for each in manifest["libraries"])]
+    return [OUT / "manifest.json", *(OUT / each["file"] for each in _files(manifest))]
 
 
 @contextlib.contextmanager
@@ -102,21 +112,31 @@ def is_current() -> bool:
     """Whether the libraries are there, whole, for this platform, and made from these sources by this script."""
     try:
         manifest = json.loads((OUT / "manifest.json").read_text("utf-8"))
-        libraries = manifest["libraries"]
         return bool(
             manifest["made"] == _made()
-            and len(libraries) >= (len(LEVELS) if EVERY_LEVEL else 1)
-            and all(_digest(OUT / each["file"]) == each["sha256"] for each in libraries)
+            and len(manifest["libraries"]) >= (len(LEVELS) if EVERY_LEVEL else 1)
+            and all(_digest(OUT / each["file"]) == each["sha256"] for each in _files(manifest))
         )
     except (OSError, ValueError, LookupError, TypeError):
         return False
+
+
+def _files(manifest: dict[str, Any]) -> list[dict[str, Any]]:
+    """List the libraries of a manifest, and the page's WebAssembly where it was made."""
+    return [*manifest["libraries"], *filter(None, [manifest["page"]])]
 
 
 def _made() -> dict[str, Any]:
     """Describe what libraries are made from and for."""
     scripts = [_digest(path) for path in sorted(Path(__file__).parent.glob("*.py"))]
     code = sources("hash_code")
-    return {"code": code, "scripts": scripts, "compiler": REQUIREMENTS[0], "platform": sysconfig.get_platform()}
+    return {
+        "code": code,
+        "scripts": scripts,
+        "compiler": REQUIREMENTS[0],
+        "platform": sysconfig.get_platform(),
+        "page": PAGE,
+    }
 
 
 def sources(kind: str) -> str:
@@ -131,14 +151,26 @@ def _digest(path: Path) -> str:
 def _make(folder: Path) -> None:
     """Make libraries and manifest in a folder, and move them to their place."""
     linker, made, text = _linker(), _made(), sources("hash_text")
+    zig = _zig() if PAGE else []
+    if PAGE and not zig:
+        print("ziglang was not found: without it there is no standalone page, and all else works", file=sys.stderr)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(lambda step: _run(folder, *step), [("lower", "0"), ("lower", "1"), ("level", "-")]))
+        steps = [("lower", "0"), ("lower", "1"), ("level", "-")]
+        lowered: list[Future[Any]] = [pool.submit(_run, folder, *step) for step in steps]
+        prepared: list[Future[Any]] = [pool.submit(_link_page, folder, zig)] if zig else []  # compiles the C library
+        for each in lowered:
+            each.result()
         levels = LEVELS if EVERY_LEVEL else [*dict.fromkeys([LEVELS[0], (folder / "level").read_text("utf-8")])]
-        list(pool.map(lambda level: _run(folder, "optimise", level), levels))
+        optimised: list[Future[Any]] = [pool.submit(_run, folder, "optimise", level) for level in levels]
+        prepared += [pool.submit(_run, folder, "page", "-")] if zig else []
+        for each in [*optimised, *prepared]:
+            each.result()
     libraries = [_linked(folder, level, linker) for level in levels]
+    page = _placed(_link_page(folder, zig, folder / "page.o"), "page") if zig else None
     kernels = {name: kernel for part in folder.glob("*.json") for name, kernel in json.loads(part.read_text()).items()}
-    _put_manifest({"made": made, "text": text, "libraries": libraries, "kernels": kernels})
-    for old in {*OUT.glob("kernels-*")} - {OUT / each["file"] for each in libraries}:
+    manifest = {"made": made, "text": text, "libraries": libraries, "kernels": kernels, "page": page}
+    _put_manifest(manifest)
+    for old in {*OUT.glob("kernels-*"), *OUT.glob("page-*")} - {OUT / each["file"] for each in _files(manifest)}:
         with contextlib.suppress(OSError):  # Windows keeps a library that a process has opened
             old.unlink()
 
@@ -148,10 +180,32 @@ def _linked(folder: Path, level: str, linker: tuple[list[str], list[str]]) -> di
     command, needed = linker
     path = folder / f"{level}{SUFFIX}"
     subprocess.run([*command, "-o", str(path), str(folder / f"{level}.o"), *needed], check=True)
+    return {"level": LEVELS.index(level), **_placed(path, f"kernels-{level}")}
+
+
+def _placed(path: Path, name: str) -> dict[str, Any]:
+    """Move a file to its place, under a name of its own, and describe it."""
     sha256 = _digest(path)
-    file = f"kernels-{level}-{sha256[:8]}{SUFFIX}"
+    file = f"{name}-{sha256[:8]}{path.suffix}"
     path.replace(OUT / file)
-    return {"file": file, "level": LEVELS.index(level), "sha256": sha256}
+    return {"file": file, "sha256": sha256}
+
+
+def _link_page(folder: Path, zig: list[str], code: Path | None = None) -> Path:
+    """Link the page's WebAssembly with zig's C library, so that it imports nothing; without code only that library.
+
+    All its results are the same on every machine, because its arithmetic is that of IEEE, without fused operations.
+    """
+    kernels = [f"rocking_{name.replace('.', '_')}" for name in PAGE_KERNELS] if code else []
+    if code is None:
+        code = folder / "nothing.c"
+        code.write_text("int nothing;\n")
+    exports = [f"--export={name}" for name in (*kernels, *PAGE_FUNCTIONS, "__heap_base")]
+    options = [f"-Wl,{each}" for each in ("--no-entry", "--export-memory", *exports)]
+    command = [*zig, "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", "-O2", "-s", *options]
+    path = code.with_suffix(".wasm")
+    subprocess.run([*command, str(code), "-lm", "-o", str(path)], check=True)
+    return path
 
 
 def _put_manifest(manifest: dict[str, Any]) -> None:
@@ -181,9 +235,14 @@ def _c_compiler() -> list[str]:
     return next((each for each in candidates if shutil.which(each[0])), [])
 
 
+def _zig() -> list[str]:
+    """Find ziglang."""
+    return [] if importlib.util.find_spec("ziglang") is None else [sys.executable, "-m", "ziglang"]
+
+
 def _linker() -> tuple[list[str], list[str]]:
     """Return the command that links a library, without its files, and the libraries that it needs."""
-    zig = [] if importlib.util.find_spec("ziglang") is None else [sys.executable, "-m", "ziglang"]
+    zig = _zig()
     gnu = platform.libc_ver()[0] == "glibc"
     if compiler := _c_compiler():
         strip = ["-Wl,--strip-all", "-Wl,-z,noexecstack"] if sys.platform == "linux" else []

@@ -3,6 +3,7 @@
 python lowering.py lower FOLDER SHARE      # a share of the kernels, 0 or 1, not optimised yet
 python lowering.py level FOLDER -          # the name of the highest level of this processor
 python lowering.py optimise FOLDER LEVEL   # machine code of all kernels for a level of the processor
+python lowering.py page FOLDER -           # WebAssembly of the kernels of the standalone page
 
 A function around each kernel unpacks arguments from the eight bytes each that `rocking.kernels.library` packs.
 
@@ -28,7 +29,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 import numba.np.numpy_support as support
-from libraries import LEVELS, MACHINE
+from libraries import LEVELS, MACHINE, PAGE_KERNELS
 from numba import types
 from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import AOTCPUCodegen, CodeLibrary, JITCodeLibrary
@@ -317,16 +318,45 @@ def optimise(folder: Path, level: str) -> None:
     (folder / f"{level}.o").write_bytes(object_of("\n".join([made.get_llvm_str(), *around, level_function()]), machine))
 
 
-def object_of(text: str, machine: llvm.TargetMachine) -> bytes:
-    """Machine code of the functions whose names begin with rocking_, with what they call and nothing else."""
-    module = llvm.parse_assembly(text)
+def page(folder: Path, _: str) -> None:
+    """Write WebAssembly of the kernels of the standalone page: of the same code, with addresses of four bytes."""
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = llvm.Target.from_triple("wasm32-unknown-unknown")
+    machine = target.create_target_machine(cpu="generic", features="", opt=3, reloc="static", codemodel="default")
+
+    def for_target(text: str) -> str:
+        layout = re.sub(r"^(target datalayout = ).*$", rf'\1"{machine.target_data}"', text, flags=re.MULTILINE)
+        return re.sub(r"^(target triple = ).*$", r'\1"wasm32-unknown-unknown"', layout, flags=re.MULTILINE)
+
+    linked = llvm.parse_assembly("")
+    for share in sorted(folder.glob("*.ll")):
+        linked.link_in(llvm.parse_assembly(for_target(share.read_text("utf-8"))))
+    around = [share.read_text("utf-8") for share in sorted(folder.glob("*.around"))]
+    module = llvm.parse_assembly("\n".join([for_target(str(linked)), *around]))
+    keep_only(module, {f"rocking_{name.replace('.', '_')}" for name in PAGE_KERNELS}, machine)
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = options.slp_vectorization = False
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    (folder / "page.o").write_bytes(machine.emit_object(module))
+
+
+def keep_only(module: llvm.ModuleRef, names: set[str], machine: llvm.TargetMachine) -> None:
+    """Remove whatever these functions do not call."""
     for each in [*module.functions, *module.global_variables]:
-        if not (each.is_declaration or each.name.startswith("rocking_") or each.linkage == llvm.Linkage.private):
+        if not (each.is_declaration or each.name in names or each.linkage == llvm.Linkage.private):
             each.linkage = llvm.Linkage.internal
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
     passes.run(module, builder)
+
+
+def object_of(text: str, machine: llvm.TargetMachine) -> bytes:
+    """Machine code of the functions whose names begin with rocking_, with what they call and nothing else."""
+    module = llvm.parse_assembly(text)
+    keep_only(module, {each.name for each in module.functions if each.name.startswith("rocking_")}, machine)
     # A function of the C library has its own name, or one that LLVM knows: llvm.exp.f32 calls expf.
     declared = {each.name for each in module.functions if each.is_declaration}
     known = (re.fullmatch(r"llvm\.(\w+)\.f(32|64)", name) for name in declared)
@@ -363,4 +393,4 @@ if __name__ == "__main__":
     llvm.initialize_native_asmprinter()
     llvm.initialize_native_asmparser()
     step, folder, argument = sys.argv[1:]
-    {"lower": lower, "optimise": optimise, "level": level}[step](Path(folder), argument)
+    {"lower": lower, "optimise": optimise, "level": level, "page": page}[step](Path(folder), argument)

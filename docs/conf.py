@@ -12,6 +12,8 @@ from pathlib import Path
 import sphinx.ext.autosummary
 from sphinx_gallery.sorting import ExplicitOrder
 
+from rocking.explorer.standalone import build_page
+
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 
 project = "rocking"
@@ -189,8 +191,16 @@ def lead_within(_app, _path, _page, content):
     content[0] = content[0].replace("](docs/", "](/")
 
 
+def write_page(app, error):
+    """Write the standalone page, which other pages embed."""
+    if error is None and app.builder.format == "html":
+        path = Path(app.outdir) / "_static" / "block.html"
+        path.write_text(build_page(), "utf-8")
+
+
 def setup(app):
     """Register what this file adds to Sphinx."""
+    app.connect("build-finished", write_page)
     app.connect("include-read", lead_within)
     # After numpydoc, which reads the docstring at the default priority.
     app.connect("autodoc-process-docstring", escape_bars, priority=900)

@@ -236,7 +236,8 @@ def test_a_wheel_holds_the_kernels_and_an_editable_installation_finds_them_in_th
     hook = hooks["KernelsHook"]()
     hook.root, hook.target_name = str(ROOT), "wheel"
     manifest = json.loads((ROOT / "src/rocking/kernels/built/manifest.json").read_text("utf-8"))
-    names = ["manifest.json", *(each["file"] for each in manifest["libraries"])]
+    made = [*manifest["libraries"], *filter(None, [manifest["page"]])]
+    names = ["manifest.json", *(each["file"] for each in made)]
     for version, expected in (("editable", []), ("standard", [f"rocking/kernels/built/{name}" for name in names])):
         hook.initialize(version, build := {"force_include": {}})
         assert [*build["force_include"].values()] == expected

@@ -2062,7 +2062,7 @@ def test_the_modules_pass_the_type_checker():
         "--lib es2023,dom,dom.iterable"
     )
     found = subprocess.run(
-        ["node", compiler, *options.split(), *sorted(folder.glob("*.js"))], capture_output=True, text=True
+        ["node", compiler, *options.split(), *sorted(folder.rglob("*.js"))], capture_output=True, text=True
     )
     assert found.returncode == 0, found.stdout
 

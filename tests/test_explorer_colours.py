@@ -10,7 +10,7 @@ import rocking.explorer
 from rocking.explorer.payload import load_english_texts
 
 PAGE = Path(rocking.explorer.__file__).parent / "page"
-STYLE = (PAGE / "style.css").read_text("utf-8")
+STYLE = (PAGE / "colours.css").read_text("utf-8")
 OUTCOMES = (PAGE / "outcomes.js").read_text("utf-8")
 HEX = re.compile(r"#[0-9a-fA-F]{6}\b")
 

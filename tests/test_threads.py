@@ -31,6 +31,17 @@ def test_of_several_errors_that_of_the_first_item_is_raised(threads):
         next(found)
 
 
+def test_a_system_without_threads_does_the_work_itself(monkeypatch):
+    def refused(self):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", refused)
+    with set_options(threads=4):
+        assert [*map_in_threads(lambda each: -each, range(100))] == [-each for each in range(100)]
+        assert [*map_in_threads(lambda each: -each, iter([3]))] == [-3]
+        assert [*map_in_threads(lambda each: -each, [])] == []
+
+
 def test_items_are_taken_a_few_ahead_of_the_results():
     taken = []
     items = (taken.append(each) or each for each in itertools.count())

@@ -49,6 +49,7 @@ COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "chatter": ("chatter", "1.05", "0.7", "0.8", "--out", "OUT"),
     "critical": ("critical", "0.7", "0.8", "--out", "OUT"),
     "mesh": ("mesh", "statue", "--azimuth", "0,90", "--out", "OUT"),
+    "page": ("page", "--out", "OUT/block.html"),
     "study new": ("study", "new", "OUT/study.toml"),
     "study create": ("study", "create", "study.toml", "OUT"),
     "study export": ("study", "export", "STUDY", "OUT/study.csv"),
@@ -59,7 +60,7 @@ COMMANDS: Final[dict[str, tuple[str, ...]]] = {
 LONG: Final = tuple(
     name
     for name in COMMANDS
-    if name not in ("check", "chatter", "critical", "study new", "study create", "study export")
+    if name not in ("check", "chatter", "critical", "page", "study new", "study create", "study export")
 )
 
 #: Commands that only print.

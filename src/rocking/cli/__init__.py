@@ -40,6 +40,7 @@ for _module, _commands in {
     "calibrate": ("calibrate", "validate"),
     "mesh": ("mesh",),
     "explore": ("explore",),
+    "page": ("page",),
 }.items():
     _lines = _read_help_lines(_module)
     for _command in _commands:

@@ -114,7 +114,12 @@ def map_in_threads(
     try:
         while True:
             for item in itertools.islice(remaining, LOOKAHEAD * count - len(pending)):
-                pending.append(pool.submit(function, item))
+                try:
+                    pending.append(pool.submit(function, item))
+                except RuntimeError as error:
+                    if pending or "start new thread" not in str(error):
+                        raise
+                    yield from map(function, itertools.chain([item], remaining))  # a system without threads
             if not pending:
                 return
             yield pending.popleft().result()

@@ -45,7 +45,7 @@ OUTCOME = np.dtype(
 
 #: Step budget of a simulation, besides a few steps for every piece of its motion.
 BUDGET: Final = 3_000_000
-_BUDGET_PER_PIECE: Final = 4
+BUDGET_PER_PIECE: Final = 4
 
 #: Steps per call of a kernel, for one body and for each of many: milliseconds until an interrupt.
 SLICE: Final = 50_000
@@ -212,7 +212,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
         members = np.flatnonzero(np.isin(motion, group.indices))
         index = np.searchsorted(group.indices, motion[members])
         batch = _Batch(group.grounds, index, factors[members], records[members], states[members])
-        batch.states["budget"] = _FIRST_SLICE + _BUDGET_PER_PIECE * np.diff(group.grounds.first_pieces)[index]
+        batch.states["budget"] = _FIRST_SLICE + BUDGET_PER_PIECE * np.diff(group.grounds.first_pieces)[index]
         for part, substeps in _split_batch(batch, group.steps, setup.model):
             if cancelled is not None and cancelled.is_set():
                 break
@@ -311,7 +311,7 @@ def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event 
 
 def count_slices(ground: Ground) -> int:
     """Return the number of slices in the budget of a simulation."""
-    return math.ceil((BUDGET + _BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
+    return math.ceil((BUDGET + BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
 
 
 def detect_complete_chattering(

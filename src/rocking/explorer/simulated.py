@@ -36,7 +36,7 @@ _MAX_MARKS: Final = 2_000
 _REFINED: Final = Certified(1e-40)
 
 #: Longest drawn period of ground motion, s, for records whose baseline would drift.
-_MAX_DRAWN_PERIOD: Final = 10.0
+MAX_DRAWN_PERIOD: Final = 10.0
 
 #: Properties of a response that the page shows unchanged.
 _RESPONSE_PROPERTIES: Final = ("duration", "overturned", "overturn_time", "peak_rotation", "peak_time", "time_at_rest")
@@ -72,7 +72,7 @@ class SimulatedCase:
         if self.case.motion is None:
             return None
         motion = self.case.motion.with_vertical(None)
-        return motion.processed(baseline=1, band_pass=(1.0 / _MAX_DRAWN_PERIOD, None)) if has_drift(motion) else motion
+        return motion.processed(baseline=1, band_pass=(1.0 / MAX_DRAWN_PERIOD, None)) if has_drift(motion) else motion
 
 
 def find_unresolved(response: Response, start: float, end: float) -> list[float]:
@@ -86,7 +86,7 @@ def find_unresolved(response: Response, start: float, end: float) -> list[float]
 
 def has_drift(motion: Motion) -> bool:
     """Whether a motion has the displacement of a record, which can be filtered."""
-    long_enough = motion.dt is not None and motion.duration > 2.0 * _MAX_DRAWN_PERIOD > 20.0 * motion.dt
+    long_enough = motion.dt is not None and motion.duration > 2.0 * MAX_DRAWN_PERIOD > 20.0 * motion.dt
     return long_enough and motion.coefficients.shape[1] == 2 and not motion.jumps
 
 

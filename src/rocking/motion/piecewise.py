@@ -248,7 +248,7 @@ def compute_peak_magnitude(widths: Floats, coefficients: Floats) -> float:
 def sine_cosine_from_quarters(quarters: Floats, rest: Floats) -> tuple[Floats, Floats]:
     """Compute sine and cosine of quarter turns plus the rest of an angle, rad."""
     sine, cosine = np.sin(rest), np.cos(rest)
-    quadrant = np.mod(quarters, 4.0).astype(np.int64)
+    quadrant = np.mod(quarters, 4.0).astype(np.intp)
     return np.choose(quadrant, [sine, cosine, -sine, -cosine]), np.choose(quadrant, [cosine, -sine, -cosine, sine])
 
 

@@ -364,7 +364,7 @@ def _compute_floor_motion(
         message = f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s"
         raise MotionError(f"{message}; use a longer one, or a shorter {{}}", "period", "ringing", value=period)
     nodes = np.append(motion.breakpoints, end + tail) if tail > 0.0 else motion.breakpoints
-    subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / step)).astype(np.int64)
+    subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / step)).astype(np.intp)
     start, width = np.repeat(nodes[:-1], subdivisions), np.repeat(np.diff(nodes) / subdivisions, subdivisions)
     index = np.arange(subdivisions.sum()) - np.repeat(np.cumsum(subdivisions) - subdivisions, subdivisions)
     breakpoints = np.append(start + index * width, nodes[-1])

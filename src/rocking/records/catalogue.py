@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from rocking.core import checks
+from rocking.core.arrays import Integers
 from rocking.errors import RecordError
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
@@ -171,9 +172,7 @@ def load(name: str) -> Motion:
     319.31 s, 0.344 g
     """
     record = info(name)
-    with (_DATA_FOLDER / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        differences = archive[record.direction].astype(np.int64)
-    published = np.cumsum(np.cumsum(differences)) / record.denominator
+    published = np.cumsum(np.cumsum(read_differences(record))) / record.denominator
     facts = (record.event, record.station, f"direction {record.direction}", record.state, record.source)
     text = f"{'; '.join(facts)}; terms: {record.terms}"
     origin_fields: dict[str, Any] = {
@@ -186,6 +185,13 @@ def load(name: str) -> Motion:
     description = Description("record", text=text, origin=Origin(azimuth=azimuth, **origin_fields))
     samples = choose_unit(record.units).to_si(published)
     return Motion.from_samples(samples, record.dt, name=name, description=description)
+
+
+def read_differences(record: Record) -> Integers:
+    """Read the second differences of the published integers of a record."""
+    with (_DATA_FOLDER / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        differences: Integers = archive[record.direction].astype(np.int64)
+    return differences
 
 
 def _read_catalogue() -> dict[str, dict[str, Any]]:

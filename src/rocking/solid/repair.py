@@ -137,7 +137,7 @@ def _find_open_edges(faces: Integers) -> Integers:
     undirected, edge_index = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
     net = np.bincount(edge_index.reshape(-1), weights=np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0)).astype(np.int64)
     closing = np.where(net[:, None] > 0, undirected[:, ::-1], undirected)
-    return np.repeat(closing, np.abs(net), axis=0)
+    return np.repeat(closing, np.abs(net).astype(np.intp), axis=0)
 
 
 def fill_holes(surface: Surface) -> Surface:

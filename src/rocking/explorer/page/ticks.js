@@ -6,7 +6,7 @@ import {fixed, power} from "./numbers.js";
 const SMALLEST = -5, LARGEST = 6;
 
 /** Decimals that tell these numbers apart and write each as it is. @param {ArrayLike<number>} values */
-function decimals(values) {
+function digitsOf(values) {
   const all = Array.from(values), size = all.reduce((most, each) => Math.max(most, Math.abs(each)), 0);
   const step = all.reduce((least, each, k) => (k ? Math.min(least, Math.abs(each - all[k - 1])) : least), Infinity);
   const close = 1e-4 * (Number.isFinite(step) && step > 0 ? step : size);
@@ -21,7 +21,7 @@ export function written(values) {
   const exponent = size > 0 ? Math.floor(Math.log10(size) + 1e-9) : 0;
   const raised = exponent < SMALLEST || exponent >= LARGEST;
   const scaled = raised ? all.map((each) => Number((each / 10 ** exponent).toPrecision(12))) : all;
-  const count = decimals(scaled);
+  const count = digitsOf(scaled);
   return scaled.map((each) => {
     const text = fixed(each, count);
     return Number(each.toFixed(count)) === 0 ? "0" : raised ? `${text}${power(exponent)}` : text;

@@ -1,0 +1,36 @@
+"""`rocking page`: the standalone page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from rocking.cli.output import OUTPUT, QuietOptions
+from rocking.core.tables import write_text
+
+
+def page(
+    *,
+    out: Path = Path("block.html"),
+    records: str | None = None,
+    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+) -> None:
+    """Write a page with a rocking block that needs no server and no installation: one HTML file.
+
+    The file contains the compiled kernels and some of the shipped records. It works in any current browser, offline,
+    also on a phone. A case is part of the address, so that a link opens it.
+
+    Parameters
+    ----------
+    out
+        File to write.
+    records
+        Names of the shipped records in the page, separated by commas, by default el-centro-meloland-270 and
+        ridgecrest-clc-090.
+    """
+    from rocking.explorer.standalone import RECORDS, build_page
+
+    names = RECORDS if records is None else [name.strip() for name in records.split(",") if name.strip()]
+    text = build_page(names)
+    write_text(out, text)
+    print(f"written to {out}: {len(text.encode()) // 1000} kB; open it in a browser")

@@ -1,0 +1,202 @@
+"""Standalone page: one HTML file with the kernels as WebAssembly and some records, without a server.
+
+The page consists of modules in `page/standalone` and of modules that it shares with the explorer. All numbers of the
+computation come from the package when the file is written: layouts of records, codes, settings, pulses, gravity.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import math
+import re
+from collections.abc import Sequence
+from enum import IntEnum
+from importlib import resources
+from itertools import product
+from pathlib import PurePosixPath
+from typing import Any, Final
+
+import numpy as np
+
+from rocking import pulses
+from rocking.block import Block
+from rocking.core.arrays import Floats
+from rocking.core.constants import MODELS, STANDARD_GRAVITY, VERSION
+from rocking.engine.schemes import Certified, VelocityThreshold
+from rocking.engine.tasks import BUDGET, BUDGET_PER_PIECE, SLICE, Setup
+from rocking.errors import KernelsError, OptionError
+from rocking.explorer.simulated import MAX_DRAWN_PERIOD
+from rocking.kernels import compiled, ground, library, state
+from rocking.motion.motion import Motion
+from rocking.records.catalogue import info, load, read_differences
+from rocking.records.units import choose_unit
+
+#: Records in the page by default: a near-fault pulse, and the long record of the tutorials.
+RECORDS: Final = ("el-centro-meloland-270", "ridgecrest-clc-090")
+
+#: Pulses in the page by name, besides sines of several cycles.
+PULSES: Final = ("one-sine", "one-cosine", "half-sine", "rectangular", "triangular", "ricker")
+
+#: Largest size of the compressed file, bytes.
+MAX_SIZE: Final = 600_000
+
+#: Sampling step, s, and unit, m, of the displacement of a record, which is only drawn.
+_DRAWN_STEP: Final = 0.04
+_DRAWN_UNIT: Final = 1e-4
+
+_KERNELS: Final = {"march": "march.march", "trace": "trace.trace", "write_pieces": "ground.write_pieces"}
+_IMPORT: Final = re.compile(r'^import \{[^}]*\} from "([^"]+)";\n', re.MULTILINE)
+
+
+def build_page(names: Sequence[str] = RECORDS) -> str:
+    """Create the page with these shipped records as HTML text.
+
+    Raises
+    ------
+    OptionError
+        If a record is unknown, the page would be too large, or this installation has no WebAssembly.
+    """
+    html = _read("standalone/index.html")
+    core, seen = _bundle("standalone/jobs.js", [])
+    parts = {
+        "STYLE": _read("colours.css") + _read("standalone/style.css"),
+        "DATA": json.dumps(describe_computation(names), separators=(",", ":")),
+        "CORE": core,
+        "APP": _bundle("standalone/main.js", seen)[0],
+    }
+    page = re.sub(r"/\*(STYLE|DATA|CORE|APP)\*/", lambda match: parts[match[1]], html)
+    size = len(gzip.compress(page.encode()))
+    if size > MAX_SIZE:
+        limit = f"at most {MAX_SIZE // 1000} kB compressed, but would have {size // 1000} kB"
+        raise OptionError(f"the page must have {limit}; choose fewer or shorter {{}}", "records")
+    return page
+
+
+def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
+    """Describe kernels, records and motions for the modules of the page."""
+    sample = ground.build_ground(np.zeros(1), np.zeros((0, 2)), 1.0 / STANDARD_GRAVITY, 0.0)
+    return {
+        "version": VERSION,
+        "fingerprint": compiled.fingerprint(),
+        "gravity": STANDARD_GRAVITY,
+        "wasm": base64.b64encode(_read_webassembly()).decode(),
+        "calls": {name: _describe_call(kernel) for name, kernel in _KERNELS.items()},
+        "layouts": {
+            name: _describe_layout(kind)
+            for name, kind in (
+                ("block", state.BLOCK), ("settings", state.SETTINGS), ("state", state.STATE),
+                ("table", state.TABLE), ("scratch", state.SCRATCH), ("node", state.NODE_ROW),
+            )
+        },
+        "templates": _build_templates(),
+        "endings": _list_codes(state.Ending),
+        "events": _list_codes(state.EventKind),
+        "ground": {"first": sample.first, "stretch": ground.STRETCH, "unit": sample.unit},
+        "budget": {"slice": SLICE, "total": BUDGET, "per_piece": BUDGET_PER_PIECE},
+        "pulses": {name: _describe_pulse(getattr(pulses, name.replace("-", "_"))(1.0, 1.0)) for name in PULSES},
+        "records": {name: _describe_record(name) for name in names},
+    }  # fmt: skip
+
+
+def _read(path: str) -> str:
+    return (resources.files("rocking.explorer") / "page" / path).read_text("utf-8")
+
+
+def _bundle(path: str, seen: list[str]) -> tuple[str, list[str]]:
+    """Join a module and all that it imports into one script, without the modules already seen."""
+    text, parts = _read(path), []
+    for name in _IMPORT.findall(text):
+        imported = str(PurePosixPath(path).parent / name).replace("standalone/../", "").replace("/./", "/")
+        if imported not in seen:
+            part, seen = _bundle(imported, [*seen, imported])
+            parts.append(part)
+    return "".join([*parts, re.sub(r"^export ", "", _IMPORT.sub("", text), flags=re.MULTILINE)]), [*seen, path]
+
+
+def _read_webassembly() -> bytes:
+    entry = library.read_manifest().get("page")
+    if not entry:
+        raise OptionError(
+            "this installation of rocking has no WebAssembly for the page, because ziglang was not available when it "
+            "was built; install rocking again where ziglang can be installed, and without ROCKING_PAGE=0"
+        )
+    try:
+        return (library.FOLDER / str(entry["file"])).read_bytes()
+    except OSError as error:
+        raise KernelsError(f"the WebAssembly of the page cannot be read ({error}); install rocking again") from error
+
+
+def _describe_call(kernel: str) -> dict[str, str]:
+    """Return the symbol of a kernel, and the format of each of its packed arguments: q (integer, address) or d."""
+    entry = library.read_manifest()["kernels"][kernel]
+    return {"symbol": entry["symbol"], "slots": "".join(map(library._struct_format, entry["arguments"]))}
+
+
+def _describe_layout(kind: np.dtype[np.void], prefix: str = "", start: int = 0) -> dict[str, Any]:
+    """Return the size of a record, and offset, type and length of each field by name."""
+    fields: dict[str, Any] = {}
+    for name, (field, offset, *_) in (kind.fields or {}).items():
+        base, shape = field.subdtype or (field, ())
+        if base.names:
+            fields |= _describe_layout(base, f"{prefix}{name}.", start + offset)["fields"]
+        else:
+            fields[prefix + name] = [start + offset, base.str[1:], math.prod(shape)]
+    return {"size": kind.itemsize, "fields": fields}
+
+
+def _build_templates() -> dict[str, str]:
+    """Return the bytes of records as the package prepares them, for the page to change: hexadecimal."""
+    templates = {"state": _write_bytes(state.new_states(1, 0))}
+    for model, scheme, is_recorded in product(MODELS, (Certified(), VelocityThreshold(1.0)), (False, True)):
+        run = Setup(Block(width=0.4, height=2.0).as_bodies(), model, scheme).prepare(None, record=is_recorded)
+        key = f"{model} {scheme.name}"
+        templates[f"settings {key} {'record' if is_recorded else 'state'}"] = _write_bytes(run.settings)
+        templates[f"block {key}"] = _write_bytes(run.records)
+    return templates
+
+
+def _write_bytes(record: state.Record) -> str:
+    """Write the bytes of a record, with zeros between its fields."""
+    copied = np.zeros(1, record.dtype)
+    for name in record.dtype.names:
+        copied[name] = record[name]
+    return copied.tobytes().hex()
+
+
+def _list_codes(kind: type[IntEnum]) -> dict[str, int]:
+    return {code.name: code.value for code in kind}
+
+
+def _describe_pulse(motion: Motion) -> dict[str, Any]:
+    """Return the pieces of a pulse of unit amplitude whose frequency is 1 Hz, or whose duration is 1 s."""
+    return {
+        "by": "frequency" if "frequency" in motion.description.parameters else "duration",
+        "breaks": motion.breakpoints.tolist(),
+        "rows": motion.coefficients.tolist(),
+        "error": motion.error,
+    }
+
+
+def _describe_record(name: str) -> dict[str, Any]:
+    """Return a shipped record: second differences of its integers, and the displacement to draw without its drift."""
+    record, motion = info(name), load(name)
+    unit = choose_unit(record.units)
+    drawn = motion.processed(baseline=1, band_pass=(1.0 / MAX_DRAWN_PERIOD, None))
+    displacement = drawn.displacement(np.arange(0.0, motion.duration, _DRAWN_STEP)) / _DRAWN_UNIT
+    return {
+        "title": record.title,
+        "step": record.dt,
+        "differences": read_differences(record).tolist(),
+        "denominator": record.denominator,
+        "multiplier": unit.multiplier,
+        "divisor": unit.divisor,
+        "pga": motion.pga,
+        "drawn": {"step": _DRAWN_STEP, "unit": _DRAWN_UNIT, "differences": _differences(displacement)},
+    }
+
+
+def _differences(values: Floats) -> list[int]:
+    numbers: list[int] = np.diff(np.rint(values).astype(np.int64), prepend=0).tolist()
+    return numbers
