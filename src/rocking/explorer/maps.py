@@ -132,7 +132,7 @@ def simulate_grid(grid: MapGrid) -> Generator[MapPart]:
     setup = Setup(blocks, grid.case.model, Certified())
     exceedances: dict[tuple[tuple[float, float], float], float | None] = {}
     for task, results in simulate_tasks(setup, _list_tasks(grid, factors)):
-        indices, stride = task.bodies, task.key[0]
+        indices, stride = task.bodies, task.key
         assert isinstance(indices, np.ndarray) and isinstance(stride, int)
         alpha = blocks.alpha[indices]
         conditions = np.column_stack([_compute_uplift_thresholds(alpha, grid), factors[indices]])
