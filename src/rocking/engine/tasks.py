@@ -76,24 +76,19 @@ class Setup:
     def prepare(
         self,
         motion: Motion | None,
-        factor: float | Floats = 1.0,
+        factor: float = 1.0,
         *,
         record: bool = False,
         ground: Ground | None = None,
         name: str | None = None,
     ) -> Run:
-        """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments.
-
-        An array of factors, one for each body, leaves the factor of the ground at 1.
-        """
+        """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments."""
         bodies = self.bodies
         check_components(bodies, motion)
         settings = build_settings(bodies, self.model, self.chattering, self.duration, record=record)
         records = bodies.kernel_records(self.model, self.chattering.thresholds(bodies, motion, self.model, factor))
         if ground is None:
-            ground = prepare_ground(motion, bodies.gravity)
-            if np.ndim(factor) == 0:
-                ground = ground._replace(factor=float(factor))
+            ground = prepare_ground(motion, bodies.gravity)._replace(factor=float(factor))
         states = state.new_states(len(bodies), 0)
         set_start(states, records, bodies, *self.start, name)
         return Run(ground, records, settings, states)

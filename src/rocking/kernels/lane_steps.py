@@ -70,27 +70,22 @@ def weight_line(group: Record, lane: int, unit: float) -> Line:
 
 
 @inlined
-def is_event_free(
-    ends: Line, rate: float, below: float, above: float, change: Line, peak: float, overturn_angle: float
-) -> bool:
+def is_event_free(group: Record, lane: int, ends: Line, rate: float, change: Line) -> bool:
     """Return whether a step certainly contains no impact, new peak or overturning; False for NaN.
 
-    During a step from u to u1 (``ends``), the rotation stays above min(u, u1) - below and under max(u, u1) + above, and
-    its rate, initially ``rate``, changes by between ``change[0]`` and ``change[1]``. A rising rotation has its peak at
-    the end, which the next step compares; a falling one has it at the start, which must not exceed the peak so far.
+    During a step from u to u1 (``ends``), the rate of the rotation per step, initially ``rate``, changes by between
+    ``change[0]`` and ``change[1]``. Therefore the rotation exceeds neither end by more than an eighth of them. A rising
+    rotation has its peak at the end, which the next step compares; a falling one has it at the start, which must not
+    exceed the peak so far.
     """
     u, u1 = ends
     lower, upper = change
-    highest = max(u, u1)
+    peak, below, highest = group.peak[lane], 0.125 * upper, max(u, u1) - 0.125 * lower
     is_rising = rate + lower > 0.0
     is_falling = (rate + upper < 0.0) & (u <= peak)
     # The comparisons are separate because a minimum may ignore a NaN.
-    return (
-        (u > below)
-        & (u1 > below)
-        & ((highest + above <= peak) | is_rising | is_falling)
-        & (highest + above < overturn_angle)
-    )
+    is_below = highest < group.overturn_angle[lane]
+    return (u > below) & (u1 > below) & ((highest <= peak) | is_rising | is_falling) & is_below
 
 
 @shared
@@ -118,10 +113,7 @@ def step_linear(group: Record, unit: float) -> int:
         min_w, max_w = min(min(w, w1), 0.0), max(max(w, w1), 0.0)
         curve = group.curve[lane]
         # Eight times ``curve`` is h^2; its product with the smallest w is h times the smallest change of the rate.
-        change = (8.0 * curve * min_w, 8.0 * curve * max_w)
-        is_free = is_event_free(
-            (u, u1), h * v, curve * max_w, -(curve * min_w), change, group.peak[lane], group.overturn_angle[lane]
-        )
+        is_free = is_event_free(group, lane, (u, u1), h * v, (8.0 * curve * min_w, 8.0 * curve * max_w))
         group.u[lane] = u1 if is_free else u
         group.v[lane] = v1 if is_free else v
         group.row[lane] += group.increment[lane] if is_free else 0
@@ -205,15 +197,7 @@ def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> 
         tail = 3.0 * abs(r4) + (4.0 * abs(r5) + (5.0 * abs(r6) + (6.0 * abs(r7) + 7.0 * abs(r8))))
         tail += 8.0 * abs(r9) + (9.0 * abs(r10) + 10.0 * abs(r11))
         lower, upper = min(r2 + 2.0 * min(r3, 0.0) - tail, 0.0), max(r2 + 2.0 * max(r3, 0.0) + tail, 0.0)
-        is_free = is_event_free(
-            (u, u1),
-            r1,
-            0.125 * upper,
-            -0.125 * lower,
-            (lower, upper),
-            group.peak[lane],
-            group.overturn_angle[lane],
-        )
+        is_free = is_event_free(group, lane, (u, u1), r1, (lower, upper))
         last_terms = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
         is_free &= abs(q) * last_terms <= _NEXT_TERMS * (abs(r1) + abs(r2))
         group.blocked[lane] |= not is_free
@@ -283,15 +267,7 @@ def take_nonlinear_substep(
         strength = sum_forcing(weight, side_push, 1.0)
         is_converged, tail = has_negligible_truncation(sizes, angles, -2.0 * l2, strength)
         lower, upper = min(r2 - tail, 0.0), max(r2 + tail, 0.0)
-        is_free = is_event_free(
-            (u, u1),
-            r1,
-            0.125 * upper,
-            -0.125 * lower,
-            (lower, upper),
-            group.peak[lane],
-            group.overturn_angle[lane],
-        )
+        is_free = is_event_free(group, lane, (u, u1), r1, (lower, upper))
         group.blocked[lane] |= not (is_free & is_converged)
         group.truncated[lane] |= not is_converged
         # sine and 1 - cosine of the change of the rotation
