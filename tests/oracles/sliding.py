@@ -207,6 +207,7 @@ def follow(
     y = np.zeros(_SIZE)
     i = 1 if (start[0] or start[1]) > 0.0 else -1
     y[0], y[1] = abs(start[0]), i * start[1]
+    run.peak = float(y[0])
     rates = [math.sqrt(G * body.arm[n] / (body.gyration[n] + body.height**2 + body.distances[n] ** 2)) for n in (0, 1)]
     slow = closing_speed * min(rates) * min(body.alpha)
     longest = 0.15 / max(rates)

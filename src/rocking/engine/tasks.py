@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.block.body import Bodies
+from rocking.block.friction import add_friction
 from rocking.block.single import ROTATION
 from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import Model
@@ -70,6 +71,8 @@ class Setup:
     duration: float | None = None
     #: Coordinate of all bodies at time 0 and its rate; None means zero, or the stop if zero is behind the stop.
     start: tuple[float | None, float] = (None, 0.0)
+    #: Static and kinetic coefficient of friction; None for bodies that never slip.
+    friction: tuple[float, float] | None = None
 
     def prepare(
         self,
@@ -88,6 +91,8 @@ class Setup:
         check_components(bodies, motion)
         settings = build_settings(bodies, self.model, self.chattering, self.duration, record=record)
         records = bodies.kernel_records(self.model, self.chattering.thresholds(bodies, motion, self.model, factor))
+        if self.friction is not None:
+            add_friction(records, bodies, self.model, self.friction)
         if ground is None:
             ground = prepare_ground(motion, bodies.gravity)
             if np.ndim(factor) == 0:
@@ -197,7 +202,7 @@ def _group_bodies(
         substeps = np.where(
             width <= lanes.MAX_STEP, _count_substeps(width, model, motion.vertical is not None), -1.0
         ).astype(np.int64)
-    substeps[records["restrained"] | records["two_stops"]] = -1
+    substeps[records["restrained"] | records["two_stops"] | records["friction"]] = -1
     size = min(_GROUP_SIZE, max(1, _GROUP_PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
     for count in np.unique(substeps):
         indices = np.flatnonzero(substeps == count)

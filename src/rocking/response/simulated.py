@@ -41,9 +41,12 @@ class Simulated(Result):
     motion: Motion | None
     model: Model
     chattering: ChatteringScheme
+    friction: tuple[float, float] | None
     overturned: bool
     unfinished: bool
     leans: bool
+    lost_contact: bool
+    largest_slip: float
     overturn_time: float
     peak_rotation: float
     peak_time: float
@@ -138,12 +141,14 @@ class Simulated(Result):
     @property
     def moves_at_end(self) -> bool:
         """Whether the block is not at rest at the end of the response."""
-        return bool(self.solution.trail.nodes["side"][-1] >= 0)
+        last = self.solution.trail.nodes[-1]
+        return bool(last["side"] >= 0 or last["direction"] != 0)
 
     @property
     def moved(self) -> bool:
         """Whether the body moves at any time."""
-        return bool(np.any(self.solution.trail.nodes["side"] >= 0))
+        nodes = self.solution.trail.nodes
+        return bool(np.any((nodes["side"] >= 0) | (nodes["direction"] != 0)))
 
     @property
     def outcome(self) -> str:
@@ -156,6 +161,8 @@ class Simulated(Result):
             return OVERTURNS
         if self.unfinished:
             return "is given up"
+        if self.lost_contact:
+            return "loses contact"
         if self.stopped:
             return "has not overturned"
         if self.leans:
@@ -170,13 +177,15 @@ class Simulated(Result):
 
         NaN if the block overturns or its final state is unknown. For other bodies the coordinate.
         """
-        return math.nan if self.overturned or self.unfinished or self.stopped else self.solution.residual
+        is_unknown = self.overturned or self.unfinished or self.stopped or self.lost_contact
+        return math.nan if is_unknown else self.solution.residual
 
     @property
     def stopped(self) -> bool:
         """Whether `duration` ended the simulation while the block or the ground still moved."""
         motion_ended = self.motion is None or self.duration >= self.motion.end
-        return not (self.overturned or self.unfinished or self.leans) and (self.moves_at_end or not motion_ended)
+        is_decided = self.overturned or self.unfinished or self.leans or self.lost_contact
+        return not is_decided and (self.moves_at_end or not motion_ended)
 
     @cached_property
     def tipping_time(self) -> float:
@@ -284,6 +293,22 @@ class Simulated(Result):
     def angular_acceleration(self, time: ArrayLike) -> Floats:
         """Return the angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
         return unwrap_scalar(self.states(time)[..., 2])
+
+    def slip(self, time: ArrayLike) -> Floats:
+        """Return the displacement of the base relative to the ground, m, at any time; NaN outside [0, duration].
+
+        It is the displacement of the pivot in contact, positive to side + and zero at the start.
+        """
+        return unwrap_scalar(self._history.slips(time, self.block.gravity)[..., 0])
+
+    def slip_velocity(self, time: ArrayLike) -> Floats:
+        """Return the rate of `slip`, m/s, at any time (at an impact, just after it); NaN outside [0, duration]."""
+        return unwrap_scalar(self._history.slips(time, self.block.gravity)[..., 1])
+
+    @property
+    def residual_slip(self) -> float:
+        """Displacement of the base relative to the ground at the end of the response, m."""
+        return float(self.slip(self.duration))
 
     def kinetic_energy(self, time: ArrayLike) -> Floats:
         """Return the kinetic energy divided by the overturning energy, at any time (at an impact, just after it).
