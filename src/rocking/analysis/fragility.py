@@ -44,6 +44,7 @@ from rocking.analysis.levels import (
 )
 from rocking.analysis.risk import Risk, Survival, compute_mean_survival, compute_risk
 from rocking.block.body import Bodies, Body
+from rocking.block.friction import Friction, resolve_friction
 from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.progress import spell
@@ -345,6 +346,7 @@ def fragility(
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
     confidence: float = 0.9,
+    friction: Friction | None = None,
 ) -> Fragility:
     """Simulate blocks under motions and fit the probability of exceedance against the intensity.
 
@@ -362,7 +364,7 @@ def fragility(
     limit_states : mapping of str to float, optional
         Limit states: ratio of peak rotation to slenderness (the smaller one of two sides), ``math.inf`` for
         overturning.
-    model, chattering : optional
+    model, chattering, friction : optional
         As for `simulate`.
     polarity : {"+", "-", "both"}
         Original motions, reversed motions, or both. With both, each motion counts twice unless all blocks are
@@ -416,7 +418,7 @@ def fragility(
         number_clusters(motions, clusters),
         compute_units(bodies, measure, model),
     )
-    options: dict[str, Any] = {"chattering": chattering}
+    options: dict[str, Any] = {"chattering": chattering, "friction": friction}
     options["polarity"] = "+" if mirrored else polarity
     if stripes is None:
         table = simulate_many(bodies, motions, model=model, **options).expand_dims("level")
@@ -447,7 +449,7 @@ def fragility(
         raise
     scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
     factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
-    setup = Setup(bodies, model, chattering_scheme(chattering))
+    setup = Setup(bodies, model, chattering_scheme(chattering), friction=resolve_friction(friction))
     kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
     text = f"{describe_pool(blocks, weights)}, {describe_sample(cluster_numbers, clusters)}, {kind}, {model} model"
     return Fragility(

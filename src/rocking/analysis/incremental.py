@@ -23,6 +23,7 @@ from rocking.analysis.levels import (
     simulate_levels,
 )
 from rocking.block.body import Bodies, Body
+from rocking.block.friction import Friction, check_friction, resolve_friction
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.bisection import bisect
@@ -56,6 +57,7 @@ def incremental_dynamic_analysis(
     levels: ArrayLike | None = None,
     model: Model = "nonlinear",
     rtol: float = 1e-6,
+    friction: Friction | None = None,
 ) -> IncrementalDynamicAnalysis:
     """Scale motions beyond overturning of every block, and find the bands of levels that overturn.
 
@@ -77,6 +79,8 @@ def incremental_dynamic_analysis(
         Equation of motion.
     rtol : float
         Width of refined ends of bands, relative to the level.
+    friction : optional
+        As for `simulate`.
 
     Returns
     -------
@@ -125,7 +129,9 @@ def incremental_dynamic_analysis(
             "restitution",
         )
     relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
-    options: dict[str, Any] = {"model": model}
+    options: dict[str, Any] = {"model": model, "friction": friction}
+    coefficients = resolve_friction(friction)
+    check_friction(bodies, model, coefficients)
     lowest_uplift = _find_lowest_uplift(bodies, motion_list, values, measure, model)
     if levels is None:
         table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
@@ -141,7 +147,7 @@ def incremental_dynamic_analysis(
             selected = motion == m
             factor = level[selected] * factors[m, block[selected]]
             # Use the scheme of the levels, which determines how often the restitution is drawn.
-            setup = Setup(bodies.select(block[selected]), model, Certified())
+            setup = Setup(bodies.select(block[selected]), model, Certified(), friction=coefficients)
             for task, outcomes in simulate_each(setup, motion_list[m], factor):
                 is_overturned[np.flatnonzero(selected)[task.bodies]] = outcomes["overturned"]
         return is_overturned
@@ -157,7 +163,7 @@ def incremental_dynamic_analysis(
     }
     scales = (table.level.values[:, None, None] * factors)[..., None]
     attributes["undecided"] = describe_undecided(
-        Setup(bodies, model, Certified()), motion_list, scales, overturned_grid[..., None]
+        Setup(bodies, model, Certified(), friction=coefficients), motion_list, scales, overturned_grid[..., None]
     )
     return IncrementalDynamicAnalysis(dataset.assign_attrs(attributes))
 

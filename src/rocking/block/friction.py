@@ -98,6 +98,17 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
     records["friction"], records["static_friction"], records["kinetic_friction"] = True, static, kinetic
     records["arm"], records["base"], records["height"] = arm / g, base / g, height[:, 0] / g
     records["inertia_ratio"] = ratio / (1.0 - ratio)
+    s, c = (bodies.alpha, 1.0) if is_linear else (records["sine"], records["cosine"])
+    lost = 0.0 if is_linear else ratio * s
+    per_push = 1.0 - ratio * c * c + static * lost
+    records["sticking_push"] = (1.0 - _ROUNDING) * (static * (1.0 - lost * s) - ratio * s) / per_push
+    records["sticking_slope"] = 0.0 if is_linear else arm / g * (s + static) / per_push
+
+
+def check_friction(bodies: Bodies, model: Model, friction: tuple[float, float] | None) -> None:
+    """Raise `InvalidOption` if bodies cannot be simulated with friction; see `add_friction`."""
+    if friction is not None:
+        add_friction(bodies.kernel_records(model, np.zeros((len(bodies), 2))), bodies, model, friction)
 
 
 def _refuse(is_invalid: Flags, text: str) -> None:

@@ -31,16 +31,18 @@ from rocking.motion.motion import Motion
 
 #: Fields of an outcome. ``unfinished``: the step budget was exceeded. ``stopped``: the duration ended while the body
 #: moved or the motion continued. In both cases all other fields are incomplete. ``leans``: restraints hold the body in
-#: a leaning position for ever. ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
+#: a leaning position for ever. ``lost_contact``: the ground no longer presses on it, where the simulation ends.
+#: ``largest_slip``, ``residual_slip``: displacement of the base relative to the ground, m.
+#: ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
 #: rested after its first uplift before the motion exceeded a threshold again. ``rests_by_rounding``: number of rests
 #: because time no longer advanced. Times of events that did not occur are 0.
 OUTCOME = np.dtype(
     [
-        ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("peak_rotation", "f8"),
-        ("residual_rotation", "f8"), ("peak_time", "f8"),
+        ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("lost_contact", "?"),
+        ("peak_rotation", "f8"), ("residual_rotation", "f8"), ("peak_time", "f8"),
         ("impacts", "i8"), ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("first_uplift", "f8"),
         ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("rests_by_rounding", "i8"),
-        ("duration", "f8"),
+        ("duration", "f8"), ("largest_slip", "f8"), ("residual_slip", "f8"),
     ]
 )  # fmt: skip
 
@@ -185,9 +187,12 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
     _resume_marches(ground, settings, (records, states, factors), cancelled)
     outcomes = _collect_outcomes(states, task.motion.end)
     outcomes["peak_rotation"] = compute_peaks(states, records, bodies.stops)
-    is_known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
+    is_known = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"] | outcomes["lost_contact"])
+    side = states["side"]
     stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
     outcomes["residual_rotation"] = np.where(is_known, stop + (1.0 - 2.0 * side) * states["leaning_rotation"], np.nan)
+    outcomes["largest_slip"] = bodies.gravity * states["largest_slip"]
+    outcomes["residual_slip"] = np.where(outcomes["unfinished"], np.nan, bodies.gravity * states["slip"])
     outcomes["complete_chattering"] = detect_complete_chattering(ground, factors, records, states)
     return outcomes
 
@@ -202,7 +207,9 @@ def _group_bodies(
         substeps = np.where(
             width <= lanes.MAX_STEP, _count_substeps(width, model, motion.vertical is not None), -1.0
         ).astype(np.int64)
-    substeps[records["restrained"] | records["two_stops"] | records["friction"]] = -1
+    substeps[records["restrained"] | records["two_stops"]] = -1
+    if motion.vertical is not None:
+        substeps[records["friction"]] = -1
     size = min(_GROUP_SIZE, max(1, _GROUP_PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
     for count in np.unique(substeps):
         indices = np.flatnonzero(substeps == count)
@@ -277,7 +284,8 @@ def _collect_outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     outcomes["leans"] = states["ending"] == state.Ending.LEANS
-    is_early = (states["side"] >= 0) | (states["end_time"] < motion_end)
+    outcomes["lost_contact"] = states["ending"] == state.Ending.LOST
+    is_early = (states["side"] >= 0) | (states["direction"] != 0) | (states["end_time"] < motion_end)
     # A body that remains balanced also has no outcome.
     is_undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))
     outcomes["stopped"] = is_undecided & is_early

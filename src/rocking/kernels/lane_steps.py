@@ -34,6 +34,7 @@ GROUP = np.dtype(
         for name in (
             "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine",
             "stiffness", "pull", "push", "first", "second", "third", "curve", "peak", "factor",
+            "sticking_push", "sticking_slope", "twice_slenderness",
         )
     ],
     align=True,

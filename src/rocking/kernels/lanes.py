@@ -16,6 +16,7 @@ from rocking.core.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel
 from rocking.kernels.events import raise_peak
 from rocking.kernels.ground import (
+    ROUNDING,
     Ground,
     has_vertical,
     last_piece,
@@ -64,7 +65,7 @@ def build_pool(blocks: Records, states: Records, factors: Floats, pieces: int, h
     groups = _allocate_aligned(-(-count // WIDTH), GROUP)
     groups["block"] = -1
     groups["u"] = EMPTY_ROTATION
-    groups["peak"] = np.inf
+    groups["peak"] = groups["sticking_push"] = np.inf
     first_waiting = np.full(pieces + 1, -1, dtype=np.int64)
     next_waiting = np.arange(1, count + 1, dtype=np.int64)
     next_waiting[-1] = -1
@@ -132,6 +133,11 @@ def fill_lane(pool: Pool, lane: int, index: int) -> None:
     group.second[slot] = steps.second[side]
     group.third[slot] = steps.third[side]
     group.curve[slot] = steps.curve[side]
+    block = pool.blocks[index]
+    if block.friction:
+        group.sticking_push[slot] = block.sticking_push[side] if state.direction == 0 else -np.inf
+        group.sticking_slope[slot] = block.sticking_slope[side]
+        group.twice_slenderness[slot] = 2.0 * block.slenderness[side]
 
 
 @inlined
@@ -169,7 +175,7 @@ def clear_lane(pool: Pool, lane: int) -> None:
     group.block[slot] = -1
     group.u[slot] = EMPTY_ROTATION
     group.v[slot] = group.sine[slot] = group.cosine[slot] = 0.0
-    group.peak[slot] = np.inf
+    group.peak[slot] = group.sticking_push[slot] = np.inf
     group.stiffness[slot] = group.pull[slot] = group.push[slot] = group.curve[slot] = 0.0
     group.first[slot] = group.second[slot] = group.third[slot] = 0.0
 
@@ -238,6 +244,8 @@ def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, p
     """Move all lanes through one sample: together, or by a march if an event may occur."""
     for first in range(0, pool.counts.active, WIDTH):
         group = pool.groups[first // WIDTH]
+        if pool.blocks[0].friction:
+            mark_slips(group, unscaled_line(ground, piece), ground.unit, piece_length(ground, piece), substeps)
         events = step_group(ground, settings, group, piece, substeps, pool.overturn_angle)
         slot = 0
         while events > 0:
@@ -245,6 +253,26 @@ def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, p
                 march_sample(ground, settings, scratch, pool, piece, first + slot)
                 events -= 1
             slot += 1
+
+
+@inlined
+def mark_slips(group: Record, push: tuple[float, float], unit: float, h: float, substeps: int) -> None:
+    """Cause an event in each lane whose block may slip during a sample, by a NaN that is overwritten after its march.
+
+    See `sliding.may_slip`. The weight is constant; without substeps the model is linear.
+    """
+    for lane in range(WIDTH):
+        start, change = push[0] * group.factor[lane] * unit, push[1] * group.factor[lane] * unit * h
+        largest = max(abs(start), abs(start + change)) * (1.0 + ROUNDING)
+        speed = abs(group.v[lane])
+        if substeps > 0:
+            speed += -2.0 * group.stiffness[lane] * (substeps * substeps) / h * (1.0 + largest)
+        else:
+            speed += group.stiffness[lane] * h * (group.twice_slenderness[lane] + largest)
+        sticks = largest <= group.sticking_push[lane] - group.sticking_slope[lane] * (speed * speed)
+        sticks &= max(group.peak[lane], group.u[lane] + speed * h) <= group.twice_slenderness[lane]
+        if not sticks and group.block[lane] >= 0:
+            group.stiffness[lane] = np.nan
 
 
 @inlined

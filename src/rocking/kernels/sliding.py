@@ -27,8 +27,11 @@ from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import StepEnd, find_first_passing
 from rocking.kernels.ground import (
     Ground,
+    acceleration,
     bound_piece,
+    coefficient,
     has_vertical,
+    is_piecewise_linear,
     last_piece,
     vertical_component,
     write_local_series,
@@ -76,6 +79,15 @@ def slides_flat(block: Record, side: int) -> bool:
 def may_slip(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, end: StepEnd) -> bool:
     """Return whether bounds do not exclude that the forces leave the cone of friction within a step; True for NaN."""
     side, h = state.side, end.time
+    if is_piecewise_linear(ground) and not has_vertical(ground):
+        start = acceleration(ground, state.piece, state.offset)
+        push = max(abs(start), abs(start + coefficient(ground, state.piece, 1) * h))
+        allowed = block.sticking_push[side]
+        if settings.nonlinear:
+            speed = max(abs(state.v), abs(end.v)) + block.stiffness[side] * (1.0 + push) * h
+            allowed -= block.sticking_slope[side] * (speed * speed)
+        if push <= allowed and max(state.peak, end.peak) <= 2.0 * block.slenderness[side]:
+            return False
     ratio, arm = block.arm[side] * block.stiffness[side], block.arm[side]
     motion = bound_piece(ground, state.piece, state.offset, h, scratch.ground)
     push_low, push_high = (motion.low, motion.high) if side == 0 else (-motion.high, -motion.low)

@@ -153,6 +153,8 @@ BLOCK = _define_record(
     inertia_ratio=_SIDES,  # square of that distance divided by the square of the radius of gyration
     base=_SIDES,  # horizontal distance of the centre of mass from the pivot divided by g, s^2
     height="f8",  # height of the centre of mass divided by g, s^2
+    sticking_push=_SIDES,  # push below which a body sticks up to twice its slenderness, without speed
+    sticking_slope=_SIDES,  # decrease of that push per square of the speed, s^2
 )
 
 #: Settings of the computation.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,11 @@ from rocking.response.mechanics import (
     find_linear_balance,
 )
 from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat, check_factors
-from rocking.response.sensitivity import Sensitivity, bound_rest_errors, find_ambiguities
+from rocking.response.sensitivity import AMBIGUITY, Sensitivity, bound_rest_errors, find_ambiguities
+
+#: Relative change of the motion by which the sensitivity of a response that slips is estimated, and rounding error.
+_SMALL: Final = 1e-10
+_ULP: Final = 2.0**-52
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,10 +86,17 @@ class Simulated(Result):
             raise InvalidOption(f"the ground forces of this body are unknown: {self.block.description}")
         return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
 
+    @property
+    def slips(self) -> bool:
+        """Whether the base slips at any time."""
+        return bool(np.any(self.solution.trail.nodes["direction"] != 0))
+
     @cached_property
     def sequences(self) -> NDArray[np.void]:
         """Sequences of impacts that ended at rest: see `Response`."""
         sequences = self.solution.sequences.copy()
+        if self.slips:  # without the effect of rounding before the proof
+            return sequences
         errors = bound_rest_errors(
             self.solution.trail, np.isfinite(sequences["lower"]), max(map(abs, self.block.stops))
         )
@@ -208,7 +219,11 @@ class Simulated(Result):
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
-        """Derivatives of the peak and of event and impact times by the motion, the initial state and the block."""
+        """Derivatives of the peak and of event and impact times by the motion, the initial state and the block.
+
+        Raises `InvalidOption` for a response that slips.
+        """
+        require_sticking(self)
         trail, history = self.solution.trail, self._history
         if int(trail.block["seed"]) >= 0 and trail.block["variable_restitution"]:
             # Random restitutions depend on the number of the impact, which excludes the impacts after a proof.
@@ -228,6 +243,13 @@ class Simulated(Result):
         "touch" means that rounding determines whether the motion exceeds an uplift threshold, whether the body touches
         the ground, or whether it falls from its balance. `perturbed` returns the spread of such results.
         """
+        if self.slips:
+            close = self.perturbed(_SMALL, 3)
+            low, high = close.peak_range
+            changes = ((high - low) / _SMALL, np.nanmax(close.event_spreads, initial=0.0) / _SMALL)
+            named = zip(("peak", "events"), changes, strict=True)
+            names = [name for name, change in named if change * _ULP > AMBIGUITY]
+            return (*names, *(("touch",) if self.rounding_decisions or not close.is_decided else ()))
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
         height = abs(self.peak_rotation - self.block.stops[0])
@@ -395,3 +417,11 @@ class Simulated(Result):
         if self.minimum_normal_force > 0.0:
             return math.nan
         return self._contact.find_first_time(compute_pull, lambda pulled: pulled >= 0.0)
+
+
+def require_sticking(response: Simulated) -> None:
+    """Raise `InvalidOption` if the base slips, because derivatives through slip are not available."""
+    if response.slips:
+        raise InvalidOption(
+            "derivatives are not available for a response that slips; use response.perturbed() or omit {}", "friction"
+        )

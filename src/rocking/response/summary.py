@@ -66,6 +66,13 @@ def build_rows(response: Simulated, friction: float | None, precision: float) ->
             Row("friction needed", f"{response.required_friction:.4f}", note=until),
             Row("least normal force", f"{response.minimum_normal_force:.4f}", "of the weight", until),
         ]
+        if response.friction is not None:
+            static, kinetic = response.friction
+            text = f"{static:g}" if static == kinetic else f"{static:g} (static), {kinetic:g} (kinetic)"
+            rows.append(Row("friction", text))
+            slip = f"{1e3 * response.largest_slip:.4g} mm at most" if response.slips else "none"
+            residual = f", {1e3 * response.residual_slip:.4g} mm at the end" if response.slips else ""
+            rows.append(Row("slip", slip, note=residual))
         if friction is not None:
             sliding_text = (
                 f"is not enough: the block slides, first at {sliding:.4f} s; what follows is not this response"
@@ -108,6 +115,8 @@ def format_outcome(response: Simulated, overturn_time: str) -> str:
         return f"overturns at {overturn_time}"
     if response.unfinished:
         return f"UNFINISHED: given up at {response.duration:.4f} s, after too many steps"
+    if response.lost_contact:
+        return f"loses contact with the ground at {response.duration:.4f} s, where the simulation ends"
     if response.stopped:
         motion = response.motion
         goes_on = motion is not None and response.duration < motion.end
@@ -117,6 +126,8 @@ def format_outcome(response: Simulated, overturn_time: str) -> str:
         return f"does not overturn: it stays leaning, at {_format_residual(response)}"
     if not response.moved:
         return "does not move"
+    if response.slips and response.peak_rotation == 0.0:
+        return "slides and does not rock"
     return "rocks and does not overturn" if response.block.coordinate.limit else "moves, and comes to rest"
 
 
@@ -276,7 +287,7 @@ def _describe_outcome(response: Simulated) -> str:
     text = response.perturbed().describe_outcome()
     if response.overturned:
         text += f", at {format_time(response.overturn_time, *response.perturbed().overturn_range)}"
-    elif response.unfinished or response.stopped:
+    elif response.unfinished or response.stopped or response.lost_contact:
         text += f"; {format_outcome(response, '')}"
     if response.rests_by_rounding:
         text += f"; {format_count(response.rests_by_rounding, 'rest')} not proven"

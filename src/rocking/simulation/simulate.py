@@ -68,6 +68,9 @@ def simulate(
         `stopped`, with undetermined outcome.
     initial_rotation, initial_velocity : float
         Initial rotation (rad, positive to side +) and angular velocity (rad/s), or coordinate and rate of another body.
+    friction : float or pair, optional
+        Coefficient of friction of the base, or the pair (static, kinetic). By default the block never slips. Available
+        for free blocks, and for kinetic coefficients up to 1.33 for a rectangle.
 
     Returns
     -------
@@ -78,6 +81,8 @@ def simulate(
     ------
     InvalidBlock, InvalidMotion
         If `block` is not a body, `motion` is not a `Motion`, or a body on a line has vertical motion.
+    InvalidOption
+        If an option is out of range, or `friction` is not available for the block.
 
     See Also
     --------
@@ -87,8 +92,9 @@ def simulate(
 
     Notes
     -----
-    The block does not slide. `Response.sliding_time` and ``summary(friction)`` report sliding for a given coefficient
-    of friction.
+    Without `friction` the block does not slide, and `Response.sliding_time` and ``summary(friction)`` report when it
+    would. With `friction` it sticks, slides on both pivots or slips on one while it rocks, and every transition is
+    located (see "Sliding" in the documentation).
 
     Examples
     --------
