@@ -481,7 +481,7 @@ def _rest(body: Slider, shaking: Shaking, y: Any, i: int, t: float, piece: int) 
 
 
 def sum_sequence(case: Any) -> Any:
-    """The time of all arcs of a sequence that slides, in 40 digits: those above a tiny speed one by one, the others as a geometric sum."""
+    """The time of all arcs of a sequence that slides, in 40 digits; its slowest arcs are a geometric sum."""
     mp = mpmath.mp.clone()
     mp.dps = 50
     linear = case.model == "linear"

@@ -28,7 +28,8 @@ from rocking.cli.options import (
     MotionOptions,
     Names,
     RestrainedOptions,
-    SchemeOptions,
+    SlipOptions,
+    SlipSchemeOptions,
     UnscaledOptions,
     parse_labels,
     read_ensemble_arguments,
@@ -56,7 +57,7 @@ def spectrum(
     fractiles: str = "0.16,0.5,0.84",
     against: Abscissa = "p",
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SchemeOptions, MODEL] = SchemeOptions(),
+    model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
@@ -120,7 +121,7 @@ def map(
     kind: str | None = None,
     rtol: float = 1e-6,
     block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Map the outcomes of a pulse over its amplitude and frequency, with refined boundaries.
@@ -160,8 +161,8 @@ def map(
             pulse,
             amplitudes=read_array(amplitudes, "amplitudes"),
             frequencies=read_array(frequencies, "frequencies"),
-            model=model.model,
             rtol=rtol,
+            **model.arguments(),
             **{name: value for name, value in parameters.items() if value is not None},
         )
         _deliver_with_records(result, "map", None, folder=folder, as_json=output.as_json)
@@ -173,7 +174,7 @@ def ida(
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[RestrainedOptions, BLOCK] = RestrainedOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
@@ -192,7 +193,7 @@ def ida(
     with output.folder() as folder:
         loaded = motion.read_all(names)
         motions = [*loaded.motions.values()]
-        result = incremental_dynamic_analysis(body, motions, **measure.arguments(), model=model.model, rtol=rtol)
+        result = incremental_dynamic_analysis(body, motions, **measure.arguments(), **model.arguments(), rtol=rtol)
         _deliver_with_records(result, "ida", loaded, folder=folder, as_json=output.as_json)
 
 

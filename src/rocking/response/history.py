@@ -109,6 +109,14 @@ class TimeHistory:
         ends = np.append(nodes["time"][1:], self.end)
         return np.column_stack([nodes["time"][rows], ends[rows]])
 
+    def find_slips(self) -> Floats:
+        """Return start and end of each interval of slip, shape (n, 2), s."""
+        nodes = self.trail.nodes
+        slips = np.concatenate([[False], nodes["direction"] != 0, [False]])
+        rows = np.flatnonzero(slips[1:] != slips[:-1])
+        times = np.append(nodes["time"], self.end)[rows]
+        return times.reshape(-1, 2)
+
     def find_tipping_time(self, balances: tuple[float, float]) -> float:
         """Return the last time, s, at which a body passes its unstable balance outwards; NaN if it ends within it.
 
