@@ -17,11 +17,11 @@ from rocking.cli.options import (
     RECORDS,
     BlockOptions,
     FileOptions,
-    ModelOptions,
     MotionOptions,
     Names,
     RestrainedOptions,
     SchemeOptions,
+    SlipOptions,
     StartOptions,
     read_friction,
     read_records,
@@ -161,7 +161,7 @@ def check(
     rules: str | None = None,
     block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compare rules of thumb with the simulated response of a block under records.
@@ -179,7 +179,7 @@ def check(
     with output.folder() as folder:
         loaded = motion.read_all(names)
         comparison = replace(
-            compare_rules(body, loaded.motions, rules=rule_names, model=model.model), skipped=loaded.skipped
+            compare_rules(body, loaded.motions, rules=rule_names, **model.arguments()), skipped=loaded.skipped
         )
         result = comparison.to_dict()
         if folder is not None:

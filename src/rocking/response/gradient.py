@@ -20,7 +20,7 @@ from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.response.history import find_event_steps, find_impact_steps
 from rocking.response.response import Response
-from rocking.response.simulated import require_sticking
+from rocking.response.sensitivity import require_sticking
 
 #: Quantities that can be differentiated.
 Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
@@ -166,7 +166,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     """
     if not isinstance(response, Response):
         raise InvalidOption("{} must be a Response, as rocking.simulate returns", "response", value=response)
-    require_sticking(response)
+    require_sticking(response.slips)
     checks.choice(of, "of", InvalidOption, get_args(Quantity))
     if of == "peak":
         target = _target_peak(response, at)

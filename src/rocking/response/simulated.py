@@ -30,7 +30,7 @@ from rocking.response.mechanics import (
     find_linear_balance,
 )
 from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat, check_factors
-from rocking.response.sensitivity import AMBIGUITY, Sensitivity, bound_rest_errors, find_ambiguities
+from rocking.response.sensitivity import AMBIGUITY, Sensitivity, bound_rest_errors, find_ambiguities, require_sticking
 
 #: Relative change of the motion by which the sensitivity of a response that slips is estimated, and rounding error.
 _SMALL: Final = 1e-10
@@ -223,7 +223,7 @@ class Simulated(Result):
 
         Raises `InvalidOption` for a response that slips.
         """
-        require_sticking(self)
+        require_sticking(self.slips)
         trail, history = self.solution.trail, self._history
         if int(trail.block["seed"]) >= 0 and trail.block["variable_restitution"]:
             # Random restitutions depend on the number of the impact, which excludes the impacts after a proof.
@@ -417,11 +417,3 @@ class Simulated(Result):
         if self.minimum_normal_force > 0.0:
             return math.nan
         return self._contact.find_first_time(compute_pull, lambda pulled: pulled >= 0.0)
-
-
-def require_sticking(response: Simulated) -> None:
-    """Raise `InvalidOption` if the base slips, because derivatives through slip are not available."""
-    if response.slips:
-        raise InvalidOption(
-            "derivatives are not available for a response that slips; use response.perturbed() or omit {}", "friction"
-        )

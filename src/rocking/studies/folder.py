@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rocking.dynamics.bodies  # noqa: F401 -- registers its kinds
+from rocking.block import Blocks
 from rocking.block.body import KINDS
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -254,6 +255,10 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
         "rules/chattering": str(product.chattering),
         "rules/duration": product.duration,
     }
+    if product.friction is not None:
+        rules["rules/friction"] = product.friction
+        if isinstance(bodies, Blocks) and bodies.radii is not None:
+            arrays["sizes/radii"] = bodies.radii
     texts = {name: np.array(json.dumps(value)) for name, value in rules.items()}
     return arrays | {"scales/values": scales.values} | texts
 
@@ -266,15 +271,19 @@ def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
     values = {name.partition("/")[2]: array for name, array in arrays.items() if name.startswith(f"{kind}/")}
     motions = dict.fromkeys(name.split("/")[1] for name in arrays if name.startswith("motions/"))
     texts = {name: json.loads(str(array)) for name, array in arrays.items() if array.dtype.kind == "U"}
-    measure = texts["scales/measure"]
+    measure, friction = texts["scales/measure"], texts.get("rules/friction")
+    bodies = KINDS[kind](**{**values, "gravity": float(values["gravity"])})
+    if "sizes/radii" in arrays:
+        bodies.__dict__["radii"] = arrays["sizes/radii"]
     return Product(
-        KINDS[kind](**{**values, "gravity": float(values["gravity"])}),
+        bodies,
         tuple(_motion_from_arrays(arrays, f"motions/{k}") for k in motions),
         Scales(None if measure is None else Measure(**measure), arrays["scales/values"]),
         texts["rules/polarity"],
         texts["rules/model"],
         chattering_scheme(texts["rules/chattering"]),
         texts["rules/duration"],
+        friction and (friction[0], friction[1]),
     )
 
 
