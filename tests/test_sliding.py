@@ -341,3 +341,48 @@ def test_analyses_with_friction() -> None:
     blocks = rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.3], restitution=[0.9])
     spectrum = rocking.rocking_spectrum(blocks, [pulse.scaled(6.0) for pulse in pulses], friction=0.25)
     assert float(spectrum.data.peak_rotation.max()) == 0.0
+
+
+@pytest.mark.parametrize("chattering", ["velocity=1e-4", "bypass=1e-3", "interval=1e-4"])
+def test_thresholds_end_sequences_that_slip(chattering: str) -> None:
+    block = rocking.Block(width=0.5, height=1.8, restitution=0.85)
+    motion = rocking.pulses.one_sine(amplitude=5.0, frequency=2.0)
+    exact, cut = (rocking.simulate(block, motion, friction=0.3, chattering=name) for name in ("certified", chattering))
+    assert cut.residual_slip == pytest.approx(exact.residual_slip, abs=1e-9)
+    assert cut.duration == pytest.approx(exact.duration, abs=1e-3)
+
+
+def test_a_duration_stops_a_slide() -> None:
+    block = rocking.Block(width=0.5, height=1.8)
+    motion = rocking.pulses.one_sine(amplitude=5.0, frequency=2.0)
+    whole, cut = (rocking.simulate(block, motion, friction=0.25, duration=end) for end in (None, 0.2))
+    assert cut.stopped and cut.outcome == "has not overturned" and cut.duration == 0.2
+    assert cut.residual_slip == pytest.approx(float(whole.slip(0.2)), abs=1e-15)
+    data = rocking.simulate_many(block, motion, friction=0.25, duration=0.2)
+    assert bool(data.stopped.item()) and float(data.residual_slip.item()) == cut.residual_slip
+
+
+def test_outputs_contain_the_slip(tmp_path: Any, run: Any) -> None:
+    block = rocking.Block(width=0.5, height=1.8, restitution=0.85)
+    response = rocking.simulate(block, rocking.pulses.one_sine(5.0, 2.0), friction=(0.3, 0.28))
+    dataset = response.to_xarray()
+    assert {"slip", "slip_velocity"} <= set(dataset.data_vars) and dataset.attrs["friction"] == [0.3, 0.28]
+    assert response.to_dict()["largest_slip_m"] == response.largest_slip > 0.0
+    assert "0.3 (static), 0.28 (kinetic)" in response.summary() and "mm at most" in response.summary()
+    assert "slip (mm)" in [axes.get_ylabel() for axes in response.plot().axes]
+    record = tmp_path / "record.csv"
+    record.write_text("\n".join(f"{5.0 * math.sin(4.0 * math.pi * 0.01 * k)}" for k in range(51)))
+    sizes = ("--width", 0.5, "--height", 1.8, "--restitution", 0.85)
+    code, text, _ = run("simulate", record, "--dt", 0.01, "--units", "m/s2", *sizes, "--sliding", "0.3,0.28")
+    assert code == 0 and "slide-rock" in text and "mm at most" in text
+
+
+def test_a_study_with_friction_is_the_same_after_it_is_opened_again(tmp_path: Any) -> None:
+    bodies = [rocking.Block.from_pivots((0.2, 0.25), 1.0, 0.6), rocking.Block.from_pivots((0.2, 0.2), 1.0, 0.65)]
+    motion = rocking.pulses.one_sine(2.6, 1.2)
+    study = rocking.create_study(tmp_path / "study", bodies, motion, friction=(0.3, 0.25), unit_blocks=512)
+    study.run()
+    again = rocking.Study(tmp_path / "study")
+    assert again.product.friction == (0.3, 0.25)
+    expected = [rocking.simulate(body, motion, friction=(0.3, 0.25)).peak_rotation for body in bodies]
+    assert again.results().peak_rotation.values.ravel().tolist() == expected
