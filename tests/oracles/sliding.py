@@ -511,7 +511,9 @@ def sum_sequence(case: Any) -> Any:
         if linear:
             root, pull = mp.sqrt(lam), lam * (alpha - mu)
             return 2 / root * mp.atanh(root * w / pull)
-        order = 20
+        pull = lam * (mp.sin(alpha) - mu * mp.cos(alpha))
+        pull /= 1 + rho * mp.sin(alpha) * (mp.sin(alpha) - mu * mp.cos(alpha))
+        order = min(24, 5 + int(50 / -mp.log10(mp.sqrt(lam) * w / pull)))  # terms are as small as the speed
         u, s, c = [mp.mpf(0), w], [mp.sin(alpha)], [mp.cos(alpha)]
         q, b, D, N = [], [], [], []
 

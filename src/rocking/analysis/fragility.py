@@ -342,11 +342,11 @@ def fragility(
     limit_states: Mapping[str, float] | None = None,
     model: Model = "nonlinear",
     chattering: str | ChatteringScheme = "certified",
+    friction: Friction | None = None,
     polarity: Polarity = "+",
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
     confidence: float = 0.9,
-    friction: Friction | None = None,
 ) -> Fragility:
     """Simulate blocks under motions and fit the probability of exceedance against the intensity.
 

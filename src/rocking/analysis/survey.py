@@ -279,10 +279,10 @@ def survey(
         the motions.
     friction : float, optional
         Coefficient of friction for the detection of sliding.
-    sliding : float or pair, optional
-        Coefficients of friction with which slip is simulated, as `friction` of `rocking.simulate`.
     precision : float
         Relative precision of the motions, from 1e-6 to 0.1. Outcomes are also counted within this precision.
+    sliding : float or pair, optional
+        Coefficients of friction with which slip is simulated, as `friction` of `rocking.simulate`.
     **options : object
         As for `rocking.simulate`: model, chattering, duration, ...
 

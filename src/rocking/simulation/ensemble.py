@@ -318,8 +318,8 @@ def simulate_many(
     polarity: Polarity = "+",
     duration: float | None = None,
     times: bool = False,
-    robust: bool = False,
     friction: Friction | None = None,
+    robust: bool = False,
 ) -> xr.Dataset:
     """Simulate every block under every motion.
 

@@ -248,7 +248,7 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
     for k, motion in enumerate(product.motions):
         arrays |= _motion_to_arrays(motion, f"motions/{k}")
     measure = None if scales.measure is None else {"name": scales.measure.name, **scales.measure.options()}
-    rules = {
+    rules: dict[str, Any] = {
         "scales/measure": measure,
         "rules/polarity": product.polarity,
         "rules/model": product.model,
@@ -256,7 +256,7 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
         "rules/duration": product.duration,
     }
     if product.friction is not None:
-        rules["rules/friction"] = product.friction
+        rules["rules/friction"] = [*product.friction]
         if isinstance(bodies, Blocks) and bodies.radii is not None:
             arrays["sizes/radii"] = bodies.radii
     texts = {name: np.array(json.dumps(value)) for name, value in rules.items()}
