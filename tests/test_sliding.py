@@ -182,6 +182,19 @@ def test_momentum_and_energy_balance_in_every_step() -> None:
     assert checked > 200
 
 
+def test_no_force_leaves_the_cone_of_friction() -> None:
+    """Forces follow from the rotation alone: a slip that was missed would require more friction than there is."""
+    slips = 0
+    for seed in range(150):
+        case = draw_case(seed)
+        if case.options["model"] == "linear":
+            continue
+        response = rocking.simulate(case.block, case.motion, **case.options)
+        assert response.required_friction <= np.max(case.options["friction"]) * (1.0 + 1e-12), seed
+        slips += response.slips
+    assert slips > 60
+
+
 # ---- Complete chattering while sliding, in 40 digits ----
 
 
