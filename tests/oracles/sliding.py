@@ -337,7 +337,13 @@ def follow(
             dense = solver.dense_output()
             times = np.linspace(t0, solver.t, 7)
             points = [y0, *(dense(time) for time in times[1:-1]), solver.y]
-            for k in range(1, 7):
+            for k in range(6):  # a rotation may dip below zero between two times
+                if mode != SLIDE and points[k][1] < 0.0 < points[k + 1][1]:
+                    lowest = brentq(lambda x: dense(x)[1], times[k], times[k + 1], xtol=1e-16)
+                    times = np.insert(times, k + 1, lowest)
+                    points.insert(k + 1, dense(lowest))
+                    break
+            for k in range(1, len(times)):
                 new = functions(times[k], points[k])
                 fresh = first and k == 1
                 roots = []
@@ -353,7 +359,7 @@ def follow(
                     break
             stop = event[0] if event else solver.t
             if mode != SLIDE:
-                for k in range(6):
+                for k in range(len(times) - 1):
                     if times[k] < stop and points[k][1] > 0.0 >= points[k + 1][1]:
                         top = (
                             brentq(lambda x: dense(x)[1], times[k], times[k + 1], xtol=1e-15)
