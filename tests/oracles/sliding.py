@@ -14,7 +14,7 @@ from typing import Any
 import mpmath
 import numpy as np
 from scipy.integrate import DOP853
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 G = 9.80665
 REST, SLIDE, ROCK, SLIDE_ROCK = "rest", "slide", "rock", "slide-rock"
@@ -337,12 +337,10 @@ def follow(
             dense = solver.dense_output()
             times = np.linspace(t0, solver.t, 7)
             points = [y0, *(dense(time) for time in times[1:-1]), solver.y]
-            for k in range(6):  # a rotation may dip below zero between two times
-                if mode != SLIDE and points[k][1] < 0.0 < points[k + 1][1]:
-                    lowest = brentq(lambda x: dense(x)[1], times[k], times[k + 1], xtol=1e-16)
-                    times = np.insert(times, k + 1, lowest)
-                    points.insert(k + 1, dense(lowest))
-                    break
+            if mode != SLIDE:  # a function may be negative only between two times
+                dips = _find_dips(functions, dense, t0, float(solver.t))
+                times = np.union1d(times, dips)
+                points = [y0 if time == t0 else (solver.y if time == solver.t else dense(time)) for time in times]
             for k in range(1, len(times)):
                 new = functions(times[k], points[k])
                 fresh = first and k == 1
@@ -433,6 +431,22 @@ def _find_positive(functions: Any, dense: Any, m: int, low: float, high: float) 
         if functions(time, dense(time))[m] > 0.0:
             return time
     return None
+
+
+def _find_dips(functions: Any, dense: Any, start: float, end: float) -> list[float]:
+    """Times at which an event function has a negative minimum between two times at which it is positive."""
+    grid = np.linspace(start, end, 13)
+    values = np.array([functions(time, dense(time)) for time in grid])
+    rates = [dense(time)[1] for time in grid]
+    ends = [(grid[k], grid[k + 1]) for k in range(12) if rates[k] < 0.0 < rates[k + 1]]
+    dips = [brentq(lambda time: dense(time)[1], *pair, xtol=1e-16) for pair in ends]  # of the rotation
+    for m in range(values.shape[1]):
+        for k in range(1, 12):
+            if values[k, m] > 0.0 and values[k - 1, m] > values[k, m] < values[k + 1, m]:
+                options = {"bounds": (grid[k - 1], grid[k + 1]), "method": "bounded", "options": {"xatol": 1e-13}}
+                low = minimize_scalar(lambda time, m=m: functions(time, dense(time))[m], **options)
+                dips += [float(low.x)] if low.fun < 0.0 else []
+    return dips
 
 
 def _close(body: Slider, shaking: Shaking, run: Motion, y: Any, i: int, t: float, piece: int, slowest: float) -> bool:
