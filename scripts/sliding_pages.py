@@ -32,7 +32,7 @@ def build_rows() -> list[tuple[str, ...]]:
     motions, bodies = [rocking.records.load(name) for name in names], rocking.Blocks.from_bodies(blocks)
     free = rocking.simulate_many(bodies, motions, levels=[FACTOR])
     fell, rocked = free.overturned.values, free.peak_rotation.values > 0.0
-    rows = [("none", "0 %", "0 %", f"{fell.sum()} of {fell.size}", "", "", "")]
+    rows: list[tuple[str, ...]] = [("none", "0 %", "0 %", f"{fell.sum()} of {fell.size}", "", "", "")]
     for mu in FRICTION:
         data = rocking.simulate_many(bodies, motions, levels=[FACTOR], friction=mu)
         falls, largest = data.overturned.values, 1e3 * data.largest_slip.values
