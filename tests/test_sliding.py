@@ -1,6 +1,9 @@
 """Responses with friction against an integration that restarts at events, and their limits."""
 
 import math
+import os
+import subprocess
+import sys
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -399,3 +402,23 @@ def test_a_study_with_friction_is_the_same_after_it_is_opened_again(tmp_path: An
     assert again.product.friction == (0.3, 0.25)
     expected = [rocking.simulate(body, motion, friction=(0.3, 0.25)).peak_rotation for body in bodies]
     assert again.results().peak_rotation.values.ravel().tolist() == expected
+
+
+_SCRIPT = """
+import rocking
+block = rocking.Block(width=0.5, height=1.8, restitution=0.85)
+for model in ("nonlinear", "linear"):
+    for friction in (0.3, (0.3, 0.2)):
+        motion = rocking.pulses.one_sine(5.0, 2.0)
+        response = rocking.simulate(block, motion, friction=friction, model=model, duration=1.0)
+        print(response.peak_rotation.hex(), response.residual_slip.hex(), response.events["time"].tolist())
+"""
+
+
+def test_python_runs_kernels_with_friction_with_the_same_bits() -> None:
+    outputs = []
+    for uncompiled in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": uncompiled}
+        command = [sys.executable, "-W", "ignore::RuntimeWarning", "-c", _SCRIPT]
+        outputs.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert outputs[0] == outputs[1] and outputs[0].count("\n") == 4

@@ -265,7 +265,7 @@ def prove_slide(ground: Ground, block: Record, settings: Record, scratch: Record
         divisor = min(
             sliding_divisor(block, i, direction, max_height), sliding_divisor(block, j, -direction, max_height)
         )
-    arm, base = max(block.arm[0], block.arm[1]), max(block.base[0], block.base[1])
+    arm, base = max(block.arm[0], block.arm[1]), max(block.pivot_distance[0], block.pivot_distance[1])
     normal = (1.0 + motion.vertical.high) / min(1.0, divisor)
     along_arcs = mu * normal + max_magnitude(motion.horizontal) + arm * (3.0 * max_restoring + max_speed * max_speed)
     at_impacts = 2.0 * (mu * base + block.height) * max_restoring

@@ -348,7 +348,7 @@ def find_slide_end(
 def slip_factor(block: Record, side: int, e: float, direction: float) -> float:
     """Compute the factor on the speed of an impact that leaves a side and slips; ``direction`` is the slip's sign."""
     other = 1 - side
-    h, d, next_d = block.height, block.base[side], block.base[other]
+    h, d, next_d = block.height, block.pivot_distance[side], block.pivot_distance[other]
     inertia = block.arm[other] / block.stiffness[other]
     square = inertia - h * h - next_d * next_d
     couple = e * inertia - (square + h * h - d * next_d)
@@ -360,7 +360,7 @@ def slip_factor(block: Record, side: int, e: float, direction: float) -> float:
 def strike_with_friction(block: Record, state: Record, side: int, speed: float) -> None:
     """Change speed, slip and mode at an impact that has left a side and would stick with the speed of the state."""
     other = 1 - side
-    j, h, d, next_d = side_sign(other), block.height, block.base[side], block.base[other]
+    j, h, d, next_d = side_sign(other), block.height, block.pivot_distance[side], block.pivot_distance[other]
     inertia = block.arm[other] / block.stiffness[other]
     e = state.v / speed if speed > 0.0 else 0.0
     V = state.slip_rate
@@ -385,7 +385,7 @@ def strike_with_friction(block: Record, state: Record, side: int, speed: float) 
 def least_sticking_friction(block: Record, side: int) -> float:
     """Compute the friction with which an impact that leaves a side sticks if nothing slips before (Eq. 7)."""
     e = block.restitution[side]
-    return block.height * (1.0 - e) / (block.base[1 - side] * e + block.base[side])
+    return block.height * (1.0 - e) / (block.pivot_distance[1 - side] * e + block.pivot_distance[side])
 
 
 @inlined
@@ -400,7 +400,7 @@ def slip_after_sequence(
     """
     side, w, sign = state.side, state.v, side_sign(state.side)
     mu = state.direction * block.kinetic_friction
-    d, next_d = block.base[side], block.base[1 - side]
+    d, next_d = block.pivot_distance[side], block.pivot_distance[1 - side]
     drift = sign * block.height * w
     if settings.nonlinear:
         return drift + mu * d * w, 0.0
