@@ -141,7 +141,7 @@ def robust_table():
         case = families.sine(PAPER_BLOCK, model="linear")(a, omega)
         certified = rests_under(case, "certified")
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", rocking.errors.OutsideFit)
+            warnings.simplefilter("ignore", rocking.errors.OutsideFitWarning)
             found = [rests_under(case, rocking.AsymptoticTime(critical=name)) for name in ("eq76", "eq77", "exact")]
         exact = float(critical_amplitude(omega, 0.92))
         rows.append((f"{a:g}", f"{omega:g}", f"{exact:.5f}", *(verdict_on(each, certified) for each in found)))

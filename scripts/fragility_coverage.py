@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from rocking import fit_fragility
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 TABLE = Path(__file__).resolve().parents[1] / "docs" / "_tables" / "fragility-coverage.txt"
 DATA_SETS = 500
@@ -49,7 +49,7 @@ def coverage(data, count, data_sets):
         intensity, exceeded, motion = data(np.random.default_rng([seed, count]), count)
         try:
             curve = fit_fragility(intensity, exceeded, clusters=motion).curves[0]
-        except InvalidOption:
+        except OptionError:
             continue
         used += 1
         low, high = curve.band([TENTH])

@@ -9,7 +9,7 @@ import pytest
 import rocking
 from rocking import Block, Blocks
 from rocking.analysis.survey import survey
-from rocking.errors import InvalidBlock, InvalidMotion
+from rocking.errors import BlockError, MotionError
 from rocking.inputs.pulses import named_pulse
 
 BLOCK = Block(width=0.24, height=1.1)
@@ -38,7 +38,7 @@ TAKES_A_MOTION = {
     ],
 )
 def test_what_is_no_motion_is_refused_and_told_how_to_become_one(take, motion, mend):
-    with pytest.raises(InvalidMotion) as caught:
+    with pytest.raises(MotionError) as caught:
         TAKES_A_MOTION[take](motion)
     assert mend in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -47,7 +47,7 @@ def test_what_is_no_motion_is_refused_and_told_how_to_become_one(take, motion, m
 @pytest.mark.parametrize("take", [name for name in TAKES_A_MOTION if name != "simulate"])
 @pytest.mark.parametrize("motions", [[MOTION, "RSN6.AT2"], [MOTION, None], [[0.1, 0.2]]])
 def test_every_one_of_several_motions_is_a_motion(take, motions):
-    with pytest.raises(InvalidMotion):
+    with pytest.raises(MotionError):
         TAKES_A_MOTION[take](motions)
 
 
@@ -76,7 +76,7 @@ TAKES_A_BLOCK = {
 @pytest.mark.parametrize("block", [(0.2, 1.0), 0.2, "statue", None, MOTION, [BLOCK, 0.2]])
 def test_what_is_no_block_is_refused_and_told_how_to_become_one(take, block):
     with pytest.raises(
-        InvalidBlock, match=r"a (free )?Block( or another body)? is required, not a .*; create one with Block"
+        BlockError, match=r"a (free )?Block( or another body)? is required, not a .*; create one with Block"
     ):
         TAKES_A_BLOCK[take](block)
 
@@ -85,7 +85,7 @@ def test_blocks_are_gathered_from_one_from_several_and_from_themselves():
     blocks = Blocks.from_bodies([BLOCK, Block(half_width=0.2, half_height=1.0)])
     assert Blocks.from_bodies(blocks) is blocks
     assert Blocks.from_bodies(BLOCK)[0] == Block.from_parameters(BLOCK.p, BLOCK.alpha, BLOCK.restitution)
-    with pytest.raises(InvalidBlock, match="select"):
+    with pytest.raises(BlockError, match="select"):
         blocks[0:1]
     with pytest.raises(IndexError):
         blocks[2]
@@ -103,7 +103,7 @@ def test_blocks_are_gathered_from_one_from_several_and_from_themselves():
     ],
 )
 def test_half_and_full_sizes_do_not_mix(sizes):
-    with pytest.raises(InvalidBlock, match="either half_width and half_height, or width and height"):
+    with pytest.raises(BlockError, match="either half_width and half_height, or width and height"):
         Block(**sizes)
 
 
@@ -180,7 +180,7 @@ def test_what_is_not_that_thing_is_refused_in_one_sentence(take, value):
 def test_one_block_is_not_chosen_by_select_nor_are_those_that_are_not_there():
     blocks = Blocks(p=[1.0, 2.0, 3.0], alpha=0.2)
     for index in (0, 1.5, [0, 3], [True, False], np.array([[0, 1]])):
-        with pytest.raises(InvalidBlock):
+        with pytest.raises(BlockError):
             blocks.select(index)
     assert repr(blocks.select([])) == "<Blocks: none>"
     for index in (slice(0, 2), [0, 1], np.array([True, True, False]), [0, -2]):
@@ -190,14 +190,14 @@ def test_one_block_is_not_chosen_by_select_nor_are_those_that_are_not_there():
 @pytest.mark.parametrize("level", [1e60, 1e300, 1e308])
 def test_nothing_is_shaken_more_than_a_motion_may_be(level):
     for scaled in (MOTION.scaled, MOTION.scaled_to):
-        with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+30 m/s\^2"):
+        with pytest.raises(MotionError, match=r"the acceleration of a motion must stay below 1e\+30 m/s\^2"):
             scaled(level)
     for scale in ({"levels": level, "measure": "pga"}, {"levels": level}):
-        with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+30 m/s\^2"):
+        with pytest.raises(MotionError, match=r"the acceleration of a motion must stay below 1e\+30 m/s\^2"):
             rocking.simulate_many(BLOCK, MOTION, **scale)
 
 
 @pytest.mark.parametrize("period", [1e300, 1e9])
 def test_a_period_that_says_nothing_is_refused(period):
-    with pytest.raises(InvalidMotion, match="a period longer than one million times the duration"):
+    with pytest.raises(MotionError, match="a period longer than one million times the duration"):
         MOTION.spectral_acceleration(period)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rocking import Block, Blocks
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 
 sizes = st.floats(0.01, 20.0)
 
@@ -51,7 +51,7 @@ def test_a_block_whose_sides_differ_has_no_one_value_of_them():
     block = Block.from_pivots((0.2, 0.15), 0.6, 0.4, mass=100.0)
     for name in ("alpha", "p", "radius", "restitution"):
         plus, minus = (getattr(side, name) for side in block.sides)
-        with pytest.raises(InvalidBlock, match=rf"{name} is {plus:g} on side .* use block.sides\[0\].{name}"):
+        with pytest.raises(BlockError, match=rf"{name} is {plus:g} on side .* use block.sides\[0\].{name}"):
             getattr(block, name)
         assert plus != minus
         assert not hasattr(block, name)  # what looks at all attributes of an object passes these over
@@ -140,7 +140,7 @@ def test_parameters_give_the_rectangles_radius():
     ],
 )
 def test_what_cannot_stand_is_refused_in_one_sentence(make, word):
-    with pytest.raises(InvalidBlock) as caught:
+    with pytest.raises(BlockError) as caught:
         make()
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -173,14 +173,14 @@ def test_blocks_broadcast_and_index():
     ],
 )
 def test_bad_arrays_of_blocks_are_refused(make, word):
-    with pytest.raises(InvalidBlock, match=word):
+    with pytest.raises(BlockError, match=word):
         make()
 
 
 @pytest.mark.parametrize("factor", [0.0, -0.5, np.nextafter(1.0, 2.0), 2.0])
 def test_a_restitution_outside_its_range_is_refused(factor):
     for make in (lambda: Block.from_parameters(2.0, 0.2, factor), lambda: Blocks([2.0], [0.2], [factor])):
-        with pytest.raises(InvalidBlock, match=r"restitution.* must be in \(0, 1\]"):
+        with pytest.raises(BlockError, match=r"restitution.* must be in \(0, 1\]"):
             make()
 
 

@@ -10,7 +10,7 @@ from rocking.block.body import Bodies, Body
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
+from rocking.errors import BlockError, MotionError, OptionError
 
 G = 9.81
 
@@ -24,9 +24,9 @@ def test_balls_and_blocks_are_bodies():
         assert isinstance(body, Body) and isinstance(body.as_bodies(), Bodies)
         assert not isinstance(body, Bodies) and not isinstance(body.as_bodies(), Body)
     for other in (0.4, "block", rocking.Block, [block]):
-        with pytest.raises(InvalidBlock, match="a Block or another body is required"):
+        with pytest.raises(BlockError, match="a Block or another body is required"):
             simulate(other, None)
-    with pytest.raises(InvalidBlock, match=r"not a Solid; use solid\.block\(azimuth\)"):
+    with pytest.raises(BlockError, match=r"not a Solid; use solid\.block\(azimuth\)"):
         simulate(rocking.Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, 1), [[1, 0, 0], [0, 1, 0], [0, 0, 1]]), None)
 
 
@@ -46,7 +46,7 @@ def test_a_body_on_a_line_takes_no_vertical_component(simulated):
     motion = rocking.pulses.one_sine(2.0, 1.0)
     for body in (dynamics.ImpactOscillator(1.0, 0.8, stop=0.05), dynamics.BouncingBall(0.5)):
         simulated(body, motion)
-        with pytest.raises(InvalidMotion, match=f"this {body.description} moves along one line"):
+        with pytest.raises(MotionError, match=f"this {body.description} moves along one line"):
             simulated(body, motion.with_vertical(rocking.pulses.one_sine(5.0, 1.0)))
 
 
@@ -61,7 +61,7 @@ def test_the_response_of_a_ball_is_told_in_its_own_words():
     assert list(found.to_dataframe(dt=0.01).columns) == ["position_m", "velocity_m_s", "ground_acceleration_m_s2"]
     assert found.to_xarray()["position"].attrs["units"] == "m"
     assert [axes.get_ylabel() for axes in found.plot().axes] == ["position (m)", "ground\nacceleration\n(g)"]
-    with pytest.raises(InvalidOption, match="ground forces of this body are unknown: bouncing ball"):
+    with pytest.raises(OptionError, match="ground forces of this body are unknown: bouncing ball"):
         found.normal_force(0.1)
     assert found.block == BALL
 

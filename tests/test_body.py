@@ -12,7 +12,7 @@ from mpmath import mp, mpf
 from oracles.rigid_body import Piece, sides_of
 
 from rocking import Block, Blocks
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 
 NAMES = ("p", "alpha", "restitution")
 lengths = st.floats(0.05, 5.0)
@@ -90,7 +90,7 @@ def test_a_body_is_found_again_from_its_p_and_alpha(height, plus, minus, gyratio
     assume(abs(plus - minus) > 1e-3)
     try:
         body = Block.from_pivots((plus * height, minus * height), height, gyration * height)
-    except InvalidBlock:
+    except BlockError:
         return
     again = Block.from_parameters(both(body, "p"), both(body, "alpha"))
     for name in (*NAMES, "radius"):
@@ -111,7 +111,7 @@ def test_a_body_is_found_again_from_its_p_and_alpha(height, plus, minus, gyratio
 )
 def test_sides_that_are_those_of_no_body_are_refused_and_the_restitution_is_asked_for(p, alpha, words):
     for make in (lambda: Block.from_parameters(p, alpha), lambda: Blocks([(2.0, 2.0), p], [(0.2, 0.2), alpha])):
-        with pytest.raises(InvalidBlock, match=r"set restitution to a value( or a pair)? in \(0, 1\]") as caught:
+        with pytest.raises(BlockError, match=r"set restitution to a value( or a pair)? in \(0, 1\]") as caught:
             make()
         assert caught.value.argument == "restitution"
         if "stocky" not in words:
@@ -133,7 +133,7 @@ def test_sides_that_are_equal_but_for_rounding_are_those_of_a_rectangle():
     ],
 )
 def test_offsets_lie_within(make, words):
-    with pytest.raises(InvalidBlock, match=words):
+    with pytest.raises(BlockError, match=words):
         make()
 
 

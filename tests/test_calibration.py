@@ -235,7 +235,7 @@ def test_one_unknown_angle_is_found_from_forty_tests(coarse):
 )
 def test_a_mistaken_argument_is_refused(change, word):
     arguments = {"motions": bursts(3, seed=0), "overturned": [True, False, True], "candidates": 128} | change
-    with pytest.raises(rocking.errors.InvalidOption, match=word):
+    with pytest.raises(rocking.errors.OptionError, match=word):
         rocking.calibrate(**arguments)
 
 
@@ -437,7 +437,7 @@ def test_scores_of_known_predictions():
 
 @pytest.mark.parametrize("probabilities", [[0.5], [1.2, 0.1], [math.nan, 0.1], []])
 def test_scores_refuse_what_is_no_probability(probabilities):
-    with pytest.raises(rocking.errors.InvalidOption):
+    with pytest.raises(rocking.errors.OptionError):
         Scores.from_predictions(probabilities, [True, False])
 
 
@@ -629,7 +629,7 @@ def test_correlated_noise_widens_the_errors(coarse, sure, known):
 )
 def test_a_mistaken_history_is_refused(change, word):
     arguments = {"times": TIMES, "rotation": released()} | change
-    with pytest.raises(rocking.errors.InvalidOption, match=word):
+    with pytest.raises(rocking.errors.OptionError, match=word):
         rocking.calibrate_history(**arguments)
 
 
@@ -647,7 +647,7 @@ def test_an_ensemble_is_read_as_it_was_written(found, tmp_path):
         (text.replace("linear", "nonlinear", 1), "one model"),
     ):
         (tmp_path / "damaged.csv").write_text(damaged)
-        with pytest.raises(rocking.errors.UnreadableRecord, match=said):
+        with pytest.raises(rocking.errors.RecordError, match=said):
             read_ensemble(tmp_path / "damaged.csv")
 
 
@@ -657,12 +657,12 @@ def test_an_error_within_a_table_keeps_what_it_is_about(tmp_path):
     header = sides.replace("p_plus,p_minus", "p_plus_rad_s,p_minus_rad_s").replace("alpha_plus", "alpha_plus_rad")
     header = header.replace("alpha_minus", "alpha_minus_rad")
     ensemble.write_text(f"{header},weight,model\n2,2,0.2,0.2,-0.5,0.9,1,linear\n")
-    with pytest.raises(rocking.errors.InvalidBlock, match="block 0 is in line 2: restitution must be") as caught:
+    with pytest.raises(rocking.errors.BlockError, match="block 0 is in line 2: restitution must be") as caught:
         read_ensemble(ensemble)
     error = caught.value
     assert (error.argument, error.path, error.value) == ("restitution", str(ensemble), -0.5)
     outcomes.write_text("motion,overturned\nel-centro-meloland-270,1\nnothing.AT2,0\n")
-    with pytest.raises(rocking.errors.UnreadableRecord, match="line 3: dt must be a positive number") as caught:
+    with pytest.raises(rocking.errors.RecordError, match="line 3: dt must be a positive number") as caught:
         read_calibration(outcomes, channel=None, dt=-1.0, units=None)
     error = caught.value
     assert (error.argument, error.path, error.line, error.value) == ("dt", str(outcomes), 3, -1.0)
@@ -680,9 +680,9 @@ def test_rows_without_a_group_belong_to_none(tmp_path):
 def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(shaken):
     space = Space.from_bounds((3.0, 3.0), (0.1, 0.2), (0.9, 0.9), two_sided=False)
     assert space.known == {"p": 3.0, "restitution": 0.9}
-    with pytest.raises(rocking.errors.InvalidOption, match=r"call simulate or fragility"):
+    with pytest.raises(rocking.errors.OptionError, match=r"call simulate or fragility"):
         rocking.calibrate(*shaken, p=(3.0, 3.0), alpha=0.2, restitution=(0.9, 0.9), model="linear")
-    with pytest.raises(rocking.errors.InvalidOption, match=r"call simulate or fragility"):
+    with pytest.raises(rocking.errors.OptionError, match=r"call simulate or fragility"):
         rocking.calibrate_history([0.0, 0.1], [0.1, 0.1], p=3.0, alpha=0.2, restitution=0.9, initial_rotation=0.1)
 
 
@@ -704,5 +704,5 @@ def test_a_column_that_is_there_twice_is_refused(tmp_path):
     ):
         path = tmp_path / "table.csv"
         path.write_text(text)
-        with pytest.raises(rocking.errors.UnreadableRecord, match=r"must contain either|must be distinct"):
+        with pytest.raises(rocking.errors.RecordError, match=r"must contain either|must be distinct"):
             read_calibration(path, channel=None, dt=None, units=None)

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from matplotlib.figure import Figure
 
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 DRAW = """
 import sys
@@ -69,7 +69,7 @@ def test_a_notebook_shows_a_figure_once_and_so_one_in_axes_of_the_caller(monkeyp
 
 @pytest.mark.parametrize("size", [(3.0,), (3.0, 2.0, 1.0), (3.0, 0.0), (3.0, float("nan")), "wide", (), 0, ""])
 def test_a_figure_of_no_size_is_refused(size):
-    with pytest.raises(InvalidOption, match="figsize must be"):
+    with pytest.raises(OptionError, match="figsize must be"):
         drawn(figsize=size)
 
 

@@ -6,7 +6,7 @@ import pytest
 from oracles.paper_scheme import cycles
 
 from rocking import chattering
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 
 def test_eq65_of_the_reference(reference):
@@ -99,9 +99,9 @@ def test_asymptotic_functions_know_their_ends():
     assert np.isinf(chattering.chattering_time(1.01, 2.0, 1.0, method="asymptotic"))
     assert np.isnan(chattering.first_interval(0.9, 2.0)) and chattering.first_interval(1.0, 2.0) == 0.0
     assert chattering.first_impact_speed([[1.0], [1.1]], [1.0, 2.0]).shape == (2, 2)
-    with pytest.raises(InvalidOption, match="below 1"):
+    with pytest.raises(OptionError, match="below 1"):
         chattering.asymptotic_table(1.01, 2.0, 1.0)
-    with pytest.raises(InvalidOption, match="uplifts"):
+    with pytest.raises(OptionError, match="uplifts"):
         chattering.asymptotic_table(0.9, 2.0, 0.9)
 
 
@@ -110,7 +110,7 @@ def test_the_tables_and_the_figure_of_a_report_are_those_of_its_sequence():
     impacts, cycles = (report.to_dataframe(table) for table in report.TABLES)
     assert impacts["interval"].tolist() == report.impacts["interval"].tolist() and len(impacts) > 5
     assert cycles["speed_after"].tolist() == report.cycles["speed_after"].tolist() and len(cycles) > 5
-    with pytest.raises(InvalidOption, match="must be below 1 for the iterative procedure"):
+    with pytest.raises(OptionError, match="must be below 1 for the iterative procedure"):
         chattering.chattering_report(1.03, 2.0, 1.0).to_dataframe("cycles")
     titles = [
         {figure_of.get_suptitle(), *(each.get_title() for each in figure_of.axes)}

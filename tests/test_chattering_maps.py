@@ -137,7 +137,7 @@ def test_a_map_is_the_same_in_one_thread_and_in_several():
     with rocking.set_options(threads=3):
         several = chattering_map(families.sine(BLOCK), parameters)
     assert one.data.identical(several.data)
-    with pytest.raises(rocking.errors.InvalidOption, match="threads"):
+    with pytest.raises(rocking.errors.OptionError, match="threads"):
         rocking.set_options(threads=0)
 
 

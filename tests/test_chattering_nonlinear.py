@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rocking import chattering
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 
 def rests_within_half_a_period(a, omega, eta, alpha):
@@ -70,5 +70,5 @@ def test_both_sides_of_the_critical_amplitude_by_scipy(omega, eta, alpha):
 def test_shape_and_ends():
     assert chattering.critical_amplitude_nonlinear([1.0, 2.0], 1.0, [[0.1], [0.2], [0.3]]).tolist() == [[1.0, 1.0]] * 3
     for alpha in (0.0, -0.1, 1.6, np.nan):
-        with pytest.raises(InvalidOption, match="alpha"):
+        with pytest.raises(OptionError, match="alpha"):
             chattering.critical_amplitude_nonlinear(2.0, 0.92, alpha)

@@ -10,7 +10,7 @@ from oracles.sine_chattering import BITS, first_impacts, rest_time
 
 from rocking import chattering
 from rocking.chattering import expansions
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 
 def test_coefficients_of_the_reference(reference):
@@ -93,9 +93,9 @@ def test_series_knows_its_ends():
     assert chattering.series_coefficients([1.0, 2.0], [[0.5], [0.6], [0.7]], order=3).shape == (3, 2, 3)
     time = chattering.chattering_time([0.5, 1.0], 2.0, 0.9, method="series")
     assert np.isnan(time[0]) and time[1] == 0.0
-    with pytest.raises(InvalidOption, match="order must be"):
+    with pytest.raises(OptionError, match="order must be"):
         chattering.series_coefficients(2.0, 0.9, order=41)
-    with pytest.raises(InvalidOption, match="does not resolve"):
+    with pytest.raises(OptionError, match="does not resolve"):
         chattering.series_coefficients(1e-6, 0.9, order=40)
 
 
@@ -110,5 +110,5 @@ def test_where_double_precision_does_not_resolve_the_series_the_rest_is_told(unr
     assert report.values["chattering_time"]["exact"] > 0.0
     assert np.isnan(report.values["chattering_time"]["series"])
     assert re.search("by a series, 4 terms +none", report.summary())
-    with pytest.raises(InvalidOption, match="order must be a whole number from 1 to 40"):
+    with pytest.raises(OptionError, match="order must be a whole number from 1 to 40"):
         chattering.chattering_report(1.03, 2.0, 0.9, order=41)

@@ -7,18 +7,18 @@ import pytest
 
 import rocking
 from rocking.core import checks
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 
 REAL = [1, 1.0, np.float32(1), np.float64(1), np.int64(1), np.uint8(1), Fraction(1), np.array(1), np.array(1.0)]
 NOT_REAL = ["1", b"1", True, np.True_, np.array(True), None, 1j, np.array([1.0]), [1.0], np.array("1")]
 NOT_FINITE = [np.nan, np.inf, -np.inf, 10**400, np.float32(np.nan)]
 
 CHECKS = {
-    "number": lambda value: checks.real(value, "it", InvalidOption),
-    "finite": lambda value: checks.finite(value, "it", InvalidOption),
-    "positive": lambda value: checks.positive(value, "it", InvalidOption, "s"),
-    "within": lambda value: checks.between(value, "it", InvalidOption, 0.5, 2.0),
-    "share": lambda value: checks.fraction(value, "it", InvalidOption, below=1.5),
+    "number": lambda value: checks.real(value, "it", OptionError),
+    "finite": lambda value: checks.finite(value, "it", OptionError),
+    "positive": lambda value: checks.positive(value, "it", OptionError, "s"),
+    "within": lambda value: checks.between(value, "it", OptionError, 0.5, 2.0),
+    "share": lambda value: checks.fraction(value, "it", OptionError, below=1.5),
 }
 
 
@@ -32,7 +32,7 @@ def test_every_real_number_is_a_number(check, value):
 @pytest.mark.parametrize("check", CHECKS)
 @pytest.mark.parametrize("value", NOT_REAL)
 def test_text_truth_values_and_sequences_are_not_numbers(check, value):
-    with pytest.raises(InvalidOption, match=r"^it must be a .*number.*, not ") as caught:
+    with pytest.raises(OptionError, match=r"^it must be a .*number.*, not ") as caught:
         CHECKS[check](value)
     assert "\n" not in str(caught.value)
 
@@ -40,32 +40,32 @@ def test_text_truth_values_and_sequences_are_not_numbers(check, value):
 @pytest.mark.parametrize("check", [name for name in CHECKS if name != "number"])
 @pytest.mark.parametrize("value", NOT_FINITE)
 def test_only_a_number_need_not_be_finite(check, value):
-    with pytest.raises(InvalidOption, match="must be"):
+    with pytest.raises(OptionError, match="must be"):
         CHECKS[check](value)
 
 
 def test_the_error_is_the_one_that_is_asked_for_and_says_the_unit():
-    with pytest.raises(InvalidBlock, match=r"^height must be a positive number, in m, not -1$"):
-        checks.positive(-1.0, "height", InvalidBlock, "m")
-    with pytest.raises(InvalidBlock, match=r"^p must be a number from 1 to 2, in rad/s, not 3$"):
-        checks.between(3.0, "p", InvalidBlock, 1.0, 2.0, "rad/s")
+    with pytest.raises(BlockError, match=r"^height must be a positive number, in m, not -1$"):
+        checks.positive(-1.0, "height", BlockError, "m")
+    with pytest.raises(BlockError, match=r"^p must be a number from 1 to 2, in rad/s, not 3$"):
+        checks.between(3.0, "p", BlockError, 1.0, 2.0, "rad/s")
 
 
 @pytest.mark.parametrize("value", [2, np.int64(2), np.uint8(2), np.array(2)])
 def test_whole_numbers_are_of_a_whole_type(value):
-    found = checks.integer(value, "it", InvalidOption, 1, 2)
+    found = checks.integer(value, "it", OptionError, 1, 2)
     assert (found, type(found)) == (2, int)
 
 
 @pytest.mark.parametrize("value", [0, 3, 2.0, "2", True, np.True_, None, np.float64(2)])
 def test_other_whole_numbers_are_refused(value):
-    with pytest.raises(InvalidOption, match="it must be a whole number from 1 to 2, not"):
-        checks.integer(value, "it", InvalidOption, 1, 2)
+    with pytest.raises(OptionError, match="it must be a whole number from 1 to 2, not"):
+        checks.integer(value, "it", OptionError, 1, 2)
 
 
 @pytest.mark.parametrize("values", [[1, 2], (1.0, 2.0), np.array([1, 2], np.int8), [Fraction(1), 2], range(1, 3)])
 def test_arrays_of_real_numbers_become_floats(values):
-    found = checks.increasing_numbers(values, "they", InvalidOption)
+    found = checks.increasing_numbers(values, "they", OptionError)
     assert (found.tolist(), found.dtype) == ([1.0, 2.0], np.float64)
 
 
@@ -74,14 +74,14 @@ def test_arrays_of_real_numbers_become_floats(values):
     [["1", "2"], [1, "2"], [True, False], [1, None], [1j], [[1], [1, 2]], np.ma.masked_array([1.0, 2.0], [0, 1])],
 )
 def test_arrays_of_anything_else_are_refused(values):
-    with pytest.raises(InvalidOption, match=r"must (be|not contain)"):
-        checks.numbers(values, "they", InvalidOption)
+    with pytest.raises(OptionError, match=r"must (be|not contain)"):
+        checks.numbers(values, "they", OptionError)
 
 
 @pytest.mark.parametrize("values", [[], [0.0], [-1.0], [np.nan], [np.inf], [[1.0]]])
 def test_positive_numbers_are_one_or_more_of_them(values):
-    with pytest.raises(InvalidOption, match="one or more positive finite numbers"):
-        checks.positive_numbers(values, "they", InvalidOption)
+    with pytest.raises(OptionError, match="one or more positive finite numbers"):
+        checks.positive_numbers(values, "they", OptionError)
 
 
 @pytest.mark.parametrize(

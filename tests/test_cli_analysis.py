@@ -176,7 +176,7 @@ COMMANDS = {
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_figure_that_is_refused_takes_nothing_else_away(run, tmp_path, monkeypatch, request, command):
     def refused(*arguments, **options):
-        raise rocking.errors.InvalidOption("nothing can be drawn of {}", "alpha")
+        raise rocking.errors.OptionError("nothing can be drawn of {}", "alpha")
 
     arguments = COMMANDS[command]
     if command == "calibrate":
@@ -269,7 +269,7 @@ def test_what_was_simulated_is_kept_where_no_curve_can_be_fitted(run, tmp_path):
     rows = list(csv.DictReader((tmp_path / "out" / "outcomes.csv").read_text().splitlines()))
     assert [row["pga_m_s2"] for row in rows] == ["0.1", "0.2", "0.3"]
     block = rocking.Block(half_width=0.12, half_height=0.55)
-    with pytest.raises(rocking.errors.Unfitted) as refused:
+    with pytest.raises(rocking.errors.FitError) as refused:
         rocking.fragility(block, [rocking.records.load(RECORD)], levels=[0.1, 0.2, 0.3])
     assert refused.value.outcomes["peak_rotation_rad"].tolist() == [float(row["peak_rotation_rad"]) for row in rows]
 

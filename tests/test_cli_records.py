@@ -163,7 +163,7 @@ def test_a_pulse_has_the_vertical_component_that_is_given(run):
 
 def test_each_record_counts_once(folder):
     assert len(expand_record_names([str(folder), str(folder / "*.AT2")])) == 3
-    with pytest.raises(rocking.errors.UnreadableRecord, match="matches"):
+    with pytest.raises(rocking.errors.RecordError, match="matches"):
         expand_record_names([str(folder / "*.xyz")])
 
 
@@ -339,11 +339,11 @@ def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
     import warnings
 
     from rocking.cli import analysis as module
-    from rocking.errors import OutsideFit
+    from rocking.errors import OutsideFitWarning
 
     def report(*_):
-        warnings.warn("beyond the fit", OutsideFit, stacklevel=1)
-        raise rocking.errors.InvalidOption("enough")
+        warnings.warn("beyond the fit", OutsideFitWarning, stacklevel=1)
+        raise rocking.errors.OptionError("enough")
 
     monkeypatch.setattr(module, "critical_report", report)
     assert run("critical", 2, 0.9)[2].splitlines() == ["rocking: note: beyond the fit", "rocking: enough"]

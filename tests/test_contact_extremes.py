@@ -229,7 +229,7 @@ def test_a_base_lifts_off_where_the_normal_force_ends(part: int) -> None:
 @pytest.mark.parametrize("friction", [0.0, -0.3, np.nan, "0.3", True])
 def test_a_friction_coefficient_is_a_positive_number(friction) -> None:
     response = simulate(Block(half_width=0.2, half_height=1.0), None, initial_rotation=0.1)
-    with pytest.raises(rocking.errors.InvalidOption, match="friction must be a positive number"):
+    with pytest.raises(rocking.errors.OptionError, match="friction must be a positive number"):
         response.sliding_time(friction)
 
 

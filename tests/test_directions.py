@@ -7,7 +7,7 @@ import pytest
 
 import rocking
 from rocking import Motion, Solid, records, response_rose
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
+from rocking.errors import BlockError, MotionError, OptionError
 
 
 @pytest.fixture(scope="module")
@@ -70,13 +70,13 @@ def test_the_figure_has_the_full_circle(statue, pairs):
 @pytest.mark.parametrize(
     ("change", "error", "sentence"),
     [
-        ({"pairs": []}, InvalidOption, "pairs must contain a pair of horizontal"),
-        ({"pairs": [Motion([0.0, 1.0], [[1.0]])]}, InvalidOption, "a pair of horizontal components for each site"),
-        ({"pairs": Motion([0.0, 1.0], [[1.0]])}, InvalidOption, "pairs must be a list"),
-        ({"pairs": [("a.at2", "b.at2")]}, InvalidMotion, "rocking.read"),
-        ({"pairs": [(Motion([0.0, 1.0], [[1.0]]), Motion([0.0, 1.0], [[1.0]]))]}, InvalidMotion, "is unknown"),
-        ({"levels": [1.0], "measure": "pga_ratio"}, InvalidOption, "pga_ratio"),
-        ({"solid": rocking.Block(width=0.4, height=1.8)}, InvalidBlock, "a Solid is required"),
+        ({"pairs": []}, OptionError, "pairs must contain a pair of horizontal"),
+        ({"pairs": [Motion([0.0, 1.0], [[1.0]])]}, OptionError, "a pair of horizontal components for each site"),
+        ({"pairs": Motion([0.0, 1.0], [[1.0]])}, OptionError, "pairs must be a list"),
+        ({"pairs": [("a.at2", "b.at2")]}, MotionError, "rocking.read"),
+        ({"pairs": [(Motion([0.0, 1.0], [[1.0]]), Motion([0.0, 1.0], [[1.0]]))]}, MotionError, "is unknown"),
+        ({"levels": [1.0], "measure": "pga_ratio"}, OptionError, "pga_ratio"),
+        ({"solid": rocking.Block(width=0.4, height=1.8)}, BlockError, "a Solid is required"),
     ],
 )
 def test_what_is_no_pair_and_no_solid_is_refused(statue, pairs, change, error, sentence):

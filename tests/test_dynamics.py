@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import rocking
 from rocking import dynamics, pulses
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 G = 9.81
 
@@ -184,6 +184,6 @@ def test_the_entry_points_for_blocks_lead_to_those_for_bodies_between_stops(tmp_
             tmp_path, body, pulses.sine(12.0, 5.0, cycles=2), levels=[1.0], **model
         ),
     }
-    with pytest.raises(InvalidOption, match=r"call rocking.dynamics.simulate, or set model to \"linear\""):
+    with pytest.raises(OptionError, match=r"call rocking.dynamics.simulate, or set model to \"linear\""):
         calls[entry]()
     assert calls[entry](model="linear") is not None

@@ -8,7 +8,7 @@ import pytest
 
 import rocking
 from rocking import Block, dynamics, pulses
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
 LEANING = Block.from_parameters(p=(2.0, 2.2), alpha=(0.2, 0.15), restitution=(0.8, 0.85))
@@ -255,9 +255,9 @@ def test_a_spring_that_presses_against_one_of_two_stops_brings_the_body_to_rest_
     free = dynamics.ImpactOscillator(1.0, 0.8, stop=0.01, second_stop=0.05)
     shaking = pulses.sine(0.5, 2.0, cycles=1)
     lively = dynamics.ImpactOscillator(1.0, 1.0, stop=stops[0], second_stop=stops[1])
-    with pytest.raises(InvalidOption, match="restitution 1"):
+    with pytest.raises(OptionError, match="restitution 1"):
         dynamics.simulate(lively, shaking)
-    with pytest.raises(InvalidOption, match="not pressed against a stop"):
+    with pytest.raises(OptionError, match="not pressed against a stop"):
         dynamics.simulate(free, None)
 
 

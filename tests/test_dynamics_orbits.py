@@ -10,7 +10,7 @@ from oracles import closed_orbits
 from rocking import Block, dynamics, pulses
 from rocking.chattering import critical_amplitude
 from rocking.dynamics.maps import compute_distances
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 G = 10.0
 TABLE = 5.0  # Hz
@@ -309,7 +309,7 @@ def test_points_of_a_branch_are_orbits_and_stability_changes_at_its_bifurcations
     assert np.array_equal(stable, on_stable)
     steps = np.diff(branch.values)
     assert np.any(steps > 0.0) and np.any(steps < 0.0)  # it passes the fold
-    with pytest.raises(InvalidOption, match="index must be a whole number from"):
+    with pytest.raises(OptionError, match="index must be a whole number from"):
         branch.orbit(len(branch))
 
 

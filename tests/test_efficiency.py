@@ -80,9 +80,9 @@ def test_a_measure_in_the_blocks_own_units_serves_blocks_of_all_sizes():
 
 def test_what_cannot_be_compared_is_told_in_one_sentence():
     pulse = rocking.pulses.half_sine(1.0, 1.0)
-    with pytest.raises(rocking.errors.InvalidOption, match="must contain at least two motions"):
+    with pytest.raises(rocking.errors.OptionError, match="must contain at least two motions"):
         compare_measures(SLENDER, pulse)
-    with pytest.raises(rocking.errors.InvalidOption, match="periods must be one or more positive"):
+    with pytest.raises(rocking.errors.OptionError, match="periods must be one or more positive"):
         compare_measures(SLENDER, [pulse, pulse], periods=[0.0])
 
 
@@ -99,7 +99,7 @@ def test_motions_of_a_cluster_count_as_one_in_the_intervals():
         assert compared.data.dispersion_low.values == pytest.approx(ends[0] * alone.data.dispersion.values, rel=1e-12)
         assert compared.data.dispersion_high.values == pytest.approx(ends[1] * alone.data.dispersion.values, rel=1e-12)
     assert "6 motions in 2 clusters" in found.summary() and "6 motions overturn" in alone.summary()
-    with pytest.raises(rocking.errors.InvalidOption, match="fewer than two clusters overturn"):
+    with pytest.raises(rocking.errors.OptionError, match="fewer than two clusters overturn"):
         compare_measures(SLENDER, pulses, clusters=[0] * 6)
 
 
@@ -172,5 +172,5 @@ def test_multiples_of_a_motion_count_once(rectangles):
     found = compare_measures(SLENDER, pulses, periods=[0.7], model="linear", rtol=1e-9)
     for name in ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
         np.testing.assert_allclose(found.data[name].values, rectangles.data[name].values, rtol=1e-7)
-    with pytest.raises(rocking.errors.InvalidOption, match="not multiples of one another"):
+    with pytest.raises(rocking.errors.OptionError, match="not multiples of one another"):
         compare_measures(SLENDER, pulses[:2], model="linear")

@@ -73,7 +73,7 @@ def test_a_block_thrown_over_falls_in_no_time_or_is_refused(model: str, rotation
     for velocity in SPEEDS:
         try:
             thrown = rocking.simulate(BLOCK, None, model=model, initial_rotation=rotation, initial_velocity=velocity)
-        except rocking.errors.InvalidOption:
+        except rocking.errors.OptionError:
             continue
         way = 0.5 * math.pi - math.copysign(rotation, velocity)
         if velocity < 0.0 and rotation > 0.0:

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, simulate
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.response.figure import compute_boundary, compute_course
 
 COLUMN = Block(width=0.4, height=2.0, mass=2000.0)
@@ -195,12 +195,12 @@ def test_a_phase_plane_counts_in_radians_where_a_side_has_no_balance(model):
 def test_an_energy_that_is_not_known_is_refused_in_one_sentence(body, words):
     response = simulate(body, None, initial_rotation=0.01, duration=1.0)
     for ask in (lambda: response.kinetic_energy(0.5), lambda: response.impact_losses, response.plot_energy):
-        with pytest.raises(InvalidOption, match=words):
+        with pytest.raises(OptionError, match=words):
             ask()
 
 
 def test_a_ball_has_no_energy_that_overturns_it():
     ball = rocking.dynamics.BouncingBall(restitution=0.8)
     response = rocking.dynamics.simulate(ball, None, initial_position=1.0)
-    with pytest.raises(InvalidOption, match="defined for blocks only, not for a BouncingBall"):
+    with pytest.raises(OptionError, match="defined for blocks only, not for a BouncingBall"):
         response.potential_energy(0.1)

@@ -11,7 +11,7 @@ import pytest
 import rocking
 from rocking import Block, Blocks, Certified, Measure, VelocityThreshold, simulate, simulate_many
 from rocking.engine import tasks as engine
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 
 
 @pytest.fixture(scope="module")
@@ -113,16 +113,16 @@ def test_the_result_can_be_written_and_says_what_it_is(records, tmp_path):
     ],
 )
 def test_bad_options_are_refused(records, options, word):
-    with pytest.raises(InvalidOption, match=word):
+    with pytest.raises(OptionError, match=word):
         simulate_many(Block(half_width=0.2, half_height=1.0), records[0], **options)
 
 
 def test_nothing_to_simulate_is_refused(records):
-    with pytest.raises(InvalidOption, match="at least one motion"):
+    with pytest.raises(OptionError, match="at least one motion"):
         simulate_many(Block(half_width=0.2, half_height=1.0), [])
-    with pytest.raises(InvalidBlock, match="at least one"):
+    with pytest.raises(BlockError, match="at least one"):
         simulate_many([], records[0])
-    with pytest.raises(InvalidOption, match="give duration to limit the simulation"):
+    with pytest.raises(OptionError, match="give duration to limit the simulation"):
         simulate_many(Blocks(p=[1.0, 2.0], alpha=0.1, restitution=[0.9, 1.0]), records[0])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.errors import OptionError, RecordError
 from rocking.explorer import uploads
 from rocking.explorer.catalogue import find_title, list_records, number_stations, read_entries
 from rocking.explorer.motions import read_motion
@@ -173,12 +173,12 @@ def test_a_wrong_answer_is_said_of_its_file_and_leaves_the_list(answer, words):
 
 def test_entries_of_an_address_are_those_of_motions_and_not_too_many():
     assert read_entries("") == []
-    with pytest.raises(InvalidOption, match="not 'width'"):
+    with pytest.raises(OptionError, match="not 'width'"):
         read_entries("motion=none&width=1")
-    with pytest.raises(InvalidOption, match="has 160 entries"):
+    with pytest.raises(OptionError, match="has 160 entries"):
         read_entries("motion=none;" * 161)
     assert read_entries("motion=" + "n" * 39_993) == [{"motion": "n" * 39_993}]
-    with pytest.raises(InvalidOption, match="40000 letters at most"):
+    with pytest.raises(OptionError, match="40000 letters at most"):
         read_entries("motion=" + "n" * 39_994)
 
 
@@ -186,17 +186,17 @@ def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch
     store = UploadStore()
     monkeypatch.setattr(uploads, "MAX_FILES", 3)
     keys = [store.add_file(f"{seed}.txt", samples(seed).encode()) for seed in range(3)]
-    with pytest.raises(UnreadableRecord, match="3 files and 256 MiB are kept at most; take some out of the list"):
+    with pytest.raises(RecordError, match="3 files and 256 MiB are kept at most; take some out of the list"):
         store.add_file("4.txt", samples(4).encode())
     assert store.add_file("again.txt", samples(1).encode()) == keys[1]
     store.describe_file(keys[0])
     store.read(keys[0], None, 0.01, "g")
     store.remove(keys[0])
     assert store.usage()["files"] == 2
-    with pytest.raises(UnreadableRecord, match="not here any more"):
+    with pytest.raises(RecordError, match="not here any more"):
         store.file(keys[0])
     monkeypatch.setattr(uploads, "MAX_BYTES", store.usage()["bytes"] + 10)
-    with pytest.raises(UnreadableRecord, match="cannot be kept"):
+    with pytest.raises(RecordError, match="cannot be kept"):
         store.add_file("4.txt", samples(4).encode())
 
 

@@ -16,7 +16,7 @@ from explorer_texts import in_english
 
 import rocking
 from rocking.chattering import chattering_map, critical_amplitude, families
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
+from rocking.errors import BlockError, MotionError, OptionError, RecordError, RockingError, StudyError
 from rocking.explorer import maps, readings
 from rocking.explorer.code import case_as_command, case_as_python, map_as_python
 from rocking.explorer.core import Explorer
@@ -195,25 +195,25 @@ def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
 @pytest.mark.parametrize(
     ("texts", "error", "words"),
     [
-        ({"width": "0.2"}, InvalidBlock, "either width and height"),
-        ({**STATUE, "p": "3"}, InvalidBlock, "either width and height"),
-        ({**STATUE, "width": "wide"}, InvalidOption, "width must be a length"),
-        ({**STATUE, "width": "-1"}, InvalidBlock, "positive"),
-        ({**STATUE, "width": "nan"}, InvalidBlock, "positive"),
-        ({**STATUE, "colour": "red"}, InvalidOption, "no 'colour'"),
-        ({**STATUE, "pgv": "1"}, InvalidOption, "use only one of them"),
-        ({**STATUE, "motion": "ridgecrest-cls-090"}, UnreadableRecord, "did you mean"),
-        ({**STATUE, "motion": "/etc/passwd"}, UnreadableRecord, "no shipped record"),
-        ({**STATUE, "motion": "file:../../etc/passwd"}, UnreadableRecord, "drop its file"),
-        ({**STATUE, "motion": "none"}, InvalidOption, "no motion to scale"),
-        ({**STATUE, "motion": "sine:amplitude=1"}, InvalidOption, "also requires frequency and cycles"),
-        ({**STATUE, "motion": "sine:amplitude=1,frequency=1,cycles=1e9"}, InvalidMotion, "1000 here at most"),
-        ({**STATUE, "restitution": "0.9999"}, InvalidOption, "hardly comes to rest"),
-        ({**STATUE, "chattering": "never"}, InvalidOption, "chattering must be one of"),
-        ({**STATUE, "model": "x" * 400}, InvalidOption, "at most 300"),
-        ({"width": "0.3", "height": "1", "p": "2"}, InvalidBlock, "a block has either width and height"),
-        ({"pivots": "0.2,0.1", "gyration": "0.4"}, InvalidBlock, "a block has either width and height"),
-        ({"p": "2", "alpha": "0.2", "offset": "0.1"}, InvalidBlock, "a block has either width and height"),
+        ({"width": "0.2"}, BlockError, "either width and height"),
+        ({**STATUE, "p": "3"}, BlockError, "either width and height"),
+        ({**STATUE, "width": "wide"}, OptionError, "width must be a length"),
+        ({**STATUE, "width": "-1"}, BlockError, "positive"),
+        ({**STATUE, "width": "nan"}, BlockError, "positive"),
+        ({**STATUE, "colour": "red"}, OptionError, "no 'colour'"),
+        ({**STATUE, "pgv": "1"}, OptionError, "use only one of them"),
+        ({**STATUE, "motion": "ridgecrest-cls-090"}, RecordError, "did you mean"),
+        ({**STATUE, "motion": "/etc/passwd"}, RecordError, "no shipped record"),
+        ({**STATUE, "motion": "file:../../etc/passwd"}, RecordError, "drop its file"),
+        ({**STATUE, "motion": "none"}, OptionError, "no motion to scale"),
+        ({**STATUE, "motion": "sine:amplitude=1"}, OptionError, "also requires frequency and cycles"),
+        ({**STATUE, "motion": "sine:amplitude=1,frequency=1,cycles=1e9"}, MotionError, "1000 here at most"),
+        ({**STATUE, "restitution": "0.9999"}, OptionError, "hardly comes to rest"),
+        ({**STATUE, "chattering": "never"}, OptionError, "chattering must be one of"),
+        ({**STATUE, "model": "x" * 400}, OptionError, "at most 300"),
+        ({"width": "0.3", "height": "1", "p": "2"}, BlockError, "a block has either width and height"),
+        ({"pivots": "0.2,0.1", "gyration": "0.4"}, BlockError, "a block has either width and height"),
+        ({"p": "2", "alpha": "0.2", "offset": "0.1"}, BlockError, "a block has either width and height"),
     ],
 )
 def test_an_impossible_case_is_refused_with_one_sentence(texts, error, words):
@@ -448,13 +448,13 @@ def test_a_window_that_begins_when_the_response_is_over_is_where_it_moves(explor
     assert explorer.case(short, (400.0, 500.0)).header["window"] == usual
     both = explorer.compare(short, {"model": "linear"}).header["window"]
     assert explorer.compare(short, {"model": "linear"}, (400.0, 500.0)).header["window"] == both
-    with pytest.raises(InvalidOption, match="window"):
+    with pytest.raises(OptionError, match="window"):
         explorer.case(short, (math.nan, 1.0))
 
 
 @pytest.mark.parametrize("window", [(5.0, 5.0), (6.0, 5.0), (math.nan, 1.0), (0.0, math.inf), (400.0, 500.0)])
 def test_a_window_that_is_none_is_refused(explorer, window):
-    with pytest.raises(InvalidOption, match="window"):
+    with pytest.raises(OptionError, match="window"):
         explorer.window(STATUE, window)
 
 
@@ -580,10 +580,10 @@ def test_files_are_known_by_their_content_and_so_many_at_most():
     assert uploads.add_file("a.txt", b"1 2 3") == uploads.add_file("b.txt", b"1 2 3")
     for k in range(MAX_FILES - 1):
         uploads.add_file("x", str(k).encode())
-    with pytest.raises(UnreadableRecord, match="x: it cannot be kept: 120 files and 256 MiB are kept at most"):
+    with pytest.raises(RecordError, match="x: it cannot be kept: 120 files and 256 MiB are kept at most"):
         uploads.add_file("x", b"another")
     assert uploads.add_file("c.txt", b"1 2 3") in uploads.list_records() and len(uploads.list_records()) == MAX_FILES
-    with pytest.raises(UnreadableRecord, match="may be 16 MiB large"):
+    with pytest.raises(RecordError, match="may be 16 MiB large"):
         uploads.add_file("big", bytes(MAX_FILE_SIZE + 1))
 
 
@@ -657,7 +657,7 @@ def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
 @pytest.mark.parametrize("block", ECCENTRIC)
 def test_an_eccentric_block_is_not_mapped_over_one_slenderness_of_both_sides(block):
     texts = {**block, "motion": "one-sine:amplitude=4,frequency=1"}
-    with pytest.raises(InvalidOption, match="is mapped over omega, p, restitution, a, pga, not over 'alpha'"):
+    with pytest.raises(OptionError, match="is mapped over omega, p, restitution, a, pga, not over 'alpha'"):
         maps.read_grid(read_case(texts, UploadStore()), {"x": "alpha", "y": "a"})
     assert "alpha" in maps.list_axes(read_case({**texts, "restitution": "0.9"}, UploadStore()))
 
@@ -687,7 +687,7 @@ def test_the_curves_over_a_map_are_the_critical_amplitudes():
     ],
 )
 def test_axes_that_are_none_are_refused(axes, words):
-    with pytest.raises(InvalidOption, match=words):
+    with pytest.raises(OptionError, match=words):
         maps.read_grid(read_case(SINE, UploadStore()), axes)
 
 
@@ -783,7 +783,7 @@ def test_a_map_says_what_is_other_than_in_the_case():
 @pytest.mark.parametrize("motion", ["one-sine:amplitude=0,frequency=1", "ridgecrest-clc-090"])
 def test_a_map_of_a_motion_that_shakes_nothing_is_refused(motion):
     case = read_case({**_BLOCK, "motion": motion, "scale": "0"}, UploadStore())
-    with pytest.raises(InvalidOption, match="something that shakes the block"):
+    with pytest.raises(OptionError, match="something that shakes the block"):
         maps.read_grid(case, {"x": "p", "y": "pga"})
 
 
@@ -816,7 +816,7 @@ def test_the_critical_amplitude_is_drawn_where_it_parts_complete_chattering_from
 
 def test_a_motion_beyond_all_mechanics_is_refused_before_it_is_simulated():
     for scaling in ({"pga": "1e31"}, {"scale": "1e31"}, {"pgv": "1e40"}):
-        with pytest.raises(InvalidMotion, match=r"must stay below 1e\+30 m/s\^2"):
+        with pytest.raises(MotionError, match=r"must stay below 1e\+30 m/s\^2"):
             read_case({**_BLOCK, "motion": "one-sine:amplitude=3,frequency=1", **scaling}, UploadStore())
     upwards = {"motion": "ridgecrest-clc-090", "vertical": "ridgecrest-clc-up", "scale": "1e29"}
     assert read_case({**_BLOCK, **upwards}, UploadStore()).motion.pga < 1e30
@@ -824,15 +824,15 @@ def test_a_motion_beyond_all_mechanics_is_refused_before_it_is_simulated():
     for axes in (
         {"y": "pga", "y_to": "1e40"}, {"y": "a", "y_to": "1e40"}, {"x": "alpha", "y": "a", "y_to": "1e33"}
     ):  # fmt: skip
-        with pytest.raises(InvalidMotion, match="must stay below"):
+        with pytest.raises(MotionError, match="must stay below"):
             maps.read_grid(case, {"x": "p", **axes, "points": "8"})
-    with pytest.raises(InvalidMotion, match="must stay below"):
+    with pytest.raises(MotionError, match="must stay below"):
         read_sweep(case, {"sweep": "a", "sweep_to": "1e40"})
 
 
 @pytest.mark.parametrize("duration", ["5e-324", "1e-13"])
 def test_a_duration_that_no_window_shows_is_refused(duration):
-    with pytest.raises(InvalidOption, match="duration must be 1e-12 s or more here"):
+    with pytest.raises(OptionError, match="duration must be 1e-12 s or more here"):
         read_case({**STATUE, "duration": duration}, UploadStore())
     explorer = Explorer()
     shortest = {**STATUE, "duration": "1e-12"}
@@ -843,11 +843,11 @@ def test_a_block_that_hardly_comes_to_rest_is_mapped_over_no_points_that_would_b
     case = read_case(
         {**_BLOCK, "restitution": "1", "duration": "10", "motion": "el-centro-meloland-270"}, UploadStore()
     )
-    with pytest.raises(InvalidOption, match="hardly comes to rest"):
+    with pytest.raises(OptionError, match="hardly comes to rest"):
         maps.read_grid(case, {"x": "p", "y": "pga"})
     axes = {"x": "restitution", "y": "pga", "x_to": "0.9989"}
     assert maps.read_grid(case, axes)
-    with pytest.raises(InvalidOption, match="hardly comes to rest"):
+    with pytest.raises(OptionError, match="hardly comes to rest"):
         maps.read_grid(case, {**axes, "x_to": "0.9991"})
 
 
@@ -942,7 +942,7 @@ def test_levels_of_a_study_are_an_axis_in_increasing_order(tmp_path):
 @pytest.mark.parametrize("axis", ["motion", "p", "scale"])
 def test_a_point_beside_a_study_is_refused(study, axis, at):
     if axis == "motion" or at in ("inf", "nan"):
-        with pytest.raises(InvalidOption, match="at_x must be a") as caught:
+        with pytest.raises(OptionError, match="at_x must be a") as caught:
             study.point_to_texts({"x": axis, "y": "alpha", "at_x": at, "at_y": "0.2"}, UploadStore())
         assert caught.value.argument == "at_x"
 
@@ -1025,7 +1025,7 @@ def test_another_case_is_compared_with_as_a_whole(explorer):
     ],
 )
 def test_a_slice_that_is_none_is_refused(study, texts):
-    with pytest.raises(InvalidOption):
+    with pytest.raises(OptionError):
         study.slice(texts)
 
 
@@ -1037,7 +1037,7 @@ def test_a_slice_of_more_points_than_a_map_may_have_is_refused(study, monkeypatc
         if fits:
             assert study.slice({"x": "p", "y": "alpha"}).arrays
         else:
-            with pytest.raises(InvalidOption, match="points are too many for a map"):
+            with pytest.raises(OptionError, match="points are too many for a map"):
                 study.slice({"x": "p", "y": "alpha"})
 
 

@@ -14,7 +14,7 @@ from explorer_client import Client, clients, let_in
 from explorer_texts import in_english
 
 import rocking
-from rocking.errors import InvalidBlock, InvalidOption, RockingError, UnreadableRecord
+from rocking.errors import BlockError, OptionError, RecordError, RockingError
 from rocking.explorer import apart, meshes
 from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.code import case_as_command, case_as_python
@@ -130,7 +130,7 @@ def test_what_is_said_of_a_body_are_its_own_numbers():
     assert in_english(found.header["repaired"]) == "Nothing had to be repaired in the mesh."
     assert np.allclose(found.arrays["support"].reshape(-1, 2), solid.support - solid.centre[:2])
     assert found.arrays["piece"][-1] == len(found.arrays["plan"]) / 2 > 100
-    with pytest.raises(InvalidOption, match="this block is of no mesh"):
+    with pytest.raises(OptionError, match="this block is of no mesh"):
         explorer.body({"width": "0.3", "height": "1"})
 
 
@@ -153,9 +153,9 @@ def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
     first = read_case({**STATUE, "mesh": f"file:{key}"}, store).block
     store.remove(key)
     others = [store.add_file(f"{k}.txt", str(k).encode()) for k in range(MAX_FILES)]
-    with pytest.raises(UnreadableRecord, match=f"{MAX_FILES} files and 256 MiB are kept at most"):
+    with pytest.raises(RecordError, match=f"{MAX_FILES} files and 256 MiB are kept at most"):
         store.add_mesh("box.stl", data)
-    with pytest.raises(UnreadableRecord, match="this mesh is not here any more: drop its file on the page again"):
+    with pytest.raises(RecordError, match="this mesh is not here any more: drop its file on the page again"):
         read_case({**STATUE, "mesh": f"file:{key}"}, store)
     assert len({*others, key}) == MAX_FILES + 1
     store.remove(others[0])
@@ -165,7 +165,7 @@ def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
 
 def test_a_mesh_that_is_refused_is_not_kept(here):
     explorer = Explorer()
-    with pytest.raises(InvalidBlock):
+    with pytest.raises(BlockError):
         explorer.add_mesh("flat.stl", content(trimesh.creation.box((1.0, 1.0, 1e-9))))
     assert explorer.uploads.usage()["files"] == 0
 
@@ -226,7 +226,7 @@ def test_a_hostile_mesh_is_answered_in_one_sentence(name, here, tmp_path, monkey
     monkeypatch.chdir(tmp_path / "folder")
     data, words = HOSTILE[name]
     explorer = Explorer()
-    with pytest.raises(InvalidBlock, match=words) as caught:
+    with pytest.raises(BlockError, match=words) as caught:
         taken = explorer.add_mesh(name, data)
         explorer.case({**STATUE, "mesh": f"file:{taken['key']}"})  # what a choice on the page may correct is taken
     said = str(caught.value)
@@ -238,12 +238,12 @@ def test_a_hostile_mesh_is_answered_in_one_sentence(name, here, tmp_path, monkey
 def test_files_that_are_no_meshes_or_too_large_are_refused():
     store = UploadStore()
     for name in ("a.zip", "a.3mf", "a.tar.gz", "a.obj.zip", "a", "obj", "a.dae", "a.json"):
-        with pytest.raises(UnreadableRecord, match="is no mesh by its name: files of obj, ply, stl, glb, gltf"):
+        with pytest.raises(RecordError, match="is no mesh by its name: files of obj, ply, stl, glb, gltf"):
             store.add_mesh(name, b"PK")
-    with pytest.raises(UnreadableRecord, match="may be 16 MiB large"):
+    with pytest.raises(RecordError, match="may be 16 MiB large"):
         store.add_mesh("a.stl", bytes(MAX_FILE_SIZE + 1))
     for name in ("statu", "../statue", "/etc/passwd", "statue.obj"):
-        with pytest.raises(InvalidBlock, match=r"must be (one of )?.?statue|did you mean"):
+        with pytest.raises(BlockError, match=r"must be (one of )?.?statue|did you mean"):
             read_case({**STATUE, "mesh": name}, store)
 
 
@@ -255,7 +255,7 @@ def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned(here):
     taken = explorer.add_mesh("lying.stl", content(lying))
     assert taken["azimuth"] == 0.0
     texts = {**STATUE, "mesh": f"file:{taken['key']}"}
-    with pytest.raises(InvalidBlock, match="does not stand"):
+    with pytest.raises(BlockError, match="does not stand"):
         explorer.case(texts)
     assert explorer.case({**texts, "up": "-z", "azimuth": "0"}).header["block"]["body"]["name"] == "lying.stl"
 
@@ -272,9 +272,7 @@ def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
         < 1e-5
     )
     monkeypatch.setattr(apart, "_MAX_WAIT", 0.05)
-    with pytest.raises(
-        InvalidBlock, match=r"statue\.obj: takes more than 20 s or 2 GiB to read: make the mesh coarser"
-    ):
+    with pytest.raises(BlockError, match=r"statue\.obj: takes more than 20 s or 2 GiB to read: make the mesh coarser"):
         apart.read_mesh_in_process("statue.obj", data, {})
 
 
@@ -282,13 +280,13 @@ def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
 def test_a_process_that_takes_too_much_is_ended(tmp_path, monkeypatch):
     (tmp_path / "sitecustomize.py").write_text("import resource\nresource.setrlimit(resource.RLIMIT_CPU, (0, 1))\n")
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
-    with pytest.raises(InvalidBlock, match="takes more than"):
+    with pytest.raises(BlockError, match="takes more than"):
         apart.read_mesh_in_process("statue.obj", SHIPPED_MESHES["statue"].read_bytes(), {})
 
 
 def test_what_reads_meshes_may_be_missing(here, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(InvalidOption, match=r"trimesh, which is not installed: run pip install '\.\[mesh\]'"):
+    with pytest.raises(OptionError, match=r"trimesh, which is not installed: run pip install '\.\[mesh\]'"):
         Explorer().add_mesh("box.stl", content(box()))
 
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rocking.engine.schemes import chattering_scheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.explorer.parameters import (
     PARAMETERS,
     PULSES,
@@ -64,7 +64,7 @@ def test_a_pulse_of_the_defaults_of_its_fields_can_be_made(name):
 def test_two_sides_are_read_where_a_parameter_may_have_them_and_refused_elsewhere():
     assert PARAMETERS["restitution"].read("0.9,0.8") == (0.9, 0.8)
     assert PARAMETERS["pivots"].read("20cm,0.1") == (0.2, 0.1)
-    with pytest.raises(InvalidOption, match="must be a length"):
+    with pytest.raises(OptionError, match="must be a length"):
         PARAMETERS["width"].read("0.2,0.3")
 
 

@@ -9,7 +9,7 @@ import pytest
 from explorer_texts import in_english
 
 import rocking
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.explorer.code import sweep_as_python
 from rocking.explorer.inputs import read_case
 from rocking.explorer.periodic import (
@@ -270,5 +270,5 @@ def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
     ],
 )
 def test_a_sweep_that_is_none_is_refused(motion, asked, words):
-    with pytest.raises(InvalidOption, match=words):
+    with pytest.raises(OptionError, match=words):
         read_sweep(case_of(motion), asked)

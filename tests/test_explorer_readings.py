@@ -5,7 +5,7 @@ import pytest
 from explorer_texts import in_english
 
 import rocking
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.explorer import maps, readings
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
@@ -71,7 +71,7 @@ def test_an_instant_outside_the_response_is_refused_by_the_name_of_its_field(exp
         ("soon", "a time, as 1.5"),
         ("", "a time, as 1.5"),
     ):
-        with pytest.raises(InvalidOption, match=words) as refused:
+        with pytest.raises(OptionError, match=words) as refused:
             readings.find_state(explorer, STATUE, text)
         assert refused.value.argument == "at"
 

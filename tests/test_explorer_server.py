@@ -24,7 +24,7 @@ from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
 from rocking.core.threads import LOOKAHEAD, count_cores
-from rocking.errors import InvalidOption, RockingError, StudyError
+from rocking.errors import OptionError, RockingError, StudyError
 from rocking.explorer import launch, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.core import Explorer
@@ -598,7 +598,7 @@ def test_a_missing_package_is_named(run, monkeypatch):
 def test_a_port_that_is_taken_is_said_so():
     here = start_listening(Explorer(), {})
     try:
-        with pytest.raises(InvalidOption, match="cannot be used"):
+        with pytest.raises(OptionError, match="cannot be used"):
             start_listening(Explorer(), {}, port=here.port)
     finally:
         here.socket.close()
@@ -651,7 +651,7 @@ def test_a_response_is_explored_in_a_frame():
         header, arrays = unpacked(client.get(f"{base}/api/case", params=texts).content)
     assert header["peak_rotation"] == response.peak_rotation
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])
-    with pytest.raises(InvalidOption, match="must be a Response"):
+    with pytest.raises(OptionError, match="must be a Response"):
         rocking.explore(response.motion)
 
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import rocking
 from rocking import Motion
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 
 SAMPLES = np.random.default_rng(5).normal(size=40)
 GROUNDS = {
@@ -89,16 +89,16 @@ def test_a_wall_on_a_floor_that_resonates_falls_under_what_it_stands_on_the_grou
     ],
 )
 def test_what_no_floor_can_be_is_refused_in_one_sentence(given, says):
-    with pytest.raises(InvalidMotion, match=says) as refused:
+    with pytest.raises(MotionError, match=says) as refused:
         GROUNDS["record"].floor(*given)
     assert "\n" not in str(refused.value)
-    with pytest.raises(InvalidMotion, match="ringing must be a number from 0 to"):
+    with pytest.raises(MotionError, match="ringing must be a number from 0 to"):
         GROUNDS["record"].floor(1.0, ringing=-1.0)
 
 
 @pytest.mark.parametrize("given", [{"damping": 1e-7}, {"damping": 0.05, "ringing": 3e6}])
 def test_a_floor_that_would_move_for_days_is_refused_at_once(given):
-    with pytest.raises(InvalidMotion, match=r"period = 1 s is too short .* use a longer one, or a shorter ringing"):
+    with pytest.raises(MotionError, match=r"period = 1 s is too short .* use a longer one, or a shorter ringing"):
         rocking.pulses.sine(1.0, 2.0, cycles=2).floor(1.0, **given)
 
 

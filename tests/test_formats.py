@@ -22,7 +22,7 @@ from oracles.damaged_files import TOKENS
 
 from rocking import records
 from rocking.analysis.levels import number_clusters
-from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
+from rocking.errors import MotionError, RecordError, RockingError
 from rocking.records import channels, formats, identify, read
 from rocking.records.formats import source, through_obspy
 from rocking.records.formats.channel import find_missing_value, fit_even_step
@@ -44,7 +44,7 @@ def file(tmp_path: Path) -> Callable[[str | bytes], Path]:
     return write
 
 
-def complaint(path: Path | str, error: type[RockingError] = UnreadableRecord, **request: object) -> str:
+def complaint(path: Path | str, error: type[RockingError] = RecordError, **request: object) -> str:
     """The message with which reading fails."""
     with pytest.raises(error) as caught:
         read(path, **request)
@@ -218,7 +218,7 @@ def test_the_vertical_motion_is_a_channel_by_its_name_whatever_the_horizontal_on
             request = Request.create(None, None, horizontal, several=several)
             assert formats.read_channel(path, request, vertical="Up").motion().pga == read(path, channel="Up").pga
         for file in (path, single):
-            with pytest.raises(UnreadableRecord, match="no channel, file or shipped record 'north'; give one of 1 '"):
+            with pytest.raises(RecordError, match="no channel, file or shipped record 'north'; give one of 1 '"):
                 formats.read_channel(file, Request.create(several=several), vertical="north")
 
 
@@ -494,7 +494,7 @@ def test_two_columns_of_whole_numbers_are_read_where_a_blank_tells_the_comma_fro
 def test_a_long_line_costs_little_more_than_its_size(content: bytes, file: Callable[[bytes], Path]) -> None:
     path = file(content)
     tracemalloc.start()
-    with contextlib.suppress(UnreadableRecord):
+    with contextlib.suppress(RecordError):
         read(path, units="g")
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -538,7 +538,7 @@ def test_of_named_columns_those_with_a_unit_of_acceleration_are_read(file: Calla
 
 @pytest.mark.parametrize("dt", [0.0, -0.01, float("nan"), float("inf"), "fast", [0.01, 0.02], 10**400])
 def test_a_bad_dt_is_refused_before_the_file_is_opened(dt: object) -> None:
-    assert "dt must be a positive number, in s" in complaint("nowhere", InvalidMotion, dt=dt)
+    assert "dt must be a positive number, in s" in complaint("nowhere", MotionError, dt=dt)
 
 
 def test_arguments_must_agree_with_the_file() -> None:
@@ -808,7 +808,7 @@ def test_real_smc(shared: Path) -> None:
 )  # fmt: skip
 def test_what_a_file_does_not_say_is_named_as_data(text: str, request_: dict[str, Any], argument: str, file) -> None:
     path = file(text)
-    with pytest.raises(UnreadableRecord) as caught:
+    with pytest.raises(RecordError) as caught:
         read(path, **request_)
     assert (caught.value.argument, caught.value.path) == (argument, str(path))
     assert str(path) not in caught.value.message.text()

@@ -14,7 +14,7 @@ from rocking import fit_fragility, fragility
 from rocking.analysis.levels import number_clusters, number_families
 from rocking.block import Blocks
 from rocking.core.progress import notes_for
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSES = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.5, 13)]
@@ -216,7 +216,7 @@ def test_any_outcomes_give_a_rising_curve_or_are_refused():
         exceeded = [level >= strength for level, strength in data]
         try:
             curve = fit_fragility(intensity, exceeded).curves[0]
-        except rocking.errors.InvalidOption as error:
+        except rocking.errors.OptionError as error:
             assert "no lognormal can be fitted" in str(error)
             refused.append(data)
             return
@@ -289,7 +289,7 @@ def test_a_cloud_has_every_motion_at_its_own_intensity(alpha):
 
 
 def test_a_limit_of_the_peak_rotation_is_not_negative():
-    with pytest.raises(rocking.errors.InvalidOption, match=r"must be 0 or more, not -0\.5"):
+    with pytest.raises(rocking.errors.OptionError, match=r"must be 0 or more, not -0\.5"):
         fragility(BLOCK, PULSES, levels=[2.5, 3.5], limit_states={"half": -0.5})
 
 
@@ -377,7 +377,7 @@ def test_the_figure_shows_curves_bands_and_shares():
     ],
 )
 def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity, exceeded, sentence):
-    with pytest.raises(rocking.errors.InvalidOption, match=f"'overturning': .*{sentence}"):
+    with pytest.raises(rocking.errors.OptionError, match=f"'overturning': .*{sentence}"):
         fit_fragility(intensity, exceeded)
 
 
@@ -400,7 +400,7 @@ def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity
 )
 def test_data_that_cannot_be_fitted_are_refused(changes, word):
     arguments = {"intensity": [1.0, 2.0, 3.0], "exceeded": [1, 0, 1]} | changes
-    with pytest.raises(rocking.errors.InvalidOption, match=word):
+    with pytest.raises(rocking.errors.OptionError, match=word):
         fit_fragility(arguments.pop("intensity"), arguments.pop("exceeded"), **arguments)
 
 
@@ -419,9 +419,9 @@ def test_studies_that_make_no_fragility_are_refused(changes, word):
 
 
 def test_a_constant_share_contradicts_a_curve_that_rises_and_a_nearly_constant_one_puts_its_median_out_of_reach():
-    with pytest.raises(rocking.errors.InvalidOption, match="the fitted curve does not rise"):
+    with pytest.raises(rocking.errors.OptionError, match="the fitted curve does not rise"):
         fit_fragility([1.0, 2.0, 3.0], [2, 2, 2], trials=4)
-    with pytest.raises(rocking.errors.InvalidOption, match="above all intensities by a factor of more than 1000"):
+    with pytest.raises(rocking.errors.OptionError, match="above all intensities by a factor of more than 1000"):
         fit_fragility([1.0, 2.0, 3.0], [20, 20, 21], trials=100)
 
 
@@ -471,7 +471,7 @@ def test_a_block_of_weight_zero_is_none_of_the_data():
 )
 def test_weights_that_weigh_nothing_are_refused(weights, word):
     block = rocking.Block.from_parameters(p=1.5, alpha=0.2, restitution=0.9)
-    with pytest.raises(InvalidOption, match=word):
+    with pytest.raises(OptionError, match=word):
         fragility([block, block], [rocking.pulses.one_sine(1.0, 1.0)], levels=[1.0, 5.0], weights=weights)
 
 
@@ -570,7 +570,7 @@ def test_components_of_one_station_are_one_cluster_where_that_is_asked_for_and_n
         )
         assert number_clusters([*named, beside, PULSES[0], PULSES[1]], "station").tolist() == [0, 1, 0, 2, 3]
         assert capsys.readouterr().err == ""
-    with pytest.raises(InvalidOption, match="clusters station requires records that name their station"):
+    with pytest.raises(OptionError, match="clusters station requires records that name their station"):
         number_clusters(PULSES, "station")
 
 
@@ -598,7 +598,7 @@ def test_motions_that_are_scaled_to_one_level_are_at_one_intensity(level):
     block = rocking.Block.from_parameters(p=3.0, alpha=0.25, restitution=0.9)
     motions = [rocking.records.load(name).scaled_to(level) for name in rocking.records.names()]
     assert len({motion.pga for motion in motions}) > 1
-    with pytest.raises(rocking.errors.Unfitted, match="all outcomes are at one intensity"):
+    with pytest.raises(rocking.errors.FitError, match="all outcomes are at one intensity"):
         fragility(block, motions)
 
 
@@ -612,7 +612,7 @@ def test_labels_of_pandas_that_are_missing_are_on_their_own_and_masked_outcomes_
     ):
         assert fit_fragility(levels, fell, clusters=labels).curves[0].clusters == 5
     masked = np.ma.masked_array(fell, mask=[0, 0, 0, 0, 0, 1])
-    with pytest.raises(InvalidOption, match="must not contain masked values"):
+    with pytest.raises(OptionError, match="must not contain masked values"):
         fit_fragility(levels, masked)
-    with pytest.raises(InvalidOption, match="must not be masked"):
+    with pytest.raises(OptionError, match="must not be masked"):
         rocking.calibrate([rocking.pulses.one_sine(each, 1.0) for each in levels], masked)

@@ -126,11 +126,11 @@ def test_a_start_on_the_ground_has_no_derivative_to_both_sides() -> None:
 
 def test_what_cannot_be_differentiated_is_refused_in_a_sentence() -> None:
     pulse = rocking.simulate(BLOCK, rocking.pulses.one_sine(2.0, 1.0))
-    with pytest.raises(rocking.errors.InvalidOption, match="not linear between samples"):
+    with pytest.raises(rocking.errors.OptionError, match="not linear between samples"):
         _ = rocking.gradient(pulse).samples
-    with pytest.raises(rocking.errors.InvalidOption, match="no vertical component"):
+    with pytest.raises(rocking.errors.OptionError, match="no vertical component"):
         _ = rocking.gradient(pulse).vertical_samples
-    with pytest.raises(rocking.errors.InvalidOption, match="must be a Response"):
+    with pytest.raises(rocking.errors.OptionError, match="must be a Response"):
         rocking.gradient(BLOCK)
 
 
@@ -179,11 +179,11 @@ def test_a_critical_scale_changes_with_the_start_and_the_vertical_component() ->
 
 def test_scales_that_bracket_no_overturning_are_refused() -> None:
     record = Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    with pytest.raises(rocking.errors.InvalidOption, match=r"does not overturn at the scale 0.2"):
+    with pytest.raises(rocking.errors.OptionError, match=r"does not overturn at the scale 0.2"):
         rocking.critical_scale(BLOCK, record, (0.1, 0.2))
-    with pytest.raises(rocking.errors.InvalidOption, match=r"overturns at the scale 8"):
+    with pytest.raises(rocking.errors.OptionError, match=r"overturns at the scale 8"):
         rocking.critical_scale(BLOCK, record, (8.0, 9.0))
-    with pytest.raises(rocking.errors.InvalidOption, match="requires a motion; got None"):
+    with pytest.raises(rocking.errors.OptionError, match="requires a motion; got None"):
         rocking.critical_scale(BLOCK, None, (8.0, 9.0))
 
 
@@ -209,7 +209,7 @@ def test_scales_in_the_wrong_order_are_refused_where_a_stronger_motion_lets_the_
     pulse = rocking.pulses.one_sine(1.0, 5.0 / np.pi)
     assert rocking.simulate(block, pulse * 8.0).overturned
     assert not rocking.simulate(block, pulse * 14.0).overturned
-    with pytest.raises(rocking.errors.InvalidOption, match=r"bounds must be \(lower, higher\); got \(14, 8\)"):
+    with pytest.raises(rocking.errors.OptionError, match=r"bounds must be \(lower, higher\); got \(14, 8\)"):
         rocking.critical_scale(block, pulse, (14.0, 8.0))
 
 

@@ -13,7 +13,7 @@ from test_gradient import ALPHA, BLOCK, MODELS, RESTITUTION, P, samples_of, slop
 
 import rocking
 from rocking import Block, Motion, RestrainedBlock, Tendon, VelocityThreshold, dynamics, gradient
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 RECORD = Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
 
@@ -367,7 +367,7 @@ def test_the_time_of_overturning_has_derivatives_though_the_peak_has_none() -> N
     ],
 )
 def test_what_is_not_told_is_refused_in_a_sentence(of: Any, at: Any, match: str) -> None:
-    with pytest.raises(InvalidOption, match=match):
+    with pytest.raises(OptionError, match=match):
         gradient(rocking.simulate(BLOCK, RECORD), of, at)
-    with pytest.raises(InvalidOption, match="has no impact"):
+    with pytest.raises(OptionError, match="has no impact"):
         gradient(rocking.simulate(BLOCK, RECORD * 0.01), "impact", 0)

@@ -190,9 +190,9 @@ def test_bands_of_a_block_or_a_motion_that_is_not_there_are_refused(analysis):
     for name in ("motion", "block"):
         assert result.bands(**{name: 1})
         for wrong in (-1, 2, 0.0):
-            with pytest.raises(rocking.errors.InvalidOption, match=f"{name} must be a whole number from 0 to 1"):
+            with pytest.raises(rocking.errors.OptionError, match=f"{name} must be a whole number from 0 to 1"):
                 result.bands(**{name: wrong})
-    with pytest.raises(rocking.errors.InvalidOption, match="block must be a whole number"):
+    with pytest.raises(rocking.errors.OptionError, match="block must be a whole number"):
         result.plot(block=-1)
 
 

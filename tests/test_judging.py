@@ -10,7 +10,7 @@ from scipy import stats
 import rocking
 from rocking import Block, Blocks, ShakeTest
 from rocking.calibration import Validation
-from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.errors import OptionError, RecordError
 
 STRONG, WEAK = rocking.pulses.one_sine(6.0, 1.0), rocking.pulses.one_sine(1.0, 1.0)
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -142,9 +142,9 @@ def test_a_calibration_says_of_tests_what_it_predicts(coarse):
     assert [t.probability for t in rocking.validate(tests, validation).tests] == pytest.approx(
         validation.probabilities.mean(axis=0).tolist()
     )
-    with pytest.raises(InvalidOption, match="a calibration contains its own weights"):
+    with pytest.raises(OptionError, match="a calibration contains its own weights"):
         rocking.validate(tests, calibration, weights=[1.0])
-    with pytest.raises(InvalidOption, match="of 4 tests; got 3 tests"):
+    with pytest.raises(OptionError, match="of 4 tests; got 3 tests"):
         rocking.validate(tests[:3], validation)
 
 
@@ -189,7 +189,7 @@ def test_a_simulation_that_was_given_up_counts_as_half_overturned(small_budget):
     ],
 )
 def test_what_is_no_outcome_is_no_test(given, sentence):
-    with pytest.raises(InvalidOption, match=sentence):
+    with pytest.raises(OptionError, match=sentence):
         ShakeTest(STRONG, **given)
 
 
@@ -206,7 +206,7 @@ def test_what_is_no_outcome_is_no_test(given, sentence):
 )
 def test_what_cannot_be_judged_is_refused_in_a_sentence(change, sentence):
     given = {"tests": [ShakeTest(STRONG, True)], "blocks": BLOCK} | change
-    with pytest.raises(InvalidOption, match=sentence):
+    with pytest.raises(OptionError, match=sentence):
         rocking.validate(given.pop("tests"), given.pop("blocks"), **given)
 
 
@@ -262,7 +262,7 @@ def test_a_table_of_tests_is_read_with_its_units_and_labels(tmp_path):
     ],
 )
 def test_a_wrong_row_is_named_by_its_line(tmp_path, text, line, sentence):
-    with pytest.raises(UnreadableRecord, match=sentence) as caught:
+    with pytest.raises(RecordError, match=sentence) as caught:
         rocking.read_tests(written(tmp_path / "tests.csv", text))
     assert caught.value.line == line and "\n" not in str(caught.value)
 
@@ -285,5 +285,5 @@ def test_the_command_writes_figure_tables_and_numbers(run, undrawn, tmp_path):
 
 def test_predictions_of_tests_that_were_left_out_take_no_lapse_and_no_weights():
     for name, given in (("outlier_probability", 0.3), ("weights", [1.0, 1.0])):
-        with pytest.raises(InvalidOption, match=f"{name} cannot be combined"):
+        with pytest.raises(OptionError, match=f"{name} cannot be combined"):
             rocking.validate(of_outcomes([0, 1]), left_out([0.2, 0.3]), **{name: given})

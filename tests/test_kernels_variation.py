@@ -148,7 +148,7 @@ def test_changes_of_the_rotation_are_zero_at_rest_none_outside_and_the_sum_of_bo
         assert np.array_equal(np.isnan(values), [[False, True, False], [False, True, True]])
         assert values[1, 0] == 0.0
     assert response.sensitivity.rotation(0.0)["initial_rotation"] == pytest.approx(-0.05, rel=1e-15)
-    with pytest.raises(rocking.errors.InvalidOption, match=r"of must be among motion, .*, not 'gravity'"):
+    with pytest.raises(rocking.errors.OptionError, match=r"of must be among motion, .*, not 'gravity'"):
         response.sensitivity.rotation(times, of=["gravity"])
 
 

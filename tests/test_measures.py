@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 from rocking import pulses, records
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 from rocking.motion.motion import Motion
 
 samples = st.lists(st.floats(-10.0, 10.0).map(lambda x: round(x, 3)), min_size=2, max_size=25)
@@ -245,18 +245,18 @@ def test_the_longest_period_is_a_million_durations():
     # The mass of a soft oscillator stays where it is: it moves by the displacement of the ground, or farther after it.
     w = 2.0 * np.pi / 0.9e7
     assert motion.spectral_acceleration(0.9e7, 0.0) >= w * w * motion.pgd * (1.0 - 1e-6) > 0.0
-    with pytest.raises(InvalidMotion, match="one million times the duration, 10 s, gives only the displacement"):
+    with pytest.raises(MotionError, match="one million times the duration, 10 s, gives only the displacement"):
         motion.spectral_acceleration(1.1e7)
 
 
 @pytest.mark.parametrize("fractions", [(0.5, 0.5), (-0.1, 0.5), (0.5, 1.1), (math.nan, 0.5)])
 def test_unusable_fractions_are_refused(fractions):
     assert math.isnan(pulses.rectangular(0.0, 1.0).significant_duration())
-    with pytest.raises(InvalidMotion):
+    with pytest.raises(MotionError):
         pulses.rectangular(1.0, 1.0).significant_duration(*fractions)
 
 
 @pytest.mark.parametrize("oscillator", [(0.0, 0.05), (math.nan, 0.05), (1e-9, 0.05), (1.0, 1.0), (1.0, -0.1)])
 def test_unusable_oscillators_are_refused(oscillator):
-    with pytest.raises(InvalidMotion):
+    with pytest.raises(MotionError):
         pulses.one_sine(1.0, 1.0).spectral_acceleration(*oscillator)

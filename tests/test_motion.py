@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose, assert_array_equal
 
 from rocking import pulses, records
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import MotionError, OptionError
 from rocking.motion.motion import Description, Motion
 from rocking.motion.scaling import Measure
 
@@ -209,7 +209,7 @@ def test_scaling_and_polarity_keep_the_description_true():
     ],
 )
 def test_unusable_measures_are_refused_by_the_name_of_the_argument(call, argument):
-    with pytest.raises(InvalidOption) as caught:
+    with pytest.raises(OptionError) as caught:
         call()
     assert caught.value.argument == argument
 
@@ -287,15 +287,15 @@ def test_a_delay_and_processing_show_in_the_family():
 
 def test_pieces_of_too_high_a_degree_are_refused_and_the_message_says_to_split_them():
     assert Motion([0.0, 1.0], np.ones((1, 21))).pga == 21.0
-    with pytest.raises(InvalidMotion, match="degree 20 or less, not 21: split"):
+    with pytest.raises(MotionError, match="degree 20 or less, not 21: split"):
         Motion([0.0, 1.0], np.ones((1, 22)))
 
 
 def test_pieces_may_be_short_but_not_steep_beyond_all_sense():
     assert Motion([0.0, 1e-16, 1.0], [[1.0, 0.0], [2.0, 0.0]]).pga == 2.0
-    with pytest.raises(InvalidMotion, match="too steep"):
+    with pytest.raises(MotionError, match="too steep"):
         Motion.from_points([0.0, 1e-300, 1.0], [0.0, 1.0, 0.0])
-    with pytest.raises(InvalidMotion, match="must last"):
+    with pytest.raises(MotionError, match="must last"):
         Motion([0.0, 1e-300], [[1.0]])
 
 
@@ -373,7 +373,7 @@ def test_a_rotated_motion_has_the_pieces_of_both_and_one_vertical_component():
     assert found.breakpoints.tolist() == [0.0, 0.5, 1.0, 3.0]
     assert found.vertical is up
     assert found.label == "one with vertical up, with other rotated to 45 deg"
-    with pytest.raises(InvalidMotion, match="different vertical components"):
+    with pytest.raises(MotionError, match="different vertical components"):
         one.with_vertical(up).rotated(other.with_vertical(-up), 45.0, recorded=(0.0, 90.0))
 
 
@@ -385,7 +385,7 @@ def test_components_that_begin_at_different_times_are_refused_until_they_are_cut
     west, north = two_components
     one, other = beginning(west, 100.0), beginning(north, 100.5)
     for first, second in ((one, other), (other, one)):
-        with pytest.raises(InvalidMotion, match=r"360' begins 0.5 s after '\S+270'; remove .* processed\(trim=\(0.5, "):
+        with pytest.raises(MotionError, match=r"360' begins 0.5 s after '\S+270'; remove .* processed\(trim=\(0.5, "):
             first.rotated(second, 30.0)
     found = one.processed(trim=(0.5, one.duration)).rotated(other, 30.0)
     wanted = west.delayed(1e-3).rotated(north.delayed(0.501), 30.0)
@@ -451,6 +451,6 @@ LINE = Motion([0.0, 1.0], [[1.0]], name="line")
     ],
 )
 def test_what_no_motion_can_be_is_refused_in_one_sentence(call, sentence):
-    with pytest.raises(InvalidMotion, match=sentence) as refused:
+    with pytest.raises(MotionError, match=sentence) as refused:
         call()
     assert "\n" not in str(refused.value)

@@ -10,7 +10,7 @@ import pytest
 
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, dynamics, simulate
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.response.perturbed import choose_steps, list_factors
 
 FREE = Block(width=0.24, height=1.1)
@@ -175,9 +175,9 @@ def test_repeats_are_a_table_and_survive_pickling(tmp_path):
     ],
 )
 def test_factors_that_are_none_are_refused(given, message):
-    with pytest.raises(InvalidOption, match=re.escape(message)):
+    with pytest.raises(OptionError, match=re.escape(message)):
         simulate(FREE, RECORD).perturbed(**given)
-    with pytest.raises(InvalidOption, match=r"precision must be a number from 1e-06 to 0\.1, not 1"):
+    with pytest.raises(OptionError, match=r"precision must be a number from 1e-06 to 0\.1, not 1"):
         simulate(FREE, RECORD).summary(precision=1)
 
 

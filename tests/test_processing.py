@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from oracles.cases import wave
 
 from rocking import pulses, records
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 from rocking.motion.motion import Motion
 
 STEP = 0.01
@@ -53,7 +53,7 @@ def test_jumps_survive_a_trim_and_are_not_dropped_by_what_works_on_samples():
     part = ended.processed(trim=(1.0, 4.0))
     assert_array_equal(part.acceleration([0.5, 0.999, 1.0, 2.0]), [1.0, 1.0, 0.0, 0.0])
     for options in ({"baseline": 0}, {"band_pass": (0.1, 0.5)}):
-        with pytest.raises(InvalidMotion, match="linear between samples; call processed\\(resample"):
+        with pytest.raises(MotionError, match="linear between samples; call processed\\(resample"):
             ended.processed(**options)
     assert not ended.processed(resample=0.25).jumps
 
@@ -212,7 +212,7 @@ def test_a_vertical_component_whose_samples_are_at_both_ends_stays_even_and_can_
 
 def test_a_part_of_less_than_two_samples_is_refused_with_what_was_given():
     motion = Motion.from_samples(np.sin(np.arange(100)), 0.01)
-    with pytest.raises(InvalidMotion, match=r"trim must keep at least two samples, 0.01 s apart") as refused:
+    with pytest.raises(MotionError, match=r"trim must keep at least two samples, 0.01 s apart") as refused:
         motion.processed(trim=(0.301, 0.304))
     assert (refused.value.argument, refused.value.value) == ("trim", (0.301, 0.304))
 
@@ -234,13 +234,13 @@ def test_a_part_of_less_than_two_samples_is_refused_with_what_was_given():
     ],
 )
 def test_unusable_arguments_are_refused(arguments):
-    with pytest.raises(InvalidMotion):
+    with pytest.raises(MotionError):
         sampled(np.sin).processed(**arguments)
 
 
 @pytest.mark.parametrize("arguments", [{"baseline": 0}, {"band_pass": (0.1, 10.0)}])
 def test_filters_ask_for_even_samples(arguments):
-    with pytest.raises(InvalidMotion, match="resample"):
+    with pytest.raises(MotionError, match="resample"):
         pulses.ricker(1.0, 1.0).processed(**arguments)
 
 

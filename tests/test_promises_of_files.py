@@ -10,7 +10,7 @@ from promises.promise import Found
 
 import rocking
 from rocking.calibration.tables import read_tests
-from rocking.errors import InvalidOption, RockingError, UnreadableRecord
+from rocking.errors import OptionError, RecordError, RockingError
 from rocking.inputs.quantities import read_array
 from rocking.studies import read_study
 
@@ -47,16 +47,16 @@ def test_a_channel_whose_header_has_lost_lines_does_not_pass_for_the_next_one(fo
     else:
         none = lost(record_files.csmip_v2(channels), "points of accel", "points of veloc")
         untitled = record_files.csmip_v2(channels).rpartition("Corrected accelerogram")
-        with pytest.raises(UnreadableRecord, match="title of the next channel"):
+        with pytest.raises(RecordError, match="title of the next channel"):
             reading.read_record("a", (untitled[0] + untitled[2]).encode(), {})
-    with pytest.raises(UnreadableRecord, match=r"ends this channel's header|specifies 6 values, but 0 follow"):
+    with pytest.raises(RecordError, match=r"ends this channel's header|specifies 6 values, but 0 follow"):
         reading.read_record("a", none.encode(), {})
 
 
 @pytest.mark.parametrize("first", ["9" * 3000 + ",0.1", "0." + "0" * 600 + ",0.1"])
 def test_a_first_row_of_endless_digits_is_no_heading(first):
     text = f"time (s), a (g)\n{first}\n0.01,0.2\n0.02,0.1\n0.03,0.0\n"
-    with pytest.raises(UnreadableRecord, match="line 2"):
+    with pytest.raises(RecordError, match="line 2"):
         rocking.read(io.BytesIO(text.encode()))
 
 
@@ -71,14 +71,14 @@ def test_a_name_that_no_file_can_have_is_refused_in_a_sentence(tmp_path):
 
 @pytest.mark.parametrize("text", ["1:1e999:5", "-1e308:1e308:3", "1:1e999:5:log"])
 def test_a_range_without_finite_ends_is_refused(text):
-    with pytest.raises(InvalidOption, match=r"finite ends|positive ends"):
+    with pytest.raises(OptionError, match=r"finite ends|positive ends"):
         read_array(text, "p")
 
 
 def test_a_rate_of_an_endless_intensity_is_refused_without_a_warning(tmp_path):
     file = tmp_path / "hazard.csv"
     file.write_text("pga_g,annual_rate\n0.1,0.1\n1e308,0.01\n")
-    with pytest.raises(InvalidOption):
+    with pytest.raises(OptionError):
         rocking.HazardCurve.read(file)
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from rocking import pulses
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -259,5 +259,5 @@ def test_a_sine_keeps_what_it_was_made_of():
     ],
 )
 def test_unusable_parameters_are_refused(pulse, given):
-    with pytest.raises(InvalidMotion):
+    with pytest.raises(MotionError):
         pulse(**given)

@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 from rocking import read, records
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import UnreadableRecord
+from rocking.errors import RecordError
 from rocking.records.named import load_motion, make_names_unique
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -99,16 +99,16 @@ def test_the_shipped_files_are_small_and_name_their_sources():
 
 
 def test_an_unknown_name_is_answered_with_a_near_one():
-    with pytest.raises(UnreadableRecord, match="did you mean the shipped record ridgecrest-clc-090"):
+    with pytest.raises(RecordError, match="did you mean the shipped record ridgecrest-clc-090"):
         read("ridgecrest-clc-90")
-    with pytest.raises(UnreadableRecord, match="shipped record ridgecrest-clc-090 or ridgecrest-clc-360"):
+    with pytest.raises(RecordError, match="shipped record ridgecrest-clc-090 or ridgecrest-clc-360"):
         read("ridgecrest-clc")
-    with pytest.raises(UnreadableRecord, match="did you mean el-centro-meloland-360 or el-centro-meloland-270"):
+    with pytest.raises(RecordError, match="did you mean el-centro-meloland-360 or el-centro-meloland-270"):
         records.load("el-centro")
     for typed, meant in (("ridgecrest-clc-u", "clc-up"), ("ridgecrst-clc-up", "clc-up"), ("rigecrest-clc", r"[^ ]*\d")):
-        with pytest.raises(UnreadableRecord, match=rf"did you mean ridgecrest-{meant}\?"):
+        with pytest.raises(RecordError, match=rf"did you mean ridgecrest-{meant}\?"):
             records.load(typed)
-    with pytest.raises(UnreadableRecord, match="there are ridgecrest-clc-090, "):
+    with pytest.raises(RecordError, match="there are ridgecrest-clc-090, "):
         records.load("zzz")
 
 

@@ -109,7 +109,7 @@ def parts_of(value: object, name: str, seen: set[int]) -> Iterator[tuple[str, ob
     seen.add(id(value))
     yield name, value
     for each in [*vars(type(value)), *getattr(value, "__dict__", {})]:
-        with contextlib.suppress(AttributeError, rocking.errors.InvalidOption):  # of what this one lacks
+        with contextlib.suppress(AttributeError, rocking.errors.OptionError):  # of what this one lacks
             if not each.startswith("_") and not callable(part := getattr(value, each)):
                 yield from parts_of(part, f"{name}.{each}", seen)
 

@@ -7,7 +7,7 @@ import pytest
 
 import rocking
 from rocking import AsymptoticTime, Block, Certified, simulate
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 G = 9.80665
 
@@ -140,13 +140,13 @@ def test_a_stop_cuts_the_response_short(block, record, shaken):
     ],
 )
 def test_bad_options_are_refused_in_one_sentence(block, record, options, word):
-    with pytest.raises(InvalidOption, match=word):
+    with pytest.raises(OptionError, match=word):
         simulate(block, **{"motion": record} | options)
 
 
 def test_a_block_that_never_rests_needs_a_duration(block):
     bouncing = Block.from_parameters(p=1.0, alpha=0.2, restitution=1.0)
-    with pytest.raises(InvalidOption, match="give duration to limit the simulation"):
+    with pytest.raises(OptionError, match="give duration to limit the simulation"):
         simulate(bouncing, None, initial_rotation=0.1)
     response = simulate(bouncing, None, initial_rotation=0.1, duration=20.0)
     assert response.duration == 20.0
@@ -169,7 +169,7 @@ def test_functions_of_time_are_nan_outside_the_response_and_nowhere_within(block
     assert not np.isnan(function(within)).any()  # a friction demand may be infinite
     assert np.isnan(function(outside)).all()
     assert np.isnan(function(100.0 * end)).all()
-    with pytest.raises(InvalidOption, match="time must be a number"):
+    with pytest.raises(OptionError, match="time must be a number"):
         function("soon")
 
 

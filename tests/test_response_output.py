@@ -13,7 +13,7 @@ import rocking
 from rocking import Block, simulate
 from rocking.analysis.survey import survey
 from rocking.core.tables import add_unit
-from rocking.errors import InvalidOption, OutputError
+from rocking.errors import OptionError, OutputError
 from rocking.explorer.simulated import describe_outcome
 from rocking.response.summary import format_time, round_ratio
 from rocking.rules import RuleComparison
@@ -121,12 +121,12 @@ def test_every_table_is_a_data_frame_and_a_file_with_units(shaken, tmp_path, tab
 
 
 def test_tables_that_are_none_and_steps_that_mean_nothing_are_refused(shaken, tmp_path):
-    with pytest.raises(InvalidOption, match="table must be one of histories, events, impacts, sequences, not 'nodes'"):
+    with pytest.raises(OptionError, match="table must be one of histories, events, impacts, sequences, not 'nodes'"):
         shaken.to_dataframe("nodes")
-    with pytest.raises(InvalidOption, match="dt is the step of the histories"):
+    with pytest.raises(OptionError, match="dt is the step of the histories"):
         shaken.to_csv(tmp_path / "impacts.csv", "impacts", dt=0.01)
     for read in (shaken.to_dataframe, shaken.to_xarray):
-        with pytest.raises(InvalidOption, match="dt"):
+        with pytest.raises(OptionError, match="dt"):
             read(dt=-1.0)
     with pytest.raises(OutputError, match="nowhere"):
         shaken.to_csv(tmp_path / "nowhere" / "r.csv", "impacts")
@@ -185,15 +185,15 @@ def test_a_window_is_all_that_is_drawn(shaken):
     "window", [(3.0, 2.0), (-1.0, 2.0), (0.0, 1e9), 3.0, ("0", "1"), (0.0, 1.0, 2.0), (1.0, math.nan)]
 )
 def test_a_window_is_a_stretch_of_the_response(shaken, window):
-    with pytest.raises(InvalidOption, match="window"):
+    with pytest.raises(OptionError, match="window"):
         shaken.plot(window=window)
 
 
 def test_unknown_units_and_times_that_are_no_numbers_are_refused(shaken):
-    with pytest.raises(InvalidOption, match="units must be one of slenderness, rad, deg, not 'degrees'"):
+    with pytest.raises(OptionError, match="units must be one of slenderness, rad, deg, not 'degrees'"):
         shaken.plot(rotation_units="degrees")
     for evaluate in (shaken.rotation, shaken.angular_velocity, shaken.normal_force, shaken.friction_demand):
-        with pytest.raises(InvalidOption, match="time"):
+        with pytest.raises(OptionError, match="time"):
             evaluate("1.0")
 
 

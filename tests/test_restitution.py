@@ -10,7 +10,7 @@ from kernel_records import rocking_block
 import rocking
 from rocking import Block, Restitution, RestrainedBlock, dynamics, impact_restitution, one_sided_restitution
 from rocking.block.sides import housner_restitution
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.kernels.events import draw_uniform, restitution_factor
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -41,7 +41,7 @@ def test_angular_momentum_about_every_point_gives_the_restitution(contact, point
         ways = [(plus, minus), (minus, plus)]
         expected = [by_momentum(away, height, gyration, points, contact) for away in ways]
         if any(gained(e, away, height, gyration) > 1.0 for e, away in zip(expected, ways, strict=True)):
-            with pytest.raises(InvalidBlock, match="gain energy"):
+            with pytest.raises(BlockError, match="gain energy"):
                 impact_restitution(**body, contact=contact, points=points)
             continue
         assert impact_restitution(**body, contact=contact, points=points) == pytest.approx(expected, rel=1e-12)
@@ -63,7 +63,7 @@ def test_the_narrowest_contact_keeps_all_energy():
         for share in (0.2345, 0.2346)
     ]
     assert mostly[0] > 1.0 > mostly[1]
-    with pytest.raises(InvalidBlock, match=r"contact must be at least 0\.2346"):
+    with pytest.raises(BlockError, match=r"contact must be at least 0\.2346"):
         impact_restitution(**body, contact=0.2345)
     assert len(impact_restitution(**body, contact=0.2346)) == 2
 
@@ -201,14 +201,14 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
     ],
 )
 def test_what_cannot_be_is_refused_in_one_sentence(make, says):
-    with pytest.raises(InvalidBlock, match=says) as refused:
+    with pytest.raises(BlockError, match=says) as refused:
         make()
     assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize("given", [(0.95, 0.9), (0.9, 1.1), ((0.9, 0.5), (0.95, 0.4))])
 def test_an_error_keeps_the_bound_that_is_wrong(given):
-    with pytest.raises(InvalidBlock) as refused:
+    with pytest.raises(BlockError) as refused:
         Restitution(*given[::-1], seed=1)
     assert refused.value.value == given[["minimum", "maximum"].index(refused.value.argument)]
 
@@ -216,16 +216,16 @@ def test_an_error_keeps_the_bound_that_is_wrong(given):
 def test_what_needs_the_same_factor_each_time_refuses_a_law():
     shaking = rocking.pulses.sine(6.0, 0.8, cycles=1)
     random = RestrainedBlock(COLUMN, restitution=Restitution(0.95, 0.9, seed=1))
-    with pytest.raises(InvalidOption, match="restitution drawn at random at each impact"):
+    with pytest.raises(OptionError, match="restitution drawn at random at each impact"):
         dynamics.stroboscopic_map(random, shaking)
 
 
 @pytest.mark.parametrize("alpha", ["a", math.nan, 5.0])
 def test_a_wall_has_a_slenderness(alpha):
-    with pytest.raises(InvalidBlock, match="alpha"):
+    with pytest.raises(BlockError, match="alpha"):
         one_sided_restitution(alpha)
 
 
 def test_several_points_below_a_flat_body_leave_nothing():
-    with pytest.raises(InvalidBlock, match="too stocky"):
+    with pytest.raises(BlockError, match="too stocky"):
         impact_restitution(distances=(1.0, 5.0), height=0.1, radius_of_gyration=0.1, points=3)

@@ -9,7 +9,7 @@ from oracles.standing import OF_ENSEMBLES, case, drawn
 
 import rocking
 from rocking import Block, Damper, Load, RestrainedBlock, Spring, Tendon, Thrust
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 
 
 def of_restraints(body, j, u):
@@ -96,7 +96,7 @@ def test_maps_take_restraints_but_no_tendon_that_yields():
     aside = RestrainedBlock(column, Tendon(3e5, prestress=1e3, offset=0.1))
     assert has_mirror_symmetry(strobe)
     assert not has_mirror_symmetry(rocking.dynamics.stroboscopic_map(aside, sine))
-    with pytest.raises(InvalidBlock, match="yielding tendons have internal state"):
+    with pytest.raises(BlockError, match="yielding tendons have internal state"):
         rocking.dynamics.stroboscopic_map(RestrainedBlock(column, Tendon(3e5, strength=1e3)), sine)
 
 
@@ -151,7 +151,7 @@ def test_restraints_stay_where_they_are_on_the_block_when_a_load_that_follows_mo
 def test_a_body_too_stocky_for_angular_momentum_carries_a_load_with_a_restitution_that_is_given():
     stocky = Block(width=2.5, height=1.6, mass=1e3, restitution=0.5)
     assert [side.restitution for side in RestrainedBlock(stocky, Load(50.0, 1.6), restitution=0.4).sides] == [0.4, 0.4]
-    with pytest.raises(rocking.errors.InvalidBlock, match=r"too stocky; .*set restitution"):
+    with pytest.raises(rocking.errors.BlockError, match=r"too stocky; .*set restitution"):
         RestrainedBlock(stocky, Load(50.0, 1.6))
 
 
@@ -193,20 +193,20 @@ def test_a_tendon_that_has_yielded_leaves_the_block_free():
     ],
 )
 def test_what_cannot_be_is_refused_in_one_sentence(make, says):
-    with pytest.raises(InvalidBlock, match=says) as refused:
+    with pytest.raises(BlockError, match=says) as refused:
         make()
     assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize("restitution", [0.4, rocking.Restitution(0.4, 0.3, seed=1)])
 def test_a_wall_too_stocky_for_angular_momentum_rocks_one_way_with_a_restitution_that_is_given(restitution):
-    with pytest.raises(InvalidBlock, match=r"too stocky; .*set restitution to a value in \(0, 1\]"):
+    with pytest.raises(BlockError, match=r"too stocky; .*set restitution to a value in \(0, 1\]"):
         Block.one_sided(width=3.0, height=2.0)
     wall = Block.one_sided(width=3.0, height=2.0, restitution=restitution)
     assert wall.is_one_sided and wall.sides[0].restitution == 0.4 and wall.balance[1] == math.inf
     assert wall.sides[0].alpha == pytest.approx(math.atan(1.5), rel=1e-15)
     for wrong, says in ((1.2, "restitution must be in"), ((0.4, 0.5), "must be a number, not a pair")):
-        with pytest.raises(InvalidBlock, match=says):
+        with pytest.raises(BlockError, match=says):
             Block.one_sided(width=3.0, height=2.0, restitution=wrong)
 
 
@@ -273,5 +273,5 @@ def test_blocks_of_all_kinds_are_simulated_together_as_alone():
     limits = np.zeros((4, 2))
     for model in ("nonlinear", "linear"):
         assert np.array_equal(again.kernel_records(model, limits), gathered.kernel_records(model, limits))
-    with pytest.raises(InvalidBlock, match="blocks have no parameter stif; the terms of restraints are sine, cosine"):
+    with pytest.raises(BlockError, match="blocks have no parameter stif; the terms of restraints are sine, cosine"):
         rocking.Blocks(1.0, 0.2, 0.9, stif=3.0)

@@ -9,7 +9,7 @@ import pytest
 
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Tendon, Thrust, dynamics
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.simulation.ensemble import body_coordinates
 
 FACADE = RestrainedBlock(Block(width=0.5, height=5.0, mass=6e3), Thrust(8e2, height=4.0), one_sided=True)
@@ -163,7 +163,7 @@ def test_what_needs_a_free_block_or_any_block_says_so_in_one_sentence():
         lambda: rocking.rocking_spectrum(ball, pulse, model="linear"),
         lambda: rocking.survey(ball, pulse, model="linear"),
     ):
-        with pytest.raises(InvalidOption, match=r"[bB]all") as refused:
+        with pytest.raises(OptionError, match=r"[bB]all") as refused:
             analysis()
         assert "\n" not in str(refused.value)
     for analysis in (
@@ -171,7 +171,7 @@ def test_what_needs_a_free_block_or_any_block_says_so_in_one_sentence():
         lambda: rocking.rules.compare_rules(FACADE, pulse),
         lambda: rocking.rules.west(FACADE, pulse),
     ):
-        with pytest.raises(InvalidBlock, match="a free Block is required, not a RestrainedBlock"):
+        with pytest.raises(BlockError, match="a free Block is required, not a RestrainedBlock"):
             analysis()
-    with pytest.raises(InvalidOption, match="block"):
+    with pytest.raises(OptionError, match="block"):
         rocking.simulate(FACADE, rocking.pulses.sine(2.0, 1.0, cycles=2), chattering="time", model="linear")

@@ -289,7 +289,7 @@ def test_every_result_is_written_as_tables_whose_columns_have_units(results, tmp
             rows = found.data[[*(found.TABLES[table] or found.data)]].to_dataframe()
             assert len(found.to_dataframe(table)) == len(rows) == len(written[name, table]) - 1
         assert found.to_dataframe().equals(found.to_dataframe(next(iter(found.TABLES))))
-        with pytest.raises(errors.InvalidOption, match="table must be one of"):
+        with pytest.raises(errors.OptionError, match="table must be one of"):
             found.to_dataframe("histories")
     assert {key: lines[0] for key, lines in written.items()} == HEADERS
 
@@ -310,7 +310,7 @@ def test_a_part_of_a_result_is_a_result(spectrum):
     part = spectrum.select(alpha=0.2, p=[1.0, 3.0])
     assert dict(part.data.sizes) == {"motion": 2, "alpha": 1, "restitution": 1, "p": 2, "fractile": 3}
     assert len(part.plot().axes[0].lines) > 0
-    with pytest.raises(errors.InvalidOption, match="dimensions are"):
+    with pytest.raises(errors.OptionError, match="dimensions are"):
         spectrum.select(height=1.0)
 
 
@@ -339,7 +339,7 @@ def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
     header = (tmp_path / "outcomes.csv").read_text().splitlines()[0]
     assert header.startswith("motion,block,polarity,pga_m_s2,peak_rotation_rad,peak_over_alpha,overturned")
     given = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
-    with pytest.raises(errors.InvalidOption, match="no simulations"):
+    with pytest.raises(errors.OptionError, match="no simulations"):
         given.to_csv(tmp_path / "none.csv", "outcomes")
 
 
@@ -377,7 +377,7 @@ def test_a_part_has_no_numbers_of_the_whole(results, of_several):
         ("Basins", "angular_velocity"),
     ):  # fmt: skip
         assert dimension in results[name].data.sizes, name
-        with pytest.raises(errors.InvalidOption, match=f"aggregated over {dimension}; repeat the analysis for a part"):
+        with pytest.raises(errors.OptionError, match=f"aggregated over {dimension}; repeat the analysis for a part"):
             results[name].select(**{dimension: results[name].data[dimension].values[0]})
 
 

@@ -21,7 +21,7 @@ from rocking.analysis.hazard import compute_log_parts, compute_log_rate_within, 
 from rocking.analysis.probit import Probit
 from rocking.analysis.risk import compute_mean_survival
 from rocking.calibration.tables import read_observed
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.scaling import Measure
 
 G = 9.80665
@@ -177,7 +177,7 @@ def test_a_table_is_read_with_its_units(tmp_path: Path) -> None:
     assert "0.1 to 0.5" in repr(hazard)
     path.write_text("sa_g,annual_rate\n0.1,0.02\n0.5,0.001\n")
     assert HazardCurve.read(path, period=1.0).measure == Measure("sa", 1.0)
-    with pytest.raises(InvalidOption, match="period must be a positive number"):
+    with pytest.raises(OptionError, match="period must be a positive number"):
         HazardCurve.read(path, period="1.0")  # type: ignore[arg-type]
 
 
@@ -195,7 +195,7 @@ def test_openquake_probabilities_become_rates(tmp_path: Path) -> None:
     assert hazard.intensity == pytest.approx(np.array([0.05, 0.1, 0.2, 2.0]) * G)
     assert hazard.rate == pytest.approx(-np.log1p(-np.array([0.9, 0.4, 0.1, 0.001])) / 50.0)
     assert len(HazardCurve.read(path).rate) == 2
-    with pytest.raises(InvalidOption, match="no site 2"):
+    with pytest.raises(OptionError, match="no site 2"):
         HazardCurve.read(path, site=2)
 
 
@@ -255,17 +255,17 @@ DAMAGED = "#,,imt='{}',investigation_time={}\nlon,lat,poe-{},poe-0.2\n0,0,0.5,0.
 def test_what_is_no_hazard_curve_is_refused(tmp_path: Path, text: str, options: dict, said: str) -> None:
     path = tmp_path / "site.csv"
     path.write_text(text)
-    with pytest.raises(InvalidOption, match=said) as caught:
+    with pytest.raises(OptionError, match=said) as caught:
         HazardCurve.read(path, **options)
     assert str(path) in str(caught.value) or "site" in options
 
 
 def test_a_missing_file_and_another_measure_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidOption, match="cannot be read"):
+    with pytest.raises(OptionError, match="cannot be read"):
         HazardCurve.read(tmp_path / "none.csv")
-    with pytest.raises(InvalidOption, match="must have the same measure"):
+    with pytest.raises(OptionError, match="must have the same measure"):
         fragility_with(3.0, 0.4).annual_rate(HazardCurve([0.1, 1.0], [1e-2, 1e-3], Measure("pgv")))
-    with pytest.raises(InvalidOption, match="do not depend on a block"):
+    with pytest.raises(OptionError, match="do not depend on a block"):
         HazardCurve([0.1, 1.0], [1e-2, 1e-3], "pga_ratio")
 
 
@@ -322,9 +322,9 @@ def test_survival_is_what_the_rate_and_the_curve_say() -> None:
     assert "most likely never" in repr(alone)
     for one in (long, short, alone):
         assert one.plot().axes
-    with pytest.raises(InvalidOption, match="limit_state"):
+    with pytest.raises(OptionError, match="limit_state"):
         fitted.survival(10.0, limit_state="none")
-    with pytest.raises(InvalidOption, match="years"):
+    with pytest.raises(OptionError, match="years"):
         fitted.survival(0.0)
 
 
@@ -489,7 +489,7 @@ def test_counts_groups_and_motions_are_taken(tmp_path: Path) -> None:
     record = rocking.records.load("el-centro-meloland-270")
     assert found.curves[0].intensity[:2] == pytest.approx([record.pgv, 2.0 * record.pgv])
     assert found.curves[0].clusters == 3
-    with pytest.raises(InvalidOption, match="in units of the block"):
+    with pytest.raises(OptionError, match="in units of the block"):
         read_observed(path, Measure("pgv_ratio"))
 
 
@@ -539,7 +539,7 @@ def test_two_columns_of_one_name_are_refused(heading: str, tmp_path: Path) -> No
         read_observed(path, Measure("pga"))
     hazard = tmp_path / "hazard.csv"
     hazard.write_text("pga_g,annual_rate,Annual rate\n0.1,1e-2,1e-3\n0.2,1e-3,1e-4\n")
-    with pytest.raises(InvalidOption, match="annual_rate"):
+    with pytest.raises(OptionError, match="annual_rate"):
         HazardCurve.read(hazard)
 
 
@@ -557,7 +557,7 @@ def test_per_cent_in_a_heading_are_not_passed_over(tmp_path):
     path.write_text("SA (m/s²),annual rate\n1,1e-2\n4,1e-4\n")
     assert HazardCurve.read(path, period=1.0).intensity.tolist() == [1.0, 4.0]
     path.write_text("PGA (g),annual rate (%)\n0.1,1\n0.4,0.01\n")
-    with pytest.raises(InvalidOption, match=r"annual_rate and one of .*; got PGA \(g\), annual rate \(%\)"):
+    with pytest.raises(OptionError, match=r"annual_rate and one of .*; got PGA \(g\), annual rate \(%\)"):
         HazardCurve.read(path)
 
 
@@ -594,7 +594,7 @@ def test_a_measure_that_is_not_that_of_observed_outcomes_is_refused(tmp_path):
     table = tmp_path / "observed.csv"
     table.write_text("pga_g,overturned\n0.1,0\n0.2,1\n0.3,0\n0.4,1\n")
     for measure in (Measure("pgv"), Measure("sa", 1.0)):
-        with pytest.raises(InvalidOption, match=f"{measure.name}, but the intensities of the outcomes are pga"):
+        with pytest.raises(OptionError, match=f"{measure.name}, but the intensities of the outcomes are pga"):
             read_observed(table, measure)
     assert read_observed(table, Measure("pga"))["measure"] == Measure("pga")
 
@@ -604,7 +604,7 @@ def test_functions_of_intensity_have_one_range():
     functions = (site.rate_of, curve.probability, curve.band, lambda x: curve.largest_rate(x, 100.0))
     for function in functions:
         for wrong in (-1e-300, -1.0, math.nan, [1.0, math.nan]):
-            with pytest.raises(InvalidOption, match="intensities must be nonnegative"):
+            with pytest.raises(OptionError, match="intensities must be nonnegative"):
                 function(wrong)
         assert not np.isnan(function([0.0, 1e-300, 1.0, 1e300, math.inf])).any()
     assert [float(function(0.0)) for function in (functions[0], functions[1], functions[3])] == [

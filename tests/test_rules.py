@@ -147,13 +147,13 @@ def test_every_demand_grows_with_the_motion_and_counts_the_weaker_side(name, rec
 
 
 def test_what_a_rule_cannot_take_is_refused_in_one_sentence(record):
-    with pytest.raises(rocking.errors.InvalidBlock, match=r"priestley requires a restitution above 0\.23"):
+    with pytest.raises(rocking.errors.BlockError, match=r"priestley requires a restitution above 0\.23"):
         rules.priestley(rocking.Block.from_parameters(2.0, 0.2, 0.2), record)
-    with pytest.raises(rocking.errors.InvalidOption, match="rules must be one of west, ishiyama"):
+    with pytest.raises(rocking.errors.OptionError, match="rules must be one of west, ishiyama"):
         rules.apply_rules(TOMBSTONE, record, ["wst"])
-    with pytest.raises(rocking.errors.InvalidMotion, match="a Motion is required, not None"):
+    with pytest.raises(rocking.errors.MotionError, match="a Motion is required, not None"):
         rules.west(TOMBSTONE, None)
-    with pytest.raises(rocking.errors.InvalidOption, match="motions must contain at least one motion"):
+    with pytest.raises(rocking.errors.OptionError, match="motions must contain at least one motion"):
         rules.compare_rules(TOMBSTONE, {})
 
 

@@ -102,7 +102,7 @@ def is_ambiguous(respond: Callable[[], Response]) -> bool:
     """Whether a response says that it is, or is refused since it would balance for ever."""
     try:
         return respond().ambiguous
-    except rocking.errors.InvalidOption as error:
+    except rocking.errors.OptionError as error:
         return "balance" in str(error)
 
 

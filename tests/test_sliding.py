@@ -15,7 +15,7 @@ from rocking.block.friction import resolve_friction
 from rocking.engine.problem import prepare_ground
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup
-from rocking.errors import InvalidOption, RockingError
+from rocking.errors import OptionError, RockingError
 from rocking.kernels import state
 from rocking.kernels.compiled import UNCOMPILED
 from rocking.kernels.march import march
@@ -283,7 +283,7 @@ def test_a_thousand_brackets_of_chattering_while_sliding_contain_the_accumulatio
     ],
 )
 def test_friction_out_of_range_is_refused_in_one_sentence(friction: Any, text: str) -> None:
-    with pytest.raises(InvalidOption, match=text) as caught:
+    with pytest.raises(OptionError, match=text) as caught:
         rocking.simulate(rocking.Block(width=0.4, height=2.0), None, friction=friction, initial_rotation=0.1)
     assert "\n" not in str(caught.value)
 
@@ -299,14 +299,14 @@ def test_bodies_that_cannot_slip_are_refused_in_one_sentence() -> None:
         (rocking.Block.from_parameters((2.0, 2.0), (0.1, 0.3), 0.9), "rigid body"),
     ]
     for body, text in cases:
-        with pytest.raises(InvalidOption, match=text):
+        with pytest.raises(OptionError, match=text):
             rocking.simulate(body, None, friction=0.3, initial_rotation=0.05)
 
 
 def test_derivatives_through_a_slip_are_refused() -> None:
     block = rocking.Block(width=0.5, height=1.8)
     response = rocking.simulate(block, rocking.pulses.one_sine(5.0, 2.0), friction=0.3)
-    with pytest.raises(InvalidOption, match="slips"):
+    with pytest.raises(OptionError, match="slips"):
         _ = response.sensitivity
     assert response.slips and not response.ambiguous
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, Solid
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.solid.mesh import compute_upright_rotation
 from rocking.solid.repair import label_shells
 
@@ -509,7 +509,7 @@ def flat():
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_a_plate_is_too_thin_for_its_size_and_not_for_a_metre(size):
     assert Solid.from_mesh(box((size, size, 1e-7 * size))).volume == pytest.approx(1e-7 * size**3, rel=1e-6)
-    with pytest.raises(InvalidBlock, match="encloses no volume"):
+    with pytest.raises(BlockError, match="encloses no volume"):
         Solid.from_mesh(box((size, size, 1e-11 * size)))
 
 
@@ -604,14 +604,14 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_is_no_body_is_refused_in_one_sentence(case):
     make, sentence = REFUSED[case]
-    with pytest.raises(InvalidBlock, match=sentence) as caught:
+    with pytest.raises(BlockError, match=sentence) as caught:
         make()
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("azimuths", [[], [math.nan], "north", [[0.0]]])
 def test_azimuths_are_numbers(azimuths):
-    with pytest.raises(InvalidOption, match="azimuths must be"):
+    with pytest.raises(OptionError, match="azimuths must be"):
         Solid.from_mesh("statue").rose(azimuths)
 
 
@@ -631,7 +631,7 @@ def test_azimuths_are_numbers(azimuths):
 )  # fmt: skip
 def test_a_file_without_a_mesh_is_refused_by_its_name(tmp_path, name, content, sentence):
     (tmp_path / name).write_text(content)
-    with pytest.raises(InvalidBlock, match=sentence) as caught:
+    with pytest.raises(BlockError, match=sentence) as caught:
         Solid.from_mesh(tmp_path / name)
     assert caught.value.path == str(tmp_path / name)
     assert "\n" not in str(caught.value)
@@ -639,7 +639,7 @@ def test_a_file_without_a_mesh_is_refused_by_its_name(tmp_path, name, content, s
 
 def test_without_trimesh_it_is_said_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(InvalidOption, match=r"pip install '\.\[mesh\]'"):
+    with pytest.raises(OptionError, match=r"pip install '\.\[mesh\]'"):
         Solid.from_mesh("statue")
 
 
@@ -676,7 +676,7 @@ def test_a_stream_names_no_other_file(tmp_path, monkeypatch):
     gltf = {"asset": {"version": "2.0"}, "buffers": [{"uri": "other.bin", "byteLength": 120}]}
     for uri in ("other.bin", "/etc/passwd", "../other.bin", "http://127.0.0.1:9/other.bin", "file:///etc/passwd"):
         gltf["buffers"][0]["uri"] = uri
-        with pytest.raises(InvalidBlock, match=f"a.gltf: cannot be read: '{uri}' is missing"):
+        with pytest.raises(BlockError, match=f"a.gltf: cannot be read: '{uri}' is missing"):
             Solid.from_mesh(named(json.dumps(gltf).encode(), "a.gltf"))
     # Materials of an OBJ file are not looked for.
     scene = b"mtllib /etc/passwd\nusemtl red\n" + trimesh.exchange.obj.export_obj(box()).encode()

@@ -133,7 +133,7 @@ def test_a_figure_shows_any_number_of_curves_and_names_some_of_many(spectrum):
         named = [text.get_text() for text in found.legends[0].get_texts() if "alpha" in text.get_text()]
         assert len(named) == min(count, 8)
         assert named[0].startswith("alpha = 0.1 ") and named[-1].startswith("alpha = 0.3 ")
-    with pytest.raises(rocking.errors.InvalidOption, match="against"):
+    with pytest.raises(rocking.errors.OptionError, match="against"):
         spectrum.plot(against="height")
 
 
@@ -158,7 +158,7 @@ def test_an_ensemble_of_one_block_has_the_spectrum_of_its_shape():
     assert ensemble.data.peak_rotation.values[:, 0] == pytest.approx(grid.data.peak_rotation.values[:, 0, 0], rel=1e-12)
     assert ensemble.data.overturned_share.values.tolist() == grid.data.overturned_share.values[0, 0].tolist()
     assert ensemble.plot().axes
-    with pytest.raises(rocking.errors.InvalidBlock, match=r"give either p .*, not both"):
+    with pytest.raises(rocking.errors.BlockError, match=r"give either p .*, not both"):
         rocking_spectrum(block, motions, p=p, size=[1.0])
 
 

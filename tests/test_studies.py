@@ -462,7 +462,7 @@ def test_another_version_may_read_a_study_but_not_go_on_with_it(tmp_path, monkey
 @pytest.mark.parametrize("executor", [3, "tcp://127.0.0.1:8786", ProcessPoolExecutor])
 def test_what_is_no_executor_is_refused_before_a_unit(tmp_path, executor):
     study = made(tmp_path)
-    with pytest.raises(errors.InvalidOption, match=r"^executor must be a concurrent.futures.Executor or a client of"):
+    with pytest.raises(errors.OptionError, match=r"^executor must be a concurrent.futures.Executor or a client of"):
         study.run(executor=executor)
     assert study.status.done == 0
 
@@ -510,7 +510,7 @@ def test_a_study_is_exported_to_parquet_or_says_what_is_missing(complete, tmp_pa
     assert [*found.columns] == COLUMNS
     np.testing.assert_array_equal(found.impacts_resolved, reference.impacts.values.ravel())
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(errors.InvalidOption, match=r"pip install '\.\[parquet\]' in the source folder"):
+    with pytest.raises(errors.OptionError, match=r"pip install '\.\[parquet\]' in the source folder"):
         study.to_parquet(tmp_path / "other.parquet")
 
 
@@ -526,7 +526,7 @@ def test_units_have_names_of_their_own_and_other_files_are_none(tmp_path):
 
 @pytest.mark.parametrize("width", [0, 100, 513, 1.5])
 def test_units_are_whole_groups_of_blocks(tmp_path, width):
-    with pytest.raises(errors.InvalidOption, match="unit_blocks"):
+    with pytest.raises(errors.OptionError, match="unit_blocks"):
         made(tmp_path, unit_blocks=width)
 
 
@@ -601,5 +601,5 @@ def test_sums_of_weights_in_another_order_make_no_outcome(tmp_path):
     study.run()
     rng = np.random.default_rng(0)
     for _ in range(10):
-        with pytest.raises(errors.Unfitted, match="separated"):
+        with pytest.raises(errors.FitError, match="separated"):
             study.fragility(weights=rng.uniform(0.1, 1.0, 37))

@@ -85,9 +85,9 @@ def test_a_change_with_unknown_verdicts_inside_lies_between_the_known_ones(tmp_p
 def test_what_has_no_critical_scales_is_refused(complete, tmp_path):
     for name, levels in (("one", [2.0]), ("falling", [3.0, 2.0])):
         study = rocking.create_study(tmp_path / name, BLOCKS, MOTIONS, **(OPTIONS | {"levels": levels}))
-        with pytest.raises(rocking.errors.InvalidOption, match="at least two scales, in increasing order"):
+        with pytest.raises(rocking.errors.OptionError, match="at least two scales, in increasing order"):
             study.critical_scales()
-    with pytest.raises(rocking.errors.InvalidOption, match="outcome must be one of overturning, complete_chattering"):
+    with pytest.raises(rocking.errors.OptionError, match="outcome must be one of overturning, complete_chattering"):
         complete.critical_scales("falling")
     with pytest.raises(rocking.errors.StudyError, match="units are missing"):
         rocking.create_study(tmp_path / "new", BLOCKS, MOTIONS, **OPTIONS).critical_scales()

@@ -176,7 +176,7 @@ def test_a_mistake_is_a_sentence_with_its_line(file, mistake):
     text = TEXT if old in TEXT else WALLS
     assert old in text
     file.write_text(text.replace(old, f"{new}\n" if old == GRID else new))
-    with pytest.raises((rocking.errors.StudyError, rocking.errors.UnreadableRecord)) as caught:
+    with pytest.raises((rocking.errors.StudyError, rocking.errors.RecordError)) as caught:
         read_study(file)
     assert sentence in str(caught.value) and "\n" not in str(caught.value)
     assert f"{file}, line {line}: " in str(caught.value)
@@ -194,7 +194,7 @@ def test_unreadable_records_are_left_out_only_where_the_file_says_so(file, tmp_p
     (tmp_path / "broken.AT2").write_text("nothing of use\n")
     records = 'records = ["el-centro-meloland-270", "broken.AT2"]'
     file.write_text(TEXT.replace('records = ["el-centro-meloland-270"]', records))
-    with pytest.raises(rocking.errors.UnreadableRecord, match=r"broken\.AT2"):
+    with pytest.raises(rocking.errors.RecordError, match=r"broken\.AT2"):
         read_study(file)
     file.write_text(file.read_text().replace(records, records + "\nskip_unreadable = true"))
     found = read_study(file)
@@ -339,7 +339,7 @@ def test_units_are_for_those_of_several_records_that_do_not_say_theirs(file, tmp
     assert (silent.duration, says.duration) == pytest.approx((39 * 0.02, 39 * 0.01))
     assert says.pga == pytest.approx(9.80665 * silent.pga)
     file.write_text(several.replace('"silent.txt", ', ""))
-    with pytest.raises(rocking.errors.UnreadableRecord, match=r"omit (units|dt)"):
+    with pytest.raises(rocking.errors.RecordError, match=r"omit (units|dt)"):
         read_study(file)
     vertical = several.replace('"silent.txt", ', "").replace(
         'units = "m/s2"\ndt = 0.02', 'vertical = "silent.txt"\nunits = "g"\ndt = 0.01'
@@ -443,7 +443,7 @@ def test_files_are_found_beside_the_studys_own_wherever_it_is_called(file, tmp_p
     assert motions[1].name == "el-centro-meloland-360"
     (folder / "mine.csv").unlink()
     inside.write_text(TEXT.replace("el-centro-meloland-270", "mine.csv"))
-    with pytest.raises(rocking.errors.UnreadableRecord, match=re.escape(str(folder / "mine.csv"))):
+    with pytest.raises(rocking.errors.RecordError, match=re.escape(str(folder / "mine.csv"))):
         read_study(inside)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import rocking
-from rocking.errors import InvalidOption, StudyError
+from rocking.errors import OptionError, StudyError
 from rocking.studies.folder import Store, contains_study, lock_folder, require_empty, write_atomically
 
 
@@ -105,5 +105,5 @@ def test_a_folder_of_other_files_is_no_place_for_a_study(tmp_path: Path, names: 
 def test_a_part_that_is_none_is_refused(tmp_path: Path, part: str) -> None:
     motion, blocks = rocking.pulses.one_sine(4.0, 1.0), rocking.Blocks([1.0, 2.0], 0.2, 0.9)
     study = rocking.create_study(tmp_path, blocks, motion, unit_blocks=512)
-    with pytest.raises(InvalidOption, match="part must be the number of a part"):
+    with pytest.raises(OptionError, match="part must be the number of a part"):
         study.run(part=part)

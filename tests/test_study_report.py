@@ -67,7 +67,7 @@ def test_the_curve_of_each_block_is_that_of_its_simulations(curves, blocks):
         limits = {name: LIMITS[name]}
         try:
             curve = rocking.fragility(BLOCKS[j], MOTIONS, levels=LEVELS, limit_states=limits).curve(name)
-        except rocking.errors.InvalidOption as error:
+        except rocking.errors.OptionError as error:
             assert str(one.fault.values) == str(error)
             continue
         fitted += 1
@@ -220,11 +220,11 @@ def test_a_block_that_no_curve_fits_says_why(tmp_path):
 
 def test_wrong_options_of_a_report_are_refused(study, run, tmp_path):
     for curves in (study.block_fragilities, study.fragility):
-        with pytest.raises(rocking.errors.InvalidOption, match="confidence must be a number between 0 and 1, not 2"):
+        with pytest.raises(rocking.errors.OptionError, match="confidence must be a number between 0 and 1, not 2"):
             curves(confidence=2)
-        with pytest.raises(rocking.errors.InvalidOption, match="must be 0 or more"):
+        with pytest.raises(rocking.errors.OptionError, match="must be 0 or more"):
             curves(limit_states={"half": -0.5})
-    with pytest.raises(rocking.errors.InvalidOption, match="fractiles must contain at least one number"):
+    with pytest.raises(rocking.errors.OptionError, match="fractiles must contain at least one number"):
         study.spectrum([])
     for options in ("--limit-states foo", "--measure sa", "--fractiles 2", "--confidence 2", "--limit-states half=-1"):
         code, _, err = run("study", "report", study.folder, tmp_path / "out", *options.split())
@@ -268,7 +268,7 @@ def test_the_figures_draw_every_block(study, curves):
     figure = curves.plot()
     for axes in figure.axes[:2]:
         assert sum(len(one.get_offsets()) for one in axes.collections) == 12
-    with pytest.raises(rocking.errors.InvalidOption, match="require a separate figure"):
+    with pytest.raises(rocking.errors.OptionError, match="require a separate figure"):
         study.spectrum().plot(ax=figure.axes[0])
     spectrum = study.spectrum().plot()
     marks = sum(len(one.get_offsets()) for axes in spectrum.axes[:4] for one in axes.collections)

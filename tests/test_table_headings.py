@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rocking.errors import UnreadableRecord
+from rocking.errors import RecordError
 from rocking.inputs.notes import reading_notes, vertical_notes
 from rocking.records.formats import channels, identify, read
 from rocking.records.named import load_motion, load_vertical
@@ -151,7 +151,7 @@ def test_what_is_lost_or_unclear_in_a_table_is_refused_with_its_line(
 ) -> None:
     path = tmp_path / "table.csv"
     path.write_bytes(content.encode())
-    with pytest.raises(UnreadableRecord) as caught:
+    with pytest.raises(RecordError) as caught:
         channels(path, dt=0.01 if "," not in content and ";" not in content and "\t" not in content else None)
     message = str(caught.value)
     assert message.startswith(f"{path}, line {line}: ")
@@ -195,7 +195,7 @@ def test_the_first_row_of_a_table_is_among_its_first_1000_lines(tmp_path: Path) 
         path.write_text(f"{line}\n" * count + rows())
         assert read(path, units="g").samples == pytest.approx(G * np.array(SAMPLES))
     path.write_text("words of a laboratory\n" * 1000 + rows())
-    with pytest.raises(UnreadableRecord, match="none of its first 1000 lines contains only numbers"):
+    with pytest.raises(RecordError, match="none of its first 1000 lines contains only numbers"):
         read(path, units="g")
 
 
@@ -207,7 +207,7 @@ def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) 
     assert channel.times is not None and channel.times.tolist() == [0.0, 0.005, 0.02]
     path.write_text("t (ms),a (g)\n0,0.1\n5,0.2\n10,0.3\n")
     assert read(path, dt=0.005).dt == 0.005
-    with pytest.raises(UnreadableRecord, match=r"the sampling step in the file is 0\.005 s, not dt 5 s"):
+    with pytest.raises(RecordError, match=r"the sampling step in the file is 0\.005 s, not dt 5 s"):
         read(path, dt=5.0)
 
 
@@ -217,7 +217,7 @@ def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) 
 def test_a_column_of_times_alone_is_not_read_as_accelerations(tmp_path, name):
     path = tmp_path / "times.csv"
     path.write_text(f"{name}\n0.000\n0.005\n0.010\n")
-    with pytest.raises(UnreadableRecord, match=r"names no column of accelerations"):
+    with pytest.raises(RecordError, match=r"names no column of accelerations"):
         read(path, dt=0.005, units="g")
 
 
@@ -259,7 +259,7 @@ def test_components_alone_are_read_with_a_step(tmp_path, names):
     found = channels(path, dt=0.01, units="gal")
     assert [channel.name for channel in found] == [name.strip() for name in re.split("[,; ]", names)]
     assert found[0].acceleration == pytest.approx(0.01 * np.array(SAMPLES), rel=1e-15)
-    with pytest.raises(UnreadableRecord, match="the time does not increase from the row before"):
+    with pytest.raises(RecordError, match="the time does not increase from the row before"):
         channels(path, units="gal")
 
 
@@ -267,11 +267,11 @@ def test_of_a_folder_those_that_say_something_else_keep_it_or_are_refused(tmp_pa
     path = tmp_path / "table.csv"
     for unit, what in (("cm/s", "'cm/s', which is not a unit of"), ("counts", "the units 'counts' are unknown")):
         path.write_text(f"t (s),v ({unit})\n" + rows())
-        with pytest.raises(UnreadableRecord, match=what):
+        with pytest.raises(RecordError, match=what):
             load_motion(str(path), units="g", several=True)
     path.write_text("t (s),a (g)\n0,0\n0.01,1\n0.05,0.5\n0.06,0\n")
     assert load_motion(str(path), dt=0.01, several=True).dt is None
-    with pytest.raises(UnreadableRecord, match="not evenly"):
+    with pytest.raises(RecordError, match="not evenly"):
         load_motion(str(path), dt=0.01)
 
 
@@ -327,7 +327,7 @@ def headings(text: str) -> list[str]:
 def test_a_response_spectrum_is_no_accelerogram(heading: str, periods: list[float], tmp_path: Path) -> None:
     path = tmp_path / "record.csv"
     path.write_text(heading + "\n" + wide(periods, [0.9 / (0.3 + period) for period in periods]), encoding="utf-8")
-    with pytest.raises(UnreadableRecord, match=r"names no column of acc|seems to be a response spectrum"):
+    with pytest.raises(RecordError, match=r"names no column of acc|seems to be a response spectrum"):
         read(path)
 
 
@@ -338,7 +338,7 @@ def test_a_title_says_that_a_table_is_a_response_spectrum(title: str, columns: i
     for sign, refused in ((1.0, True), (-1.0, False)):
         path.write_text(title + wide(*(TIMES, [0.5, 0.7 * sign, 0.6, 0.1])[2 - columns :], sign=" "))
         if refused:
-            with pytest.raises(UnreadableRecord, match="seems to be a response spectrum"):
+            with pytest.raises(RecordError, match="seems to be a response spectrum"):
                 read(path, units="g", dt=dt)
         else:
             assert read(path, units="g", dt=dt).pga == pytest.approx(0.7 * G)
@@ -360,7 +360,7 @@ def test_accelerations_that_are_never_negative_are_read_where_a_column_is_named_
         if is_read:
             assert read(path).pga == pytest.approx(0.3 * G)
         else:
-            with pytest.raises(UnreadableRecord, match="or name the column 'time'"):
+            with pytest.raises(RecordError, match="or name the column 'time'"):
                 read(path)
 
 
@@ -378,10 +378,10 @@ def test_a_step_that_a_heading_states_is_not_contradicted(stated: str, columns: 
     path.write_text(f"A STATION\n{stated}\n{names}" + wide(*[SAMPLES] * columns, sign="  "))
     channel = 1 if columns == 3 else None
     assert read(path, dt=0.01, units="gal", channel=channel).dt == 0.01
-    with pytest.raises(UnreadableRecord, match=r"line 2: the heading states .*, not dt 0.02 s; correct one of them"):
+    with pytest.raises(RecordError, match=r"line 2: the heading states .*, not dt 0.02 s; correct one of them"):
         read(path, dt=0.02, units="gal", channel=channel)
     if columns == 1:
-        with pytest.raises(UnreadableRecord, match=r"no column contains times, but the heading states .*; give dt"):
+        with pytest.raises(RecordError, match=r"no column contains times, but the heading states .*; give dt"):
             read(path, units="gal")
 
 
@@ -391,7 +391,7 @@ def test_a_step_that_a_heading_states_may_be_rounded(dt: float, tmp_path: Path) 
     for stated, refused in (("0.0078", dt == 0.008), ("0.008", False), ("0.01", True), ("1e-9999", True)):
         path.write_text(f"sampling interval: {stated} s\n" + wide(SAMPLES))
         if refused:
-            with pytest.raises(UnreadableRecord, match="correct one of them"):
+            with pytest.raises(RecordError, match="correct one of them"):
                 read(path, dt=dt, units="g")
         else:
             assert read(path, dt=dt, units="g").dt == dt

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import rocking
 from rocking.chattering import chattering_time
 from rocking.engine.schemes import chattering_scheme
-from rocking.errors import OutsideFit
+from rocking.errors import OutsideFitWarning
 
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks/bench_schemes.py"))
 BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
@@ -108,7 +108,7 @@ def test_between_eq_76_and_the_critical_amplitude_the_scheme_rests_falsely(a, om
         )
     assert by_eq76.false_rests.size == (4 if omega == 4.0 else 2)
     assert by_exact.false_rests.size == by_exact.missed.size == 0
-    assert {warning.category for warning in caught} == ({OutsideFit} if omega == 12.0 else set())
+    assert {warning.category for warning in caught} == ({OutsideFitWarning} if omega == 12.0 else set())
 
 
 def test_eq_76_ends_chattering_by_stall_only_where_it_is_too_small():
@@ -132,7 +132,7 @@ def test_a_treatment_is_made_of_its_name_and_parameter():
         ("time=eq78", "eq76, eq77, exact"),
         ("velocity=x", "must be a number"),
     ):
-        with pytest.raises(rocking.errors.InvalidOption, match=sentence):
+        with pytest.raises(rocking.errors.OptionError, match=sentence):
             chattering_scheme(wrong)
 
 
@@ -188,9 +188,9 @@ def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
         rocking.Blocks([2.0], [0.2], [[0.9, 0.8]]),
         rocking.Blocks([[2.0, 2.0], [2.0, 2.5]], [0.2], [0.9]),
     ):
-        with pytest.raises(rocking.errors.InvalidOption, match="symmetric blocks"):
+        with pytest.raises(rocking.errors.OptionError, match="symmetric blocks"):
             scheme.thresholds(different, sine, "linear")
-    with pytest.raises(rocking.errors.InvalidOption, match="sinusoidal"):
+    with pytest.raises(rocking.errors.OptionError, match="sinusoidal"):
         scheme.thresholds(symmetric, sine.delayed(1.0), "linear")
 
 
@@ -198,5 +198,5 @@ def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
 @pytest.mark.parametrize("scheme", [rocking.Certified, rocking.VelocityThreshold, rocking.IntervalThreshold])
 def test_the_parameter_of_a_scheme_is_a_positive_number(scheme, value):
     assert scheme(np.float32(1.0)) == scheme(1)
-    with pytest.raises(rocking.errors.InvalidOption, match="must be"):
+    with pytest.raises(rocking.errors.OptionError, match="must be"):
         scheme(value)

@@ -12,7 +12,7 @@ from oracles.cases import wave
 
 import rocking
 from rocking import Motion
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import MotionError, OptionError
 from rocking.inputs.notes import vertical_notes
 from rocking.motion.description import Origin
 from rocking.motion.motion import compute_uplift_factors, find_exceedances
@@ -89,7 +89,7 @@ def test_the_vertical_component_goes_with_the_motion() -> None:
     "vertical, said", [([1.0, 2.0], "Motion"), (wave(1.0, 1).with_vertical(wave(1.0, 2)), "of its own")]
 )
 def test_what_is_no_vertical_component_is_refused(vertical: object, said: str) -> None:
-    with pytest.raises(InvalidMotion, match=said):
+    with pytest.raises(MotionError, match=said):
         wave(1.0, 3).with_vertical(vertical)
 
 
@@ -208,13 +208,13 @@ def test_levels_of_a_block_with_two_sides_begin_at_the_side_that_the_motion_lift
 def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
     push = Motion.from_samples([0.0, 1.0, 0.0], 0.2)
     heavy = push.with_vertical(Motion.from_samples([0.0, 9.0, 0.0], 0.2))
-    with pytest.raises(InvalidOption, match="no motion lifts a block at any level"):
+    with pytest.raises(OptionError, match="no motion lifts a block at any level"):
         rocking.incremental_dynamic_analysis(block_for(2.0, 0.2, 0.5), heavy)
 
 
 def test_the_asymptotic_time_is_for_horizontal_motions() -> None:
     motion = rocking.pulses.sine(2.2, 1.0, cycles=3).with_vertical(wave(1.0, 1))
-    with pytest.raises(InvalidOption, match="without a vertical component"):
+    with pytest.raises(OptionError, match="without a vertical component"):
         rocking.simulate(block_for(2.0, 0.2), motion, chattering="time")
 
 

@@ -25,7 +25,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import write_figure
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
@@ -69,7 +69,7 @@ class BlockUnderSine:
         check_lifting_amplitude(self.a, above=True)
         require_scalar(check_frequency(self.omega), "omega")
         require_scalar(check_lossy_restitution(self.eta), "eta")
-        checks.positive(self.p, "p", InvalidOption, "rad/s")
+        checks.positive(self.p, "p", OptionError, "rad/s")
         require_scalar(check_slenderness(self.alpha), "alpha")
 
     @property
@@ -100,9 +100,9 @@ class BlockUnderSine:
         motion = self.excitation()
         response = simulate(self.block(), motion, model="linear", chattering=scheme, duration=motion.duration)
         if response.overturned:
-            raise InvalidOption(f"the block overturns under a sine of {{}} = {self.a:g}: take a smaller one", "a")
+            raise OptionError(f"the block overturns under a sine of {{}} = {self.a:g}: take a smaller one", "a")
         if not len(response.impacts):
-            raise InvalidOption(
+            raise OptionError(
                 f"the block does not rock visibly under a sine of {{}} = {self.a!r}: take a larger one", "a"
             )
         return response

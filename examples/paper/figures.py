@@ -10,7 +10,7 @@ from block_responses import figure_1, figure_4, figure_8, figure_9, figure_10, f
 from figure import PaperFigure
 from theory import figure_2, figure_3, figure_5, figure_6, figure_7
 
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 #: All figures of the paper. A figure accepts the parameters that it depends on; their defaults are the paper's values.
 FIGURES: Final[dict[int, Callable[..., PaperFigure]]] = {
@@ -35,10 +35,10 @@ def paper_figure(number: int, **parameters: float) -> PaperFigure:
     (coefficient of restitution), p (rad/s) and alpha (slenderness, rad); a figure accepts those that it depends on.
     """
     if number not in FIGURES:
-        raise InvalidOption(f"the paper has Figs 1 to {len(FIGURES)}, not {number}")
+        raise OptionError(f"the paper has Figs 1 to {len(FIGURES)}, not {number}")
     accepted = [*inspect.signature(FIGURES[number]).parameters]
     strange = [name for name in parameters if name not in accepted]
     if strange:
         has = f"it accepts {', '.join(accepted)}" if accepted else "it is drawn in one way only"
-        raise InvalidOption(f"Fig. {number} does not depend on {', '.join(strange)}; {has}")
+        raise OptionError(f"Fig. {number} does not depend on {', '.join(strange)}; {has}")
     return FIGURES[number](**parameters)

@@ -34,7 +34,7 @@ from rocking.chattering.duration import (
 from rocking.chattering.expansions import check_lossy_restitution, first_impact_speed, first_interval, require_scalar
 from rocking.core.arrays import Floats
 from rocking.core.bisection import bisect
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 #: Amplitudes of Fig. 5, gathered towards both of its vertical tangents, and how far it goes past the second.
 _AMPLITUDES: Final = 201
@@ -323,7 +323,7 @@ def figure_3(*, a: float | None = None, omega: float | None = None, eta: float |
         _require_complete(case, 3)
     ratios = [interval_ratios(case.a, case.omega, case.eta, _RATIOS) for case in cases]
     if not all(np.isfinite(each).any() for each in ratios):
-        raise InvalidOption("intervals are too short for a ratio of two: take a larger {}", "eta")
+        raise OptionError("intervals are too short for a ratio of two: take a larger {}", "eta")
     conditions = [case.words(*_NAMES) for case in cases]
     columns = {f"ratio_{'ab'[k]}": values for k, values in enumerate(ratios)}
     return PaperFigure(
@@ -367,7 +367,7 @@ def _ratio_statements(case: BlockUnderSine, ratios: Floats, words: str) -> list[
 
 def _require_complete(case: BlockUnderSine, number: int) -> None:
     if math.isnan(case.rest):
-        raise InvalidOption(
+        raise OptionError(
             f"Fig. {number} shows complete chattering: {{}} must be below the critical amplitude "
             f"{case.critical:.9g} at {in_words({'omega': case.omega, 'eta': case.eta})}, not {case.a:.9g}",
             "a",

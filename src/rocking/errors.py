@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
-    "DamagedStudy",
-    "InvalidBlock",
-    "InvalidMotion",
-    "InvalidOption",
+    "BlockError",
+    "DamagedStudyError",
+    "FitError",
     "KernelsError",
+    "MotionError",
+    "OptionError",
     "OutputError",
-    "OutsideFit",
+    "OutsideFitWarning",
+    "RecordError",
     "RockingError",
     "StudyError",
-    "UnequalSides",
-    "Unfinished",
-    "Unfitted",
-    "UnreadableRecord",
+    "UnequalSidesError",
+    "UnfinishedError",
 ]
 
 #: Placeholder of an argument's name in a template, or an escaped "{}" from `literal`.
@@ -112,12 +112,12 @@ class RockingError(Exception):
 
     See Also
     --------
-    rocking.errors.InvalidOption : Report an invalid argument of an analysis.
-    rocking.errors.InvalidBlock : Report an invalid block.
+    rocking.errors.OptionError : Report an invalid argument of an analysis.
+    rocking.errors.BlockError : Report an invalid block.
 
     Examples
     --------
-    >>> error = InvalidMotion("{} must be positive, in s, not -1", "dt", path="a.csv", line=3, value=-1)
+    >>> error = MotionError("{} must be positive, in s, not -1", "dt", path="a.csv", line=3, value=-1)
     >>> print(error)
     a.csv, line 3: dt must be positive, in s, not -1
     """
@@ -146,7 +146,7 @@ class RockingError(Exception):
         return self.text()
 
 
-class InvalidBlock(RockingError):
+class BlockError(RockingError):
     """Sizes or parameters do not describe a block that stands and rocks.
 
     See Also
@@ -160,11 +160,11 @@ class InvalidBlock(RockingError):
     >>> rocking.Block(width=-0.4, height=2.0)
     Traceback (most recent call last):
         ...
-    rocking.errors.InvalidBlock: width must be a positive number, in m, not -0.4
+    rocking.errors.BlockError: width must be a positive number, in m, not -0.4
     """
 
 
-class UnequalSides(InvalidBlock, AttributeError):
+class UnequalSidesError(BlockError, AttributeError):
     """A property of one value was requested for a block with unequal sides (see `Block.sides`).
 
     It is also an AttributeError, so that tools that inspect all attributes of an object skip the property.
@@ -172,7 +172,7 @@ class UnequalSides(InvalidBlock, AttributeError):
     See Also
     --------
     rocking.block.Side : Describe one side of a block.
-    rocking.errors.InvalidBlock : Report an invalid block.
+    rocking.errors.BlockError : Report an invalid block.
 
     Examples
     --------
@@ -181,19 +181,19 @@ class UnequalSides(InvalidBlock, AttributeError):
     >>> block.alpha
     Traceback (most recent call last):
         ...
-    rocking.errors.UnequalSides: alpha is 0.14889 on side + and 0.244979 on side - of this block: ...
+    rocking.errors.UnequalSidesError: alpha is 0.14889 on side + and 0.244979 on side - of this block: ...
     >>> f"{block.sides[0].alpha:.4f}"
     '0.1489'
     """
 
 
-class InvalidMotion(RockingError):
+class MotionError(RockingError):
     """Samples, step or parameters of a ground motion are invalid.
 
     See Also
     --------
     rocking.Motion : Create a ground motion.
-    rocking.errors.UnreadableRecord : Report an unreadable record file.
+    rocking.errors.RecordError : Report an unreadable record file.
 
     Examples
     --------
@@ -201,17 +201,17 @@ class InvalidMotion(RockingError):
     >>> rocking.Motion.from_samples([0.0, 1.0, 0.0], dt=-0.01)
     Traceback (most recent call last):
         ...
-    rocking.errors.InvalidMotion: dt must be a positive number, in s, not -0.01
+    rocking.errors.MotionError: dt must be a positive number, in s, not -0.01
     """
 
 
-class UnreadableRecord(RockingError):
+class RecordError(RockingError):
     """A record file could not be read. The message names the file and, if known, the line.
 
     See Also
     --------
     rocking.read : Read a motion from a record file.
-    rocking.errors.InvalidMotion : Report invalid samples.
+    rocking.errors.MotionError : Report invalid samples.
 
     Examples
     --------
@@ -219,17 +219,17 @@ class UnreadableRecord(RockingError):
     >>> rocking.read("missing.at2")
     Traceback (most recent call last):
         ...
-    rocking.errors.UnreadableRecord: missing.at2: there is no such file; check the name and the folder
+    rocking.errors.RecordError: missing.at2: there is no such file; check the name and the folder
     """
 
 
-class InvalidOption(RockingError):
+class OptionError(RockingError):
     """An argument of an analysis (model, chattering scheme, duration, ...) is invalid.
 
     See Also
     --------
     rocking.RockingError : Catch all errors of the package.
-    rocking.errors.Unfitted : Report outcomes that determine no curve.
+    rocking.errors.FitError : Report outcomes that determine no curve.
 
     Examples
     --------
@@ -238,11 +238,11 @@ class InvalidOption(RockingError):
     >>> rocking.simulate(block, None, model="exact")
     Traceback (most recent call last):
         ...
-    rocking.errors.InvalidOption: model must be one of nonlinear, linear, not 'exact'
+    rocking.errors.OptionError: model must be one of nonlinear, linear, not 'exact'
     """
 
 
-class Unfitted(InvalidOption):
+class FitError(OptionError):
     """Outcomes do not determine a curve. The simulations are retained.
 
     Attributes
@@ -261,7 +261,7 @@ class Unfitted(InvalidOption):
     >>> block = rocking.Block(width=0.4, height=2.0)
     >>> try:
     ...     rocking.fragility(block, [rocking.pulses.one_sine(4.0, 1.0)], levels=[0.1, 5.0])
-    ... except rocking.errors.Unfitted as error:
+    ... except rocking.errors.FitError as error:
     ...     print(error.outcomes["overturned"].tolist())
     [False, True]
     """
@@ -269,7 +269,7 @@ class Unfitted(InvalidOption):
     outcomes: pd.DataFrame | None = None
 
 
-class Unfinished(RockingError):
+class UnfinishedError(RockingError):
     """An analysis has no result because a simulation was abandoned after too many steps.
 
     See Also
@@ -283,7 +283,7 @@ class Unfinished(RockingError):
     >>> block, pulse = rocking.Block(width=0.4, height=2.0), rocking.pulses.one_sine(4.0, 1.0)
     >>> try:
     ...     print(f"{rocking.critical_scale(block, pulse, (0.1, 2.0)).scale:.4f}")
-    ... except rocking.errors.Unfinished as error:
+    ... except rocking.errors.UnfinishedError as error:
     ...     print(error)
     0.6203
     """
@@ -295,7 +295,7 @@ class StudyError(RockingError):
     See Also
     --------
     rocking.create_study : Create a study in a folder.
-    rocking.errors.DamagedStudy : Report a damaged unit of a study.
+    rocking.errors.DamagedStudyError : Report a damaged unit of a study.
 
     Examples
     --------
@@ -307,7 +307,7 @@ class StudyError(RockingError):
     """
 
 
-class DamagedStudy(StudyError):
+class DamagedStudyError(StudyError):
     """A unit of a study is damaged and can be recomputed. The message names the unit and the fault.
 
     See Also
@@ -325,7 +325,7 @@ class DamagedStudy(StudyError):
     >>> rocking.Study(folder).results().load()
     Traceback (most recent call last):
         ...
-    rocking.errors.DamagedStudy: unit unit.0.0.0.0 is damaged: the study's verify(repair=True) computes it again
+    rocking.errors.DamagedStudyError: unit unit.0.0.0.0 is damaged: the study's verify(repair=True) computes it again
     """
 
     def __str__(self) -> str:
@@ -347,7 +347,7 @@ class KernelsError(RockingError):
     """
 
 
-class OutsideFit(UserWarning):
+class OutsideFitWarning(UserWarning):
     """A fitted formula was evaluated beyond the range of its data.
 
     See Also
@@ -359,11 +359,11 @@ class OutsideFit(UserWarning):
     --------
     >>> import rocking, warnings
     >>> with warnings.catch_warnings():
-    ...     warnings.simplefilter("error", rocking.errors.OutsideFit)
+    ...     warnings.simplefilter("error", rocking.errors.OutsideFitWarning)
     ...     rocking.chattering.critical_amplitude(10.0, 0.9, method="eq76")
     Traceback (most recent call last):
         ...
-    rocking.errors.OutsideFit: Eq. 76 was fitted for omega from 0.5 to 8 and eta from 0.5 to 0.97, ...
+    rocking.errors.OutsideFitWarning: Eq. 76 was fitted for omega from 0.5 to 8 and eta from 0.5 to 0.97, ...
     """
 
 

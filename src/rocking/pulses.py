@@ -5,7 +5,7 @@ lines are exact. Pulses start at time 0, are zero after their end, and can be ad
 
 A piece is a Taylor series about its midpoint, moved to its start, and so short that the first neglected term is below
 1e-16 of the amplitude. Large angles are not rounded, because products and quotients include their errors and whole
-turns are subtracted exactly. Numbers that are not finite or out of range raise `InvalidMotion`.
+turns are subtracted exactly. Numbers that are not finite or out of range raise `MotionError`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 from rocking.motion import piecewise
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
@@ -262,12 +262,12 @@ def _check_parameters(**numbers: float) -> dict[str, float]:
     checked = {}
     for name, value in numbers.items():
         if name in ("amplitude", "phase"):
-            checked[name] = checks.finite(value, name, InvalidMotion)
+            checked[name] = checks.finite(value, name, MotionError)
         elif name == "duration":
-            checked[name] = checks.positive(value, name, InvalidMotion, "s")
+            checked[name] = checks.positive(value, name, MotionError, "s")
         else:
-            positive = checks.positive(value, name, InvalidMotion, "Hz")
-            checked[name] = checks.between(positive, "frequency of a pulse", InvalidMotion, 1e-9, 1e6, "Hz")
+            positive = checks.positive(value, name, MotionError, "Hz")
+            checked[name] = checks.between(positive, "frequency of a pulse", MotionError, 1e-9, 1e6, "Hz")
     return checked
 
 
@@ -282,9 +282,9 @@ def _create_motion(
 
 def _create_sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
     parameters = _check_parameters(amplitude=amplitude, frequency=frequency, phase=phase)
-    cycles = checks.positive(cycles, "number of cycles", InvalidMotion, "cycles")
+    cycles = checks.positive(cycles, "number of cycles", MotionError, "cycles")
     if cycles > _MAX_CYCLES:
-        raise InvalidMotion(f"the {{}} of a sine must be at most {_MAX_CYCLES}, not {cycles:g}", "cycles", value=cycles)
+        raise MotionError(f"the {{}} of a sine must be at most {_MAX_CYCLES}, not {cycles:g}", "cycles", value=cycles)
     amplitude, frequency, phase = parameters.values()
     breakpoints = np.linspace(0.0, cycles / frequency, _count_breakpoints(_PIECES_PER_CYCLE * cycles))
     parameters = {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase}
@@ -296,16 +296,14 @@ def _create_sine(family: str, amplitude: float, frequency: float, cycles: float,
 
 def _expand_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> list[float]:
     if np.ndim(amplitude) > 1:
-        raise InvalidMotion("the amplitudes of the lobes must be one number or a flat sequence of numbers")
+        raise MotionError("the amplitudes of the lobes must be one number or a flat sequence of numbers")
     values = np.atleast_1d(np.asarray(amplitude, dtype=object))
-    amplitudes = [checks.finite(value, "amplitude of a lobe", InvalidMotion) for value in values]
-    count = None if lobes is None else checks.integer(lobes, "number of lobes", InvalidMotion, 1, 2 * _MAX_CYCLES)
+    amplitudes = [checks.finite(value, "amplitude of a lobe", MotionError) for value in values]
+    count = None if lobes is None else checks.integer(lobes, "number of lobes", MotionError, 1, 2 * _MAX_CYCLES)
     if np.ndim(amplitude) == 0 and count is not None:
         return amplitudes * count
     if np.ndim(amplitude) == 0 or not amplitudes or count not in (None, len(amplitudes)):
-        raise InvalidMotion(
-            "give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe"
-        )
+        raise MotionError("give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe")
     return amplitudes
 
 
@@ -353,13 +351,13 @@ def ricker(
     """
     amplitude, frequency = _check_parameters(amplitude=amplitude, frequency=frequency).values()
     kinds = ("symmetric", "antisymmetric")
-    symmetric = checks.choice(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
+    symmetric = checks.choice(kind, "kind of a Ricker pulse", MotionError, kinds) == "symmetric"
     rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
     limit = 2.0 * (9.1 if symmetric else 9.3) / rate  # limit at 1e-16 of the peak
-    span = limit if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")
+    span = limit if duration is None else checks.positive(duration, "duration", MotionError, "s")
     if span > limit:
         sentence = f"a Ricker pulse of {frequency:.6g} Hz lasts {limit:.6g} s; give a duration of at most this value"
-        raise InvalidMotion(sentence)
+        raise MotionError(sentence)
     breakpoints = np.linspace(0.0, span, _count_breakpoints(rate * span / _GAUSSIAN_PIECE_LENGTH))
     series = -_compute_gaussian_series(2 if symmetric else 3, _compute_midpoints(breakpoints) - 0.5 * span, rate)
     # (x^2 - 3) x exp(-x^2 / 2) is stationary at x^4 - 6 x^2 + 3 = 0.
@@ -420,10 +418,10 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
     """
     parameters = _check_parameters(amplitude=amplitude, frequency=frequency, phase=phase)
     amplitude, frequency, phase = parameters.values()
-    gamma = checks.positive(gamma, "gamma", InvalidMotion, "cycles")
+    gamma = checks.positive(gamma, "gamma", MotionError, "cycles")
     if not 1.0 <= gamma <= _MAX_CYCLES:
         sentence = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MAX_CYCLES}, not {gamma}"
-        raise InvalidMotion(sentence, "gamma", value=gamma)
+        raise MotionError(sentence, "gamma", value=gamma)
     breakpoints = np.linspace(0.0, gamma / frequency, _count_breakpoints(_PIECES_PER_CYCLE * (gamma + 1.0)))
     turns, rest = multiply_exactly(frequency, _compute_midpoints(breakpoints))
     carrier = _compute_angle(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)

@@ -25,7 +25,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.tables import format_count, format_range
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.records.named import Motions, index_motions, list_motions
@@ -301,7 +301,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If a restitution is so low (below 0.23) that the damping would be critical.
 
     See Also
@@ -327,7 +327,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """
     lowest = math.exp(-0.5 / _DAMPING)
     if blocks.restitution.min() <= lowest:
-        raise InvalidBlock(
+        raise BlockError(
             f"the rule priestley requires a restitution above {lowest:.2g}, where its damping is below critical; got "
             f"{blocks.restitution.min():g}; omit this rule"
         )
@@ -364,8 +364,8 @@ def apply_rules(
     >>> [*apply_rules(rocking.Block(width=0.3, height=0.9), record, ["west", "ishiyama"])]
     ['west', 'ishiyama']
     """
-    requested = [*RULES] if rules is None else checks.items(rules, "rules", InvalidOption)
-    names = [checks.choice(name, "rules", InvalidOption, [*RULES]) for name in requested]
+    requested = [*RULES] if rules is None else checks.items(rules, "rules", OptionError)
+    names = [checks.choice(name, "rules", OptionError, [*RULES]) for name in requested]
     combined = _combine_free_blocks(blocks)
     return {name: RULES[name](combined, motion) for name in names}
 
@@ -446,7 +446,7 @@ def compare_rules(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If there is no motion, a rule does not exist, or the block never comes to rest (restitution 1).
 
     See Also
@@ -471,7 +471,7 @@ def compare_rules(
     0.93 0.93 0.64 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
     """
     named_motions = index_motions(motions)
-    names = None if rules is None else checks.items(rules, "rules", InvalidOption)
+    names = None if rules is None else checks.items(rules, "rules", OptionError)
     # Raise errors before the simulations.
     compute_intensities([*named_motions.values()], Measure("pga"))
     ratios = [

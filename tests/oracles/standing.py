@@ -60,7 +60,7 @@ def body(kind: str, rng: Drawn) -> tuple[RestrainedBlock, Held]:
     while True:
         try:
             return _body(kind, rng)
-        except rocking.errors.InvalidBlock as refused:
+        except rocking.errors.BlockError as refused:
             if "does not stand" not in str(refused):
                 raise
 

@@ -20,7 +20,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.tables import format_within
-from rocking.errors import InvalidOption, Unfitted
+from rocking.errors import FitError, OptionError
 from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import Measure, check_intensities
 
@@ -150,7 +150,7 @@ class FragilityCurve:
         """
         from scipy.special import ndtri
 
-        fraction = checks.fraction(probability, "probability", InvalidOption)
+        fraction = checks.fraction(probability, "probability", OptionError)
         score = float(ndtri(fraction))
         with np.errstate(over="ignore", under="ignore"):
             return float(np.exp((score - self.fitted.intercept[0]) / self.fitted.slope[0]))
@@ -162,8 +162,8 @@ class FragilityCurve:
         and infinite at 0. The confidence is one-sided, as in `Fragility.survival`. A precarious rock that has stood for
         so long contradicts hazard curves above them.
         """
-        duration = checks.positive(years, "years", InvalidOption)
-        fraction = checks.fraction(confidence, "confidence", InvalidOption)
+        duration = checks.positive(years, "years", OptionError)
+        fraction = checks.fraction(confidence, "confidence", OptionError)
         with np.errstate(divide="ignore"):
             return -math.log1p(-fraction) / (duration * self.probability(intensity))
 
@@ -213,11 +213,11 @@ def fit_curve(
     outcomes = Outcomes(z, exceeded, trials)
     reason = probit.explain_missing_fit(outcomes, measure.format_value)
     if reason is not None:
-        raise Unfitted(f"no lognormal can be fitted to {name!r}: {reason}")
+        raise FitError(f"no lognormal can be fitted to {name!r}: {reason}")
     fitted = probit.fit(outcomes.alone())
     log_median = float(-fitted.intercept[0] / fitted.slope[0])
     if not z.min() - math.log(_MAX_MEDIAN_RATIO) <= log_median <= z.max() + math.log(_MAX_MEDIAN_RATIO):
-        raise Unfitted(
+        raise FitError(
             f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, so that the median "
             f"is {'above' if log_median > z.max() else 'below'} all intensities by a factor of more than 1000; use "
             "motions nearer to it, or another measure"
@@ -261,14 +261,14 @@ def create_fragility_line(curve: FragilityCurve, intensity: Floats, measure: Mea
 
 def check_counts(values: ArrayLike, argument: str, size: int, minimum: float, maximum: ArrayLike) -> Floats:
     """Check integers between two bounds, and return one for each intensity."""
-    array = checks.booleans_or_numbers(values, argument, InvalidOption)
+    array = checks.booleans_or_numbers(values, argument, OptionError)
     try:
         numbers = np.broadcast_to(array, size)
     except ValueError:
-        raise InvalidOption(f"{{}} must contain one number for each of the {size} intensities", argument) from None
+        raise OptionError(f"{{}} must contain one number for each of the {size} intensities", argument) from None
     if not np.all((numbers >= minimum) & (numbers <= np.asarray(maximum)) & (numbers == np.floor(numbers))):
         maximum_text = f"{maximum:g}" if isinstance(maximum, float) else "the number of trials"
-        raise InvalidOption(f"{{}} must be whole numbers from {minimum:g} to {maximum_text}", argument)
+        raise OptionError(f"{{}} must be whole numbers from {minimum:g} to {maximum_text}", argument)
     return numbers
 
 
@@ -330,7 +330,7 @@ def format_nrml(
     `measure` contains OpenQuake's name and the factor of its unit, `data_range` the range (SI) of the data, `no_damage`
     the lowest damaging intensity in OpenQuake's unit, and `attributes` the model's id, assetCategory and lossCategory.
     """
-    checks.choice(attributes["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
+    checks.choice(attributes["lossCategory"], "loss_category", OptionError, get_args(LossCategory))
     for argument, name in (
         ("taxonomy", taxonomy),
         ("model_id", attributes["id"]),
@@ -341,7 +341,7 @@ def format_nrml(
     low, high = (measure[1] * end for end in data_range)
     low = max(low, no_damage or 0.0)
     if not high > low * (1.0 + 1e-5):
-        raise InvalidOption(
+        raise OptionError(
             f"a fragility model requires a range of intensities above the uplift of the block; got {low:.6g} to "
             f"{high:.6g}; add motions of other intensities"
         )
@@ -357,7 +357,7 @@ def format_nrml(
     for curve in curves:
         variance = curve.dispersion**2
         if variance > _MAX_VARIANCE:
-            raise InvalidOption(f"a dispersion of {curve.dispersion:.3g} is too large for the mean and stddev of NRML")
+            raise OptionError(f"a dispersion of {curve.dispersion:.3g} is too large for the mean and stddev of NRML")
         mean = measure[1] * curve.median * math.exp(0.5 * variance)
         moments = {"mean": f"{mean:.8g}", "stddev": f"{mean * math.sqrt(math.expm1(variance)):.8g}"}
         ET.SubElement(function, "params", {"ls": curve.limit_state} | moments)
@@ -366,10 +366,10 @@ def format_nrml(
 
 
 def check_nrml_names(names: Iterable[str], argument: str) -> None:
-    """Raise an InvalidOption unless NRML allows all names."""
+    """Raise an OptionError unless NRML allows all names."""
     for name in names:
-        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", checks.text(name, argument, InvalidOption)):
-            raise InvalidOption(
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", checks.text(name, argument, OptionError)):
+            raise OptionError(
                 f"{{}} of NRML must consist of at most 100 letters, digits, dashes and underscores, not {name!r}",
                 argument,
                 value=name,
@@ -382,12 +382,12 @@ def find_openquake_measure(measure: Measure, block: Body | None, model: Model) -
     SA(T) does not state its damping, which is the damping of ground-motion models.
     """
     if measure.has_block_units and block is None:
-        raise InvalidOption(f"{measure.name} is in units of the block; give {{}} to convert it to PGA or PGV", "block")
+        raise OptionError(f"{measure.name} is in units of the block; give {{}} to convert it to PGA or PGV", "block")
     unit = 1.0 if block is None else float(compute_units(block.as_bodies(), measure, model)[0])
     if measure.motion_measure_name == "pgv":
         return "PGV", 100.0 * unit
     if measure.damping != DAMPING:
-        raise InvalidOption(
+        raise OptionError(
             f"the {{}} of a spectral acceleration must be {DAMPING:g} of critical for OpenQuake; got "
             f"{measure.damping:g}; fit the fragility against a measure with this damping",
             "damping",

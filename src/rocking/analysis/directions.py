@@ -19,7 +19,7 @@ from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.schemes import ChatteringScheme
 from rocking.engine.tasks import describe_missing
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.named import list_motions
@@ -81,11 +81,11 @@ def response_rose(
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If `solid` is not a Solid, or is too stocky to rock across an azimuth.
-    InvalidMotion
+    MotionError
         If a component is not a motion, or its azimuth is unknown.
-    InvalidOption
+    OptionError
         If there is no pair, or an argument is out of range.
 
     See Also
@@ -104,9 +104,7 @@ def response_rose(
     import xarray as xr
 
     if not isinstance(solid, Solid):
-        raise InvalidBlock(
-            f"a Solid is required, not a {type(solid).__name__}; create one with rocking.Solid.from_mesh"
-        )
+        raise BlockError(f"a Solid is required, not a {type(solid).__name__}; create one with rocking.Solid.from_mesh")
     named_pairs = _name_pairs(pairs)
     angles = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
     scales = Scales.from_levels(levels, measure)
@@ -252,10 +250,10 @@ class ResponseRose(DatasetResult):
 
 def _name_pairs(pairs: Pairs) -> dict[str, Pair]:
     """Name pairs, or raise an error if one is not a pair of motions."""
-    entries = [*pairs.values()] if isinstance(pairs, Mapping) else checks.items(pairs, "pairs", InvalidOption)
+    entries = [*pairs.values()] if isinstance(pairs, Mapping) else checks.items(pairs, "pairs", OptionError)
     lists = [list_motions(pair) for pair in entries if not isinstance(pair, Motion)]
     if not lists or len(lists) < len(entries) or any(len(components) != 2 for components in lists):
-        raise InvalidOption(
+        raise OptionError(
             "{} must contain a pair of horizontal components for each site, as [(first, second)]", "pairs", value=pairs
         )
     names = [f"{first.name} and {second.name}" for first, second in lists]

@@ -28,7 +28,7 @@ from rocking.core.constants import Model
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.problem import compute_slenderness, gather_bodies
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.scaling import Measure
 from rocking.records.named import Motions, list_motions
 
@@ -74,10 +74,10 @@ def compare_measures(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range, fewer than two motions or clusters are available or overturn a block, or a block
         never comes to rest.
-    InvalidMotion
+    MotionError
         If a motion is zero throughout.
 
     See Also
@@ -108,8 +108,8 @@ def compare_measures(
     compute_slenderness(bodies)  # raise errors before the simulations
     block_weights = normalise_weights(weights, len(bodies))
     if len(motions) < 2:
-        raise InvalidOption("{} must contain at least two motions for a comparison of measures; got one", "motions")
-    period_values = checks.positive_numbers(periods, "periods", InvalidOption)
+        raise OptionError("{} must contain at least two motions for a comparison of measures; got one", "motions")
+    period_values = checks.positive_numbers(periods, "periods", OptionError)
     spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
     measures = [Measure("pga"), Measure("pgv"), *spectral_measures, Measure("pga_ratio"), Measure("pgv_ratio")]
     cluster_numbers = number_clusters(motions, clusters)
@@ -267,6 +267,6 @@ def _check_sample_size(count: int, clusters: object) -> None:
     """Raise an error for a sample of one cluster, or of one motion without clusters."""
     if count < 2:
         argument, kind = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
-        raise InvalidOption(
+        raise OptionError(
             f"fewer than two {{}}{kind} overturn a block at any scale; a dispersion requires at least two", argument
         )

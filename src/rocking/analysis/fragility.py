@@ -53,7 +53,7 @@ from rocking.core.tables import Column, escape_dollars, format_count, format_tab
 from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup, describe_missing
-from rocking.errors import InvalidOption, Message, Unfitted
+from rocking.errors import FitError, Message, OptionError
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, list_motions
 from rocking.simulation.ensemble import SIGNS, Polarity, simulate_many
@@ -198,7 +198,7 @@ class Fragility(Result):
     def curve(self, limit_state: str) -> FragilityCurve:
         """Return the curve of a limit state."""
         curves = {curve.limit_state: curve for curve in self.curves}
-        return curves[checks.choice(limit_state, "limit_state", InvalidOption, list(curves))]
+        return curves[checks.choice(limit_state, "limit_state", OptionError, list(curves))]
 
     def annual_rate(self, hazard: HazardCurve) -> Risk:
         """Compute annual rates of exceeding the limit states from the hazard curve of a site.
@@ -264,7 +264,7 @@ class Fragility(Result):
             columns = zip((self.measure.column, "probability", "lower", "upper"), values, strict=True)
             return [Column("limit_state", names), *(Column(name, column) for name, column in columns)]
         if self.outcomes is None:
-            raise InvalidOption(
+            raise OptionError(
                 "this fragility was fitted to observed outcomes, so that there are no simulations to write"
             )
         return [Column(str(name), self.outcomes[name]) for name in self.outcomes]
@@ -298,7 +298,7 @@ class Fragility(Result):
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If NRML does not allow a name, `block` is missing, the damping of a spectral acceleration is not 5 % as in
             OpenQuake, or the dispersion is too wide. `OutputError` if the file cannot be written.
         """
@@ -384,8 +384,8 @@ def fragility(
 
     Raises
     ------
-    InvalidOption
-        If an argument is out of range, or no lognormal can be fitted (`fit_fragility`). `InvalidMotion` if a motion is
+    OptionError
+        If an argument is out of range, or no lognormal can be fitted (`fit_fragility`). `MotionError` if a motion is
         zero throughout.
 
     See Also
@@ -406,12 +406,12 @@ def fragility(
     bodies, measure = gather_bodies(blocks), Measure.parse(measure)
     slenderness = compute_slenderness(bodies)
     block_weights = normalise_positive_weights(weights, len(bodies))
-    mirrored = checks.choice(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and bodies.is_symmetric
-    checks.fraction(confidence, "confidence", InvalidOption)
+    mirrored = checks.choice(polarity, "polarity", OptionError, get_args(Polarity)) == "both" and bodies.is_symmetric
+    checks.fraction(confidence, "confidence", OptionError)
     states = check_limit_states(limit_states)
-    stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
+    stripes = None if levels is None else checks.increasing_numbers(levels, "levels", OptionError)
     if stripes is not None and stripes.size < 2:
-        raise InvalidOption(f"{{}} must contain at least two levels; got {stripes.size}", "levels", value=levels)
+        raise OptionError(f"{{}} must contain at least two levels; got {stripes.size}", "levels", value=levels)
     motions = list_motions(motions)
     values, cluster_numbers, units = (
         compute_intensities(motions, measure),
@@ -444,7 +444,7 @@ def fragility(
     }
     try:
         curves = [fit_curve(name, data[name], trial_clusters, confidence, measure, states[name]) for name in states]
-    except Unfitted as error:
+    except FitError as error:
         error.outcomes = outcomes
         raise
     scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
@@ -507,7 +507,7 @@ def fit_fragility(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range, or no rising lognormal fits best: all outcomes are equal, separated, at one
         intensity, or not more frequent at higher ones, or the median is above 1000 times every intensity.
 
@@ -531,13 +531,13 @@ def fit_fragility(
     median 3.1509 m/s^2, dispersion 0.3042
     """
     measure = Measure.parse(measure)
-    x = checks.positive_numbers(intensity, "intensity", InvalidOption)
+    x = checks.positive_numbers(intensity, "intensity", OptionError)
     for end in (x.min(), x.max()):
-        checks.between(float(end), "intensity", InvalidOption, 1e-50, 1e50)
+        checks.between(float(end), "intensity", OptionError, 1e-50, 1e50)
     counts = check_counts(trials, "trials", x.size, 1.0, 2.0**53)
     outcomes = check_state_mapping(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
     groups = None if clusters is None else number_groups(clusters, "clusters", x.size)
-    checks.fraction(confidence, "confidence", InvalidOption)
+    checks.fraction(confidence, "confidence", OptionError)
     curves = [
         fit_curve(name, (x, check_counts(values, "exceeded", x.size, 0.0, counts), counts), groups, confidence, measure)
         for name, values in outcomes.items()

@@ -18,7 +18,7 @@ from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Result
 from rocking.core.tables import format_table, read_csv_rows
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.scaling import IntensityName, Measure, check_intensities
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class HazardCurve(Result):
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If there are fewer than two points, the intensities do not increase, or the rates do not decrease.
 
     See Also
@@ -88,10 +88,10 @@ class HazardCurve(Result):
     name: str = "hazard curve"
 
     def __post_init__(self) -> None:
-        intensity = checks.numbers(self.intensity, "intensity of a hazard curve", InvalidOption)
-        rate = checks.numbers(self.rate, "rate of a hazard curve", InvalidOption)
+        intensity = checks.numbers(self.intensity, "intensity of a hazard curve", OptionError)
+        rate = checks.numbers(self.rate, "rate of a hazard curve", OptionError)
         if intensity.ndim != 1 or intensity.shape != rate.shape or len(intensity) < 2:
-            raise InvalidOption(
+            raise OptionError(
                 "a hazard curve requires at least two points, and one rate for each intensity; got shapes "
                 f"{intensity.shape} and {rate.shape}"
             )
@@ -100,7 +100,7 @@ class HazardCurve(Result):
         measure_input: Any = self.measure
         measure = Measure.parse(measure_input)
         if measure.units == "1":
-            raise InvalidOption(
+            raise OptionError(
                 f"a hazard curve must be of pga, pgv or sa, which do not depend on a block; got {measure.name}"
             )
         for name, value in (("intensity", intensity), ("rate", rate), ("measure", measure)):
@@ -132,25 +132,25 @@ class HazardCurve(Result):
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If the file cannot be read, has another format, or does not contain the site.
         """
-        file = checks.path(path, "path of a hazard curve", InvalidOption)
-        checks.integer(site, "site", InvalidOption, 0)
+        file = checks.path(path, "path of a hazard curve", OptionError)
+        checks.integer(site, "site", OptionError, 0)
         if period is not None:
-            period = checks.positive(period, "period", InvalidOption, "s")
+            period = checks.positive(period, "period", OptionError, "s")
         try:
             lines = file.read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
-            raise InvalidOption(f"the file cannot be read: {reason}", path=str(file)) from error
+            raise OptionError(f"the file cannot be read: {reason}", path=str(file)) from error
         try:
             if lines and "investigation_time" in lines[0]:
                 return cls(*_parse_openquake(lines, site, period), file.stem)
             if site:
-                raise InvalidOption("a table of two columns contains only one site; omit {}", "site")
+                raise OptionError("a table of two columns contains only one site; omit {}", "site")
             return cls(*_parse_table(lines, period), file.stem)
-        except InvalidOption as error:
+        except OptionError as error:
             error.path = str(file)
             raise
 
@@ -215,7 +215,7 @@ def _check_order(quantity: str, values: Floats, sign: float) -> None:
     if not is_valid.all():
         k = int(np.argmin(is_valid))
         predecessor = f" after {values[k - 1]:g}" if k else ""
-        raise InvalidOption(
+        raise OptionError(
             f"the {quantity} of a hazard curve must be positive and {'increase' if sign > 0.0 else 'decrease'} from "
             f"point to point; got {values[k]:g}{predecessor} at point {k + 1}; correct or remove this point"
         )
@@ -235,7 +235,7 @@ def _parse_table(lines: list[str], period: float | None) -> tuple[Floats, Floats
     heading = [normalise_heading(cell) for cell in header]
     intensity_headings = [cell for cell in heading if cell in HEADINGS]
     if len(intensity_headings) != 1 or heading.count("annual_rate") != 1:
-        raise InvalidOption(
+        raise OptionError(
             f"a hazard curve requires a heading with annual_rate and one of {', '.join(HEADINGS)}; "
             f"got {', '.join(header) or 'nothing'}"
         )
@@ -249,11 +249,11 @@ def _parse_table(lines: list[str], period: float | None) -> tuple[Floats, Floats
             sentence = (
                 f"expected an intensity and a rate in {len(heading)} cells, as in the heading; got {','.join(row)}"
             )
-            raise InvalidOption(sentence, line=line) from None
+            raise OptionError(sentence, line=line) from None
     if kind == "sa" and period is None:
-        raise InvalidOption("a spectral acceleration requires {}, in s", "period")
+        raise OptionError("a spectral acceleration requires {}, in s", "period")
     if kind != "sa" and period is not None:
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} applies only to spectral acceleration, but the intensity measure of this curve is {kind}", "period"
         )
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
@@ -268,21 +268,21 @@ def _parse_openquake(lines: list[str], site: int, period: float | None) -> tuple
     header, *rows = [*csv.reader(lines[1:])] or [[]]
     levels = {k: cell.strip()[4:] for k, cell in enumerate(header) if cell.strip().startswith("poe-")}
     if kind not in _OPENQUAKE_MEASURES or not levels:
-        raise InvalidOption(
+        raise OptionError(
             f"the imt of a hazard curve must be one of {', '.join(_OPENQUAKE_MEASURES)}; got "
             f"{fields.get('imt', 'none')}"
         )
     if site >= len(rows):
-        raise InvalidOption(f"there is no site {site}; the file contains {len(rows)}, counted from 0")
+        raise OptionError(f"there is no site {site}; the file contains {len(rows)}, counted from 0")
     try:
         intensity = np.array([float(level) for level in levels.values()])
         probabilities = np.array([float(rows[site][k]) for k in levels])
         years = float(fields["investigation_time"])
         spectral_period = float(period_text.rstrip(")")) if kind == "SA" else None
     except (ValueError, IndexError, KeyError) as error:
-        raise InvalidOption(f"the hazard curve of site {site} is incomplete or damaged: {error}") from None
+        raise OptionError(f"the hazard curve of site {site} is incomplete or damaged: {error}") from None
     if period not in (None, spectral_period):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} is {period:g} s, but the intensity measure of this curve is {fields['imt']}; omit it", "period"
         )
     measure_name, factor = _OPENQUAKE_MEASURES[kind]
@@ -290,7 +290,7 @@ def _parse_openquake(lines: list[str], site: int, period: float | None) -> tuple
     # Probabilities printed as 0 or 1 contain no information on the rate.
     is_informative = (probabilities > 0.0) & (probabilities < 1.0)
     indices, rate = _select_corners(
-        -np.log1p(-probabilities[is_informative]) / checks.positive(years, "investigation_time", InvalidOption)
+        -np.log1p(-probabilities[is_informative]) / checks.positive(years, "investigation_time", OptionError)
     )
     return factor * intensity[is_informative][indices], rate, measure
 

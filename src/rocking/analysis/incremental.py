@@ -33,7 +33,7 @@ from rocking.core.tables import add_unit, escape_dollars, format_count, format_t
 from rocking.engine.problem import compute_slenderness, compute_thresholds, gather_bodies, never_rests
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, describe_missing, simulate_each
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, check_motion, list_motions
@@ -89,9 +89,9 @@ def incremental_dynamic_analysis(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range.
-    InvalidMotion
+    MotionError
         If a motion is zero throughout.
 
     See Also
@@ -124,11 +124,11 @@ def incremental_dynamic_analysis(
     slenderness = compute_slenderness(bodies)
     values = compute_intensities(motion_list, measure)
     if never_rests(bodies):
-        raise InvalidOption(
+        raise OptionError(
             "{} must be below 1 for an incremental dynamic analysis, because otherwise the block never comes to rest",
             "restitution",
         )
-    relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
+    relative_width = checks.between(rtol, "rtol", OptionError, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model, "friction": friction}
     coefficients = resolve_friction(friction)
     check_friction(bodies, model, coefficients)
@@ -136,7 +136,7 @@ def incremental_dynamic_analysis(
     if levels is None:
         table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
     else:
-        level_values = checks.increasing_numbers(levels, "levels", InvalidOption)
+        level_values = checks.increasing_numbers(levels, "levels", OptionError)
         table = simulate_levels(bodies, motion_list, measure, level_values, **options)
     factors = compute_units(bodies, measure, model)[None, :] / values[:, None]
 
@@ -228,7 +228,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
     def _check_position(self, position: object, dimension: str) -> int:
-        return checks.integer(position, dimension, InvalidOption, 0, self.data.sizes[dimension] - 1)
+        return checks.integer(position, dimension, OptionError, 0, self.data.sizes[dimension] - 1)
 
     def summary(self) -> str:
         data = self.data
@@ -316,7 +316,7 @@ def _find_lowest_uplift(
     )
     lowest = float(np.min(factors * values[:, None] / compute_units(blocks, measure, model)))
     if math.isinf(lowest):
-        raise InvalidOption(
+        raise OptionError(
             "no motion lifts a block at any level, because of direction or vertical component; use other motions"
         )
     return lowest
@@ -491,9 +491,9 @@ def critical_scale(
 
     Raises
     ------
-    InvalidMotion
+    MotionError
         If `motion` is not a `Motion`.
-    InvalidOption
+    OptionError
         If there is no motion, the block overturns at the lower scale or stands at the higher one, or the scales are not
         positive and increasing.
 
@@ -516,9 +516,9 @@ def critical_scale(
     '3.256134'
     """
     if check_motion(motion) is None:
-        raise InvalidOption("a critical scale requires a {}; got None", "motion")
-    low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
-    checks.positive(low, "bounds", InvalidOption)
+        raise OptionError("a critical scale requires a {}; got None", "motion")
+    low, high = checks.increasing_pair(bounds, "bounds", OptionError)
+    checks.positive(low, "bounds", OptionError)
 
     def simulate_scaled(scale: float) -> Response:
         return simulate(
@@ -528,7 +528,7 @@ def critical_scale(
     for bound, expected in ((low, False), (high, True)):
         if simulate_scaled(bound).overturned is not expected:
             behaviour, correction = ("does not overturn", "raise") if expected else ("overturns", "lower")
-            raise InvalidOption(
+            raise OptionError(
                 f"the block {behaviour} at the scale {bound:g}: {correction} it in {{}}", "bounds", value=bounds
             )
     _, scale = bisect(low, high, lambda scale: simulate_scaled(scale).overturned)

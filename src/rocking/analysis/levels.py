@@ -19,7 +19,7 @@ from rocking.core.progress import Progress, note
 from rocking.core.tables import format_count
 from rocking.engine.problem import gather_bodies
 from rocking.engine.tasks import Setup, Task, describe_missing, simulate_tasks
-from rocking.errors import InvalidOption, Message
+from rocking.errors import Message, OptionError
 from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, compose_label
 from rocking.motion.motion import Motion
@@ -40,9 +40,9 @@ def number_labels(labels: Sequence[object]) -> Integers:
 
 def number_groups(labels: object, name: str, count: int, item: str = "outcome") -> Integers:
     """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
-    entries = checks.items(labels, name, InvalidOption)
+    entries = checks.items(labels, name, OptionError)
     if len(entries) != count or not all(isinstance(label, Hashable) for label in entries):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must contain {count} labels (numbers or texts), one for each {item}", name, value=labels
         )
     return number_labels([(k,) if _is_missing(label) else label for k, label in enumerate(entries)])
@@ -115,9 +115,9 @@ def normalise_weights(weights: ArrayLike | None, count: int) -> Floats:
     """Normalise weights of blocks to mean 1, equal by default."""
     if weights is None:
         return np.ones(count)
-    values = checks.numbers(weights, "weights", InvalidOption)
+    values = checks.numbers(weights, "weights", OptionError)
     if values.shape != (count,) or not (np.all(np.isfinite(values) & (values >= 0.0)) and np.any(values > 0.0)):
-        raise InvalidOption(f"{{}} must contain {count} nonnegative numbers, not all 0, one for each block", "weights")
+        raise OptionError(f"{{}} must contain {count} nonnegative numbers, not all 0, one for each block", "weights")
     values = values / values.max()  # otherwise sums of very large or very small weights overflow
     return np.asarray(values * (count / values.sum()))
 
@@ -151,7 +151,7 @@ def number_clusters(motions: Sequence[Motion], labels: object = None) -> Integer
     if isinstance(labels, str) and labels == BY_STATION:
         labels = stations
         if not any(stations):
-            raise InvalidOption(
+            raise OptionError(
                 f"{{}} {BY_STATION} requires records that name their station; give a label for each motion", "clusters"
             )
     from scipy.sparse import coo_array
@@ -230,16 +230,16 @@ def exceeds_limit(ratio: Floats, limit: float, name: str) -> Floats:
 def check_limit(limit: float, name: str) -> float:
     """Check a limit of the ratio of peak rotation to slenderness."""
     argument = f"the limit {name!r} (rotation over slenderness)"
-    checked = checks.real(limit, argument, InvalidOption)
+    checked = checks.real(limit, argument, OptionError)
     if not checked >= 0.0:
-        raise InvalidOption(f"{{}} must be 0 or more, not {limit!r}", argument, value=limit)
+        raise OptionError(f"{{}} must be 0 or more, not {limit!r}", argument, value=limit)
     return checked
 
 
 def check_state_mapping(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """Check values by limit state, at least one."""
-    for state in checks.mapping(values, name, InvalidOption, "{'overturning': inf}"):
-        checks.text(state, f"name of a limit state in {name}", InvalidOption)
+    for state in checks.mapping(values, name, OptionError, "{'overturning': inf}"):
+        checks.text(state, f"name of a limit state in {name}", OptionError)
     return values
 
 

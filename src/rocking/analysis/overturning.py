@@ -24,7 +24,7 @@ from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import add_unit, columns_to_records, escape_dollars, format_cell, format_table
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import OUTCOME, Setup, describe_missing, simulate_each
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import MotionError, OptionError
 from rocking.inputs.pulses import find_family
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
@@ -131,10 +131,10 @@ def overturning_map(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range, the shape of the pulse depends on the frequency (for example because of a fixed
         `duration`) or the amplitude, or the block never comes to rest (restitution 1).
-    InvalidMotion
+    MotionError
         If a function does not return a motion.
 
     See Also
@@ -164,13 +164,13 @@ def overturning_map(
     >>> print(f"{float(result.data.overturning_amplitude[0]):.5f}")
     1.80072
     """
-    levels = checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption)
-    ratios = checks.increasing_numbers(frequencies, "frequencies", InvalidOption)
-    checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
-    relative_width = checks.between(rtol, "rtol", InvalidOption, 1e-15, 0.5)
+    levels = checks.increasing_numbers(amplitudes, "amplitudes", OptionError)
+    ratios = checks.increasing_numbers(frequencies, "frequencies", OptionError)
+    checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, OptionError)
+    relative_width = checks.between(rtol, "rtol", OptionError, 1e-15, 0.5)
     require_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
-        raise InvalidOption(
+        raise OptionError(
             "{} must be below 1 for an overturning map, because otherwise the block never comes to rest", "restitution"
         )
     min_p = min(side.p for side in block.sides)
@@ -181,7 +181,7 @@ def overturning_map(
         scaled_pulse = _call_pulse(create_pulse, amplitude, ratio * frequency)
         pairs = (unit, scaled_pulse), (unit.vertical, scaled_pulse.vertical)
         if not all(_is_alike(first, second, amplitude, ratio) for first, second in pairs):
-            raise InvalidOption(
+            raise OptionError(
                 "the {} must have the same shape at all frequencies: proportional to the amplitude, and half as long "
                 f"at twice the frequency; the shapes at {frequency:g} Hz and at {ratio * frequency:g} Hz differ",
                 "pulse",
@@ -392,7 +392,7 @@ def _create_pulse_function(
     """Create a function of amplitude (m/s^2, peak for named pulses) and frequency (Hz) that returns a pulse."""
     if callable(pulse):
         if parameters:
-            raise InvalidOption(
+            raise OptionError(
                 f"{{}} is a function, so that no parameters are accepted; got {', '.join(parameters)}; set them in it",
                 "pulse",
                 value=parameters,
@@ -400,7 +400,7 @@ def _create_pulse_function(
         return pulse
     family = find_family(pulse)
     if family.name not in PULSES:
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse", value=pulse
         )
 
@@ -414,9 +414,7 @@ def _create_pulse_function(
 def _call_pulse(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
     motion = check_motion(pulse(amplitude, frequency))
     if motion is None:
-        raise InvalidMotion(
-            f"the pulse of amplitude {amplitude:g} and frequency {frequency:g} is None; return a Motion"
-        )
+        raise MotionError(f"the pulse of amplitude {amplitude:g} and frequency {frequency:g} is None; return a Motion")
     return motion
 
 

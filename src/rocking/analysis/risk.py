@@ -24,7 +24,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import Result
 from rocking.core.tables import escape_dollars, format_count, format_digits, format_table, format_within
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.scaling import Measure
 
 if TYPE_CHECKING:
@@ -82,11 +82,11 @@ class Rate:
 
     def probability(self, years: float) -> float:
         """Compute the probability of at least one exceedance in a time (years), for independent exceedances."""
-        return -math.expm1(-self.annual_rate * checks.positive(years, "years", InvalidOption))
+        return -math.expm1(-self.annual_rate * checks.positive(years, "years", OptionError))
 
     def survival(self, years: float) -> float:
         """Compute the probability of no exceedance (survival) in a time (years)."""
-        return math.exp(-self.annual_rate * checks.positive(years, "years", InvalidOption))
+        return math.exp(-self.annual_rate * checks.positive(years, "years", OptionError))
 
     @property
     def return_period(self) -> float:
@@ -147,11 +147,11 @@ class Risk(Result):
     def rate(self, limit_state: str) -> Rate:
         """Return the rate of a limit state."""
         rates = {rate.limit_state: rate for rate in self.rates}
-        return rates[checks.choice(limit_state, "limit_state", InvalidOption, [*rates])]
+        return rates[checks.choice(limit_state, "limit_state", OptionError, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
         """Return rates, return periods, and probabilities in a time (years) as a text table."""
-        years = checks.positive(years, "years", InvalidOption)
+        years = checks.positive(years, "years", OptionError)
         confidence, rows = 100 * self.curves[0].confidence, []
         for rate in self.rates:
             probabilities = [
@@ -229,7 +229,7 @@ class Risk(Result):
 def compute_risk(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
     """Integrate fragility curves of a measure over a hazard curve."""
     if not isinstance(hazard, HazardCurve):
-        raise InvalidOption(
+        raise OptionError(
             f"a HazardCurve is required, not a {type(hazard).__name__}; create one with HazardCurve(intensity, rate), "
             "or read one with HazardCurve.read(path)",
             value=hazard,
@@ -248,9 +248,9 @@ def describe_extrapolated_shares(rate: Rate) -> list[str]:
 
 
 def check_measure(hazard: HazardCurve, measure: Measure) -> None:
-    """Raise an InvalidOption if the measures of a hazard curve and a fragility differ."""
+    """Raise an OptionError if the measures of a hazard curve and a fragility differ."""
     if measure != hazard.measure:
-        raise InvalidOption(
+        raise OptionError(
             f"the fragility and the hazard curve must have the same measure; got {measure.label} and "
             f"{hazard.measure.label}; fit the fragility against the measure of the hazard curve"
         )
@@ -325,8 +325,8 @@ class Survival(Result):
     mean_probability: float = math.nan
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
-        checks.fraction(self.confidence, "confidence", InvalidOption)
+        object.__setattr__(self, "years", checks.positive(self.years, "years", OptionError))
+        checks.fraction(self.confidence, "confidence", OptionError)
 
     @property
     def intensity(self) -> Floats:

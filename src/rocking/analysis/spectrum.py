@@ -30,7 +30,7 @@ from rocking.core.tables import add_unit, escape_dollars
 from rocking.engine.problem import gather_bodies
 from rocking.engine.schemes import ChatteringScheme
 from rocking.engine.tasks import describe_missing
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.records.named import Motions, list_motions
 from rocking.simulation.ensemble import simulate_many
 
@@ -92,9 +92,9 @@ def rocking_spectrum(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range.
-    InvalidBlock
+    BlockError
         If p or size is out of range, or one of the blocks is not a block.
 
     See Also
@@ -122,14 +122,14 @@ def rocking_spectrum(
     >>> rocking_spectrum(blocks, motions).data.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
     [0.367, inf, inf]
     """
-    values = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
-    shares = np.array([checks.fraction(value, "each of fractiles", InvalidOption) for value in values])
+    values = np.atleast_1d(checks.numbers(fractiles, "fractiles", OptionError)).ravel()
+    shares = np.array([checks.fraction(value, "each of fractiles", OptionError) for value in values])
     options: dict[str, Any] = {"model": model, "chattering": chattering, "friction": friction}
     bodies, motions = gather_bodies(blocks), list_motions(motions)
     if not isinstance(bodies, Blocks):
-        raise InvalidOption(f"a spectrum requires blocks, because only blocks have a size; got {bodies.kind}")
+        raise OptionError(f"a spectrum requires blocks, because only blocks have a size; got {bodies.kind}")
     if (axes := bodies.axes) is not None and p is None and size is None and weights is None:
-        checks.grid_size({"motions": len(motions), "blocks": len(bodies)}, InvalidOption)
+        checks.grid_size({"motions": len(motions), "blocks": len(bodies)}, OptionError)
         names, shape = (*(name for name in axes if name != "p"), "p"), [*map(len, axes.values())]
         table = simulate_many(bodies, motions, **options)
         peak, overturned, unfinished = (
@@ -144,9 +144,9 @@ def rocking_spectrum(
     median = float(compute_weighted_fractiles(bodies.p.mean(axis=1), weight, _MEDIAN_SHARE)[0])
     p_values = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
-        p_values = checks.positive_numbers(resolve_p(p, size, bodies.gravity), "p", InvalidOption)
+        p_values = checks.positive_numbers(resolve_p(p, size, bodies.gravity), "p", OptionError)
     count, n = len(p_values), len(bodies)
-    checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, InvalidOption)
+    checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, OptionError)
     resized = bodies.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(p_values / median, n))
     table = simulate_many(resized, motions, **options)
     peak, overturned, unfinished = (
@@ -282,7 +282,7 @@ class RockingSpectrum(DatasetResult):
         """
         from rocking.plot.curves import SpectrumCurves, draw_spectrum
 
-        checks.choice(against, "against", InvalidOption, get_args(Abscissa))
+        checks.choice(against, "against", OptionError, get_args(Abscissa))
         # Lines are drawn in the order of the abscissa, whatever the order of p.
         data = self.data.sortby("p") if "p" in self.data.dims else self.data
         named_curves = split_curves(data)

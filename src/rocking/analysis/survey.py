@@ -17,7 +17,7 @@ from rocking.core.progress import Progress
 from rocking.core.result import Result
 from rocking.core.tables import Column, add_unit, format_count, format_table, records_to_columns, round_decimal
 from rocking.engine.problem import require_body
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
 from rocking.response import Response
@@ -293,9 +293,9 @@ def survey(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         As for `rocking.simulate`, or if there is no motion.
-    InvalidMotion
+    MotionError
         If an element of `motions` is not a motion.
 
     See Also
@@ -313,7 +313,7 @@ def survey(
     """
     named_motions = index_motions(motions)
     if not require_body(block).coordinate.limit:
-        raise InvalidOption(
+        raise OptionError(
             f"a survey requires a Block, because only a block has an unstable equilibrium; got {type(block).__name__}"
         )
     if friction is not None:

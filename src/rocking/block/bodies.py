@@ -19,7 +19,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.tables import format_range
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 from rocking.kernels import state
 
 _FIELDS: Final = ("p", "alpha", "restitution")
@@ -65,7 +65,7 @@ class Blocks:
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If a value is out of range, or p and alpha determine no restitution. The message names the block.
 
     See Also
@@ -103,14 +103,14 @@ class Blocks:
         if terms:
             arguments |= {**_TERMS, **terms}
             if unknown := [*terms.keys() - _TERMS.keys()]:
-                raise InvalidBlock(
+                raise BlockError(
                     f"blocks have no parameter {{}}; the terms of restraints are {', '.join(_TERMS)}", unknown[0]
                 )
         try:
-            columns = [_expand_sides(checks.numbers(values, name, InvalidBlock)) for name, values in arguments.items()]
+            columns = [_expand_sides(checks.numbers(values, name, BlockError)) for name, values in arguments.items()]
             arrays = dict(zip(arguments, np.broadcast_arrays(*columns), strict=True))
         except ValueError:
-            raise InvalidBlock(
+            raise BlockError(
                 "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with the same n",
                 "p", "alpha", "restitution",
             ) from None  # fmt: skip
@@ -169,10 +169,10 @@ class Blocks:
         arguments = {"p": resolve_p(p, size, gravity), "alpha": alpha}
         if restitution is not None:
             arguments["restitution"] = restitution
-        axes = {name: np.atleast_1d(checks.numbers(axis, name, InvalidBlock)) for name, axis in arguments.items()}
+        axes = {name: np.atleast_1d(checks.numbers(axis, name, BlockError)) for name, axis in arguments.items()}
         if any(axis.ndim != 1 or axis.size == 0 for axis in axes.values()):
-            raise InvalidBlock("each parameter of a grid must be a number or a sequence of at least one number")
-        checks.grid_size({name: axis.size for name, axis in axes.items()}, InvalidBlock)
+            raise BlockError("each parameter of a grid must be a number or a sequence of at least one number")
+        checks.grid_size({name: axis.size for name, axis in axes.items()}, BlockError)
         blocks = cls(*(column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")), gravity=gravity)
         return blocks._fill(blocks.gravity, blocks._arrays(), axes)
 
@@ -195,7 +195,7 @@ class Blocks:
 
         Raises
         ------
-        InvalidBlock
+        BlockError
             If there are no blocks, an item is not a block, or gravities differ.
         """
         if isinstance(blocks, Blocks):
@@ -207,7 +207,7 @@ class Blocks:
                 require_block(body)
         gravities = {body.gravity for body in bodies}
         if len(gravities) != 1:
-            raise InvalidBlock(
+            raise BlockError(
                 "Blocks.from_bodies requires at least one block, and the same {} for all of them", "gravity"
             )
         rows = [body._build_rows() for body in bodies]
@@ -323,7 +323,7 @@ class Blocks:
 
     def __getitem__(self, index: int) -> Block | RestrainedBlock:
         if isinstance(index, (slice, tuple, list, np.ndarray)):
-            raise InvalidBlock(
+            raise BlockError(
                 "the index of a block must be a whole number; use blocks.select for slices, indices and masks"
             )
         p, alpha, e = (tuple(array[index]) for array in (self.p, self.alpha, self.restitution))
@@ -353,7 +353,7 @@ class Blocks:
         except IndexError:
             rows = np.array(0)
         if rows.ndim != 1:
-            raise InvalidBlock(
+            raise BlockError(
                 f"select requires a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} values, "
                 f"not {checks.short_repr(index)}; use blocks[0] for a single block"
             )
@@ -379,10 +379,10 @@ def resolve_p(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> Ar
     if p is not None and size is None:
         return p
     if size is not None and p is None:
-        g = checks.positive(gravity, "gravity", InvalidBlock, "m/s^2")
-        return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidBlock))
+        g = checks.positive(gravity, "gravity", BlockError, "m/s^2")
+        return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", BlockError))
     suffix = "" if p is None else ", not both"
-    raise InvalidBlock(f"give either {{}} (rad/s) or {{}} (half diagonals, m){suffix}", "p", "size")
+    raise BlockError(f"give either {{}} (rad/s) or {{}} (half diagonals, m){suffix}", "p", "size")
 
 
 def _expand_sides(array: Floats) -> Floats:
@@ -400,10 +400,10 @@ def _compute_restitutions(p: Floats, alpha: Floats) -> Floats:
     factors[asymmetric], _ = find_rigid_bodies(p[asymmetric], alpha[asymmetric])
     if (undetermined := np.isnan(factors).any(axis=1)).any():
         first = int(np.argmax(undetermined))
-        raise InvalidBlock(f"{describe_missing_body(p[first], alpha[first])} (block {first})", "restitution")
+        raise BlockError(f"{describe_missing_body(p[first], alpha[first])} (block {first})", "restitution")
     stocky = np.flatnonzero(~(factors > 0.0).all(axis=1))
     if len(stocky):
-        raise InvalidBlock(
+        raise BlockError(
             f"conservation of angular momentum gives block {stocky[0]} a restitution of "
             f"{factors[stocky[0]].min():.3g}, because it is too stocky; set {{}} to a value or a pair in (0, 1]",
             "restitution",

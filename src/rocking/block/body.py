@@ -153,7 +153,7 @@ class Bodies(Protocol):
         """Return one body."""
 
     def select(self, index: slice | Integers) -> Self:
-        """Return bodies by a slice, flat array of indices, or mask; otherwise raise `InvalidBlock`."""
+        """Return bodies by a slice, flat array of indices, or mask; otherwise raise `BlockError`."""
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         """Return the parameters by name: arrays of shape (n, 2), and units."""

@@ -14,7 +14,7 @@ from rocking.block.sides import find_rigid_bodies
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels.state import Records
 
 #: Coefficient of friction, or the pair (static, kinetic).
@@ -29,14 +29,14 @@ def resolve_friction(friction: Friction | None) -> tuple[float, float] | None:
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If a coefficient is not positive, or the static one is below the kinetic one.
     """
     if friction is None:
         return None
-    values = checks.numbers(friction, "friction", InvalidOption)
+    values = checks.numbers(friction, "friction", OptionError)
     if values.shape not in ((), (2,)) or np.any(np.isnan(values)) or np.any(values <= 0.0):
-        raise InvalidOption(
+        raise OptionError(
             "{} must be a positive number or a pair (static, kinetic) of positive numbers, or None for a block that "
             f"never slips, not {checks.short_repr(friction)}",
             "friction",
@@ -44,7 +44,7 @@ def resolve_friction(friction: Friction | None) -> tuple[float, float] | None:
         )
     static, kinetic = np.broadcast_to(values, 2).tolist()
     if static < kinetic:
-        raise InvalidOption(
+        raise OptionError(
             f"the static {{}} must not be below the kinetic one; got {static:g} and {kinetic:g}: swap them",
             "friction",
             value=friction,
@@ -57,14 +57,14 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If the bodies are not free rigid blocks of known size, the kinetic friction admits a paradox at a pivot, or a
         restitution would gain energy in a slip.
     """
     if not isinstance(bodies, Blocks):
-        raise InvalidOption("{} applies to blocks, not to " + f"{bodies.kind}; omit it", "friction")
+        raise OptionError("{} applies to blocks, not to " + f"{bodies.kind}; omit it", "friction")
     if bodies.terms:
-        raise InvalidOption(
+        raise OptionError(
             "{} is not available for blocks with restraints, a lean, one side or a law of restitution; simulate the "
             "free block, or omit it",
             "friction",
@@ -84,7 +84,7 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
     largest = np.minimum(2.0 * np.sqrt(gyration * (1.0 + gyration)), limit / (height * base[:, ::-1]))
     if np.any(~(kinetic < largest)):
         index = int(np.argmin(largest.min(axis=1)))
-        raise InvalidOption(
+        raise OptionError(
             f"the kinetic {{}} must be below {largest[index].min():.4g}, beyond which forces at a pivot have no unique "
             f"solution; got {kinetic:g}; use a smaller one, or None for a block that never slips",
             "friction",
@@ -106,7 +106,7 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
 
 
 def check_friction(bodies: Bodies, model: Model, friction: tuple[float, float] | None) -> None:
-    """Raise `InvalidOption` if bodies cannot be simulated with friction; see `add_friction`."""
+    """Raise `OptionError` if bodies cannot be simulated with friction; see `add_friction`."""
     if friction is not None:
         add_friction(bodies.kernel_records(model, np.zeros((len(bodies), 2))), bodies, model, friction)
 
@@ -114,7 +114,7 @@ def check_friction(bodies: Bodies, model: Model, friction: tuple[float, float] |
 def _refuse(is_invalid: Flags, text: str) -> None:
     if np.any(is_invalid):
         index = int(np.argwhere(is_invalid)[0][0])
-        raise InvalidOption(text + (f" of block {index}" if len(is_invalid) > 1 else ""), "friction")
+        raise OptionError(text + (f" of block {index}" if len(is_invalid) > 1 else ""), "friction")
 
 
 def _find_radii(blocks: Blocks) -> Floats:

@@ -18,7 +18,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.bisection import bisect
 from rocking.core.constants import MODELS, Model
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 
 #: Number of rotations in the search for the balance on each side.
 _N_SAMPLES: Final = 512
@@ -49,7 +49,7 @@ class RestrainedBlock(Rocking):
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If the mass is missing, the block does not stand, or a restraint is not a `Restraint`.
 
     See Also
@@ -92,10 +92,10 @@ class RestrainedBlock(Rocking):
         restitution: float | Sequence[float] | Restitution | None = None,
     ) -> None:
         if isinstance(block, RestrainedBlock):
-            raise InvalidBlock("this block already has restraints; give a Block and all restraints together")
-        free_block, is_one_sided = require_block(block), checks.boolean(one_sided, "one_sided", InvalidBlock)
+            raise BlockError("this block already has restraints; give a Block and all restraints together")
+        free_block, is_one_sided = require_block(block), checks.boolean(one_sided, "one_sided", BlockError)
         _check_restraints(restraints, free_block)
-        tilt = checks.finite(lean, "lean", InvalidBlock)
+        tilt = checks.finite(lean, "lean", BlockError)
         law = restitution if isinstance(restitution, Restitution) else None
         factors = restitution.maximum if isinstance(restitution, Restitution) else restitution
         details = [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * is_one_sided
@@ -103,7 +103,7 @@ class RestrainedBlock(Rocking):
         if is_one_sided and restitution is None:
             factors = one_sided_restitution(free_block.sides[0].alpha)
         elif is_one_sided and law is None and len({*check_pair(restitution, "restitution")}) > 1:
-            raise InvalidBlock("{} of a one-sided block must be a number, not a pair", "restitution", value=restitution)
+            raise BlockError("{} of a one-sided block must be a number, not a pair", "restitution", value=restitution)
         standing_block = _tilt(_add_loads(free_block, _find_following_loads(restraints), factors), tilt)
         if factors is not None:
             plus, minus = (
@@ -112,7 +112,7 @@ class RestrainedBlock(Rocking):
             )
             standing_block = standing_block._with_sides((plus, minus))
         if sum(isinstance(restraint, Tendon) and restraint.strength < math.inf for restraint in restraints) > 1:
-            raise InvalidBlock("only one tendon of a block may yield; omit {} of the others", "strength")
+            raise BlockError("only one tendon of a block may yield; omit {} of the others", "strength")
         pivots = _build_pivots(standing_block, tilt, restraints)
         terms = [
             functools.reduce(
@@ -126,7 +126,7 @@ class RestrainedBlock(Rocking):
         )
         self.__dict__.update(description=description)
         if (min_uplift := min(self.uplift_thresholds())) <= 0.0:
-            raise InvalidBlock(
+            raise BlockError(
                 f"this block does not stand: its uplift acceleration is {min_uplift:.3g} m/s^2; reduce the thrust, "
                 f"load or lean{'; forces are in N, masses in kg' * (min_uplift < -self.gravity)}"
             )
@@ -160,7 +160,7 @@ class RestrainedBlock(Rocking):
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
-        checks.choice(model, "model", InvalidOption, MODELS)
+        checks.choice(model, "model", OptionError, MODELS)
         records = self.as_bodies().kernel_records(model, np.zeros((1, 2)))
         plus, minus = (self.gravity * (records["threshold"] + records["restraint_threshold"])[0]).tolist()
         return plus, minus
@@ -216,11 +216,11 @@ def _check_restraints(restraints: Sequence[object], block: Block) -> None:
     """Reject invalid restraints, and restraints of a block without a mass."""
     for restraint in restraints:
         if not isinstance(restraint, Restraint):
-            raise InvalidBlock(
+            raise BlockError(
                 f"{checks.short_repr(restraint)} is not a restraint; give {_RESTRAINT_NAMES} as separate arguments"
             )
     if restraints and block.mass is None:
-        raise InvalidBlock("a block with restraints requires its {}, kg", "mass")
+        raise BlockError("a block with restraints requires its {}, kg", "mass")
 
 
 def _add_loads(block: Block, loads: Sequence[Load], restitution: float | Sequence[float] | None) -> Block:
@@ -240,7 +240,7 @@ def _add_loads(block: Block, loads: Sequence[Load], restitution: float | Sequenc
     gyration = float(mass_shares[0] * gyration_squared + mass_shares @ ((offsets - x) ** 2 + (heights - z) ** 2))
     overhang = max(x - distance_plus, -x - distance_minus)
     if overhang >= 0.0:
-        raise InvalidBlock(
+        raise BlockError(
             f"with its loads, the centre of mass of this block lies {overhang:.3g} m beyond its pivot; reduce "
             "the mass of a load, or its {}",
             "offset",
@@ -261,7 +261,7 @@ def _tilt(block: Block, lean: float) -> Block:
         return block
     plus, minus = block.sides
     if not -minus.alpha < lean < plus.alpha:
-        raise InvalidBlock(
+        raise BlockError(
             f"{{}} must be between {-minus.alpha:.4g} and {plus.alpha:.4g} rad for the block to stand, not {lean:g}"
             f"{f'; if it is in degrees, give math.radians({lean:g})' if 0.5 <= abs(lean) < 90.0 else ''}",
             "lean",

@@ -13,7 +13,7 @@ import numpy as np
 from rocking.block.sides import check_pair
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 
 #: Force on a block to side + and up, N.
 Force = tuple[Floats | float, Floats | float]
@@ -110,11 +110,11 @@ class Restraint(ABC):
     def _set_finite(self, *names: str) -> None:
         """Check that attributes are finite and convert them to floats."""
         for name in names:
-            object.__setattr__(self, name, checks.finite(getattr(self, name), name, InvalidBlock))
+            object.__setattr__(self, name, checks.finite(getattr(self, name), name, BlockError))
 
     def _set_positive(self, name: str, unit: str) -> None:
         """Check that an attribute is positive and convert it to a float."""
-        object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, unit))
+        object.__setattr__(self, name, checks.positive(getattr(self, name), name, BlockError, unit))
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class Tendon(Restraint):
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If the stiffness or the prestress is negative, both are zero, or the strength does not exceed the prestress.
 
     See Also
@@ -168,18 +168,18 @@ class Tendon(Restraint):
         stiffness, prestress = self.stiffness, self.prestress
         for name, value, unit in (("stiffness", stiffness, "N/m"), ("prestress", prestress, "N")):
             if value < 0.0:
-                raise InvalidBlock(f"{{}} of a tendon must be at least 0 {unit}, not {value:g}", name, value=value)
+                raise BlockError(f"{{}} of a tendon must be at least 0 {unit}, not {value:g}", name, value=value)
         if stiffness == prestress == 0.0:
-            raise InvalidBlock("a tendon requires {} (N/m) or {} (N)", "stiffness", "prestress")
-        object.__setattr__(self, "strength", checks.real(self.strength, "strength", InvalidBlock))
+            raise BlockError("a tendon requires {} (N/m) or {} (N)", "stiffness", "prestress")
+        object.__setattr__(self, "strength", checks.real(self.strength, "strength", BlockError))
         if not self.strength > prestress:
-            raise InvalidBlock(
+            raise BlockError(
                 f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}",
                 "strength",
                 value=self.strength,
             )
         if stiffness == 0.0 and self.strength < math.inf:
-            raise InvalidBlock("a yielding tendon requires a {}, N/m", "stiffness")
+            raise BlockError("a yielding tendon requires a {}, N/m", "stiffness")
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
         x = self._find_lever(pivot)
@@ -224,7 +224,7 @@ class Tendon(Restraint):
         """Return the distance of the duct from the pivot, m."""
         x = pivot.distance - pivot.sign * self.offset
         if x < -1e-12 * pivot.distance:
-            raise InvalidBlock(
+            raise BlockError(
                 f"a tendon at {{}} = {self.offset:g} m is beyond the pivot, which is {pivot.distance:g} m from the "
                 "centre of mass",
                 "offset",
@@ -309,7 +309,7 @@ class Thrust(Restraint):
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If the force is zero, or the height is not positive.
 
     See Also
@@ -330,7 +330,7 @@ class Thrust(Restraint):
     def __post_init__(self) -> None:
         self._set_finite("force", "offset")
         if self.force == 0.0:
-            raise InvalidBlock("{} of a thrust must not be zero", "force", value=self.force)
+            raise BlockError("{} of a thrust must not be zero", "force", value=self.force)
         self._set_positive("height", "m")
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
@@ -364,7 +364,7 @@ class Load(Restraint):
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If the mass or the height is not positive.
 
     See Also
@@ -387,7 +387,7 @@ class Load(Restraint):
         self._set_positive("mass", "kg")
         self._set_positive("height", "m")
         self._set_finite("offset")
-        object.__setattr__(self, "follows", checks.boolean(self.follows, "follows", InvalidBlock))
+        object.__setattr__(self, "follows", checks.boolean(self.follows, "follows", BlockError))
 
     def _compute_terms(self, pivot: Pivot) -> Terms:
         if self.follows:  # part of the block
@@ -429,7 +429,7 @@ class Restitution:
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If a bound, the slope or the seed is out of its range, or a slope and a seed are both given or both
         missing.
 
@@ -454,26 +454,26 @@ class Restitution:
     def __post_init__(self) -> None:
         if self.slope is None:
             if self.seed is None:
-                raise InvalidBlock("a law of restitution requires a {} or a {}", "slope", "seed")
+                raise BlockError("a law of restitution requires a {} or a {}", "slope", "seed")
             object.__setattr__(self, "slope", 0.0)
         slopes = check_pair(self.slope, "slope")
         if invalid := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
-            raise InvalidBlock(
+            raise BlockError(
                 f"{{}} must be finite and at least 0, in s/rad, not {invalid[0]:g}", "slope", value=self.slope
             )
         for low, high in zip(check_pair(self.minimum, "minimum"), check_pair(self.maximum, "maximum"), strict=True):
             if not 0.0 < high <= 1.0:
                 hint = checks.hint_at_percent(high)
-                raise InvalidBlock(f"{{}} must be in (0, 1], not {high:g}{hint}", "maximum", value=self.maximum)
+                raise BlockError(f"{{}} must be in (0, 1], not {high:g}{hint}", "maximum", value=self.maximum)
             if not 0.0 < low <= high:
-                raise InvalidBlock(
+                raise BlockError(
                     f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}", "minimum", "maximum",
                     value=self.minimum,
                 )  # fmt: skip
         if self.seed is not None:
-            checks.integer(self.seed, "seed", InvalidBlock, 0, _LARGEST_SEED)
+            checks.integer(self.seed, "seed", BlockError, 0, _LARGEST_SEED)
             if max(slopes) > 0.0:
-                raise InvalidBlock("a law of restitution has either a {} or a {}, not both", "slope", "seed")
+                raise BlockError("a law of restitution has either a {} or a {}, not both", "slope", "seed")
 
     def _compute_terms(self, side: int) -> dict[str, float]:
         """Return the law on leaving a side as fields of `Terms`, without the largest factor."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 
 Number = TypeVar("Number", float, Floats)
 
@@ -32,17 +32,17 @@ _MAX_POINTS: Final = 1_000_000
 
 
 def check_parameter(value: float, name: str, *, origin: str = "", label: str = "") -> float:
-    """Return p, alpha or restitution of a side, or raise InvalidBlock that names its origin and its block."""
+    """Return p, alpha or restitution of a side, or raise BlockError that names its origin and its block."""
     low, high, range_text = _BOUNDS[name]
     if not low <= value <= high:
         hint = checks.hint_at_degrees(value) if name == "alpha" else ""
         hint = checks.hint_at_percent(value) if name == "restitution" else hint
-        raise InvalidBlock(f"{{}}{origin} must be {range_text}, not {value:g}{label}{hint}", name, value=value)
+        raise BlockError(f"{{}}{origin} must be {range_text}, not {value:g}{label}{hint}", name, value=value)
     return value
 
 
 def check_sides(values: Floats, name: str) -> Floats:
-    """Return p, alpha or restitution, shape (n, 2), or raise InvalidBlock for the first one out of range."""
+    """Return p, alpha or restitution, shape (n, 2), or raise BlockError for the first one out of range."""
     low, high, _ = _BOUNDS[name]
     invalid = np.argwhere(~((values >= low) & (values <= high)))
     if len(invalid):
@@ -51,27 +51,27 @@ def check_sides(values: Floats, name: str) -> Floats:
 
 
 def check_gravity(gravity: object) -> float:
-    """Return an acceleration of gravity, m/s^2, or raise InvalidBlock."""
-    return checks.positive(gravity, "gravity", InvalidBlock, "m/s^2", _GRAVITY)
+    """Return an acceleration of gravity, m/s^2, or raise BlockError."""
+    return checks.positive(gravity, "gravity", BlockError, "m/s^2", _GRAVITY)
 
 
 def check_mass(mass: object) -> float:
-    """Return a mass, kg, or raise InvalidBlock."""
-    return checks.positive(mass, "mass", InvalidBlock, "kg", _MASS)
+    """Return a mass, kg, or raise BlockError."""
+    return checks.positive(mass, "mass", BlockError, "kg", _MASS)
 
 
 def check_length(value: object, name: str) -> float:
-    """Return a length, m, or raise InvalidBlock."""
-    return checks.positive(value, name, InvalidBlock, "m", _LENGTH)
+    """Return a length, m, or raise BlockError."""
+    return checks.positive(value, name, BlockError, "m", _LENGTH)
 
 
 def check_pair(value: Any, name: str) -> tuple[float, float]:
     """Return a number, or a pair (side +, side -), as two numbers."""
     if type(value) is float:
         return value, value
-    values = checks.numbers(value, name, InvalidBlock)
+    values = checks.numbers(value, name, BlockError)
     if values.shape not in ((), (2,)):
-        raise InvalidBlock(
+        raise BlockError(
             f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name, value=value
         )
     plus, minus = np.broadcast_to(values, 2).tolist()
@@ -80,7 +80,7 @@ def check_pair(value: Any, name: str) -> tuple[float, float]:
 
 def housner_restitution(alpha: float) -> float:
     """Compute the restitution of a rectangle, 1 - 1.5 sin(alpha)^2, from angular momentum (:cite:t:`housner1963`)."""
-    return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
+    return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", BlockError)) ** 2
 
 
 def one_sided_restitution(alpha: float) -> float:
@@ -108,7 +108,7 @@ def one_sided_restitution(alpha: float) -> float:
     >>> round(one_sided_restitution(0.1), 4)
     0.4707
     """
-    angle = check_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
+    angle = check_parameter(checks.finite(alpha, "alpha", BlockError), "alpha")
     sine, cosine = math.sin(angle), math.cos(angle)
     return abs((1.0 - 1.5 * sine * sine) ** 2 * (1.0 - 1.5 * cosine * cosine))
 
@@ -146,7 +146,7 @@ def impact_restitution(
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If a value is out of range, both or neither of slenderness and sizes are given, both `contact` and `points` are
         given, the body would not continue to rock, or `contact` is so narrow that an uneven body would gain energy.
 
@@ -167,25 +167,25 @@ def impact_restitution(
     [0.869, 0.8938, 0.9323]
     """
     if alpha is not None and distances is None and height is None and radius_of_gyration is None:
-        angle = check_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
+        angle = check_parameter(checks.finite(alpha, "alpha", BlockError), "alpha")
         arms, h, k = (math.sin(angle),) * 2, math.cos(angle), math.sqrt(1.0 / 3.0)
     elif alpha is None and not (distances is None or height is None or radius_of_gyration is None):
         plus, minus = check_pair(distances, "distances")
         arms = check_length(plus, "distances"), check_length(minus, "distances")
         h, k = check_length(height, "height"), check_length(radius_of_gyration, "radius_of_gyration")
     else:
-        raise InvalidBlock(
+        raise BlockError(
             "give either {} for a rectangular block, or {}, {} and {} for another body",
             "alpha", "distances", "height", "radius_of_gyration",
         )  # fmt: skip
-    kappa = checks.fraction(contact, "contact", InvalidBlock, below=math.nextafter(1.0, 2.0))
-    count = checks.integer(points, "points", InvalidBlock, 2, _MAX_POINTS)
+    kappa = checks.fraction(contact, "contact", BlockError, below=math.nextafter(1.0, 2.0))
+    count = checks.integer(points, "points", BlockError, 2, _MAX_POINTS)
     if kappa < 1.0 and count > 2:
-        raise InvalidBlock("give either a {} or {}, not both", "contact", "points")
+        raise BlockError("give either a {} or {}, not both", "contact", "points")
     inertia = k * k + h * h
     factors = (_compute_factor(arms, inertia, kappa, count), _compute_factor(arms[::-1], inertia, kappa, count))
     if min(factors) <= 0.0:
-        raise InvalidBlock(
+        raise BlockError(
             f"conservation of angular momentum gives this body a restitution of {min(factors):.3g}, because it is too "
             "stocky; use a more slender one"
         )
@@ -193,7 +193,7 @@ def impact_restitution(
     ratio = math.sqrt((inertia + long * long) / (inertia + short * short))  # ratio of the speeds without energy loss
     min_kappa = inertia * (ratio - 1.0) / (long * (long + ratio * short))
     if kappa < min_kappa:
-        raise InvalidBlock(
+        raise BlockError(
             f"{{}} must be at least {min_kappa:.4g}, because this body would otherwise gain energy", "contact"
         )
     return factors
@@ -295,14 +295,14 @@ def choose_restitutions(restitution: object, conserved: Sequence[float]) -> tupl
     """Return the given restitutions, by default the ones that conserve angular momentum."""
     if restitution is None:
         if min(conserved) <= 0.0:
-            raise InvalidBlock(
+            raise BlockError(
                 f"conservation of angular momentum gives this block a restitution of {min(conserved):.3g}, because it "
                 "is too stocky; correct its sizes if they are swapped, or set {} to a value in (0, 1]",
                 "restitution",
             )
         return conserved[0], conserved[1]
     if hasattr(restitution, "maximum"):  # a Restitution, whose module imports this one
-        raise InvalidBlock(
+        raise BlockError(
             "{} of a Block must be a number or a pair; for a law, use RestrainedBlock(block, restitution=...)",
             "restitution",
         )

@@ -29,7 +29,7 @@ from rocking.block.sides import (
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
-from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
+from rocking.errors import BlockError, OptionError, UnequalSidesError
 
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
@@ -85,7 +85,7 @@ class Block(Rocking):
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If the sizes are not two positive, finite half or full sizes, or the offset or the restitution (or its default)
         is out of range.
 
@@ -132,7 +132,7 @@ class Block(Rocking):
         **unknown: Never,
     ) -> None:
         if unnamed:
-            raise InvalidBlock("give the sizes of a block by name, in m: Block({}=0.4, {}=2.0)", "width", "height")
+            raise BlockError("give the sizes of a block by name, in m: Block({}=0.4, {}=2.0)", "width", "height")
         for name in unknown:
             constructors = {"p": "from_parameters", "alpha": "from_parameters", "distances": "from_pivots"}
             constructors |= {"radius_of_gyration": "from_pivots", "mass_ratio": "from_frame"}
@@ -141,9 +141,9 @@ class Block(Rocking):
         b, h = _resolve_half_sizes((half_width, half_height), (width, height))
         g = check_gravity(gravity)
         description = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
-        s = checks.finite(offset, "offset", InvalidBlock)
+        s = checks.finite(offset, "offset", BlockError)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
-            raise InvalidBlock(
+            raise BlockError(
                 f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}; for a larger one, give the "
                 "pivots and the radius of gyration",
                 "offset",
@@ -214,7 +214,7 @@ class Block(Rocking):
 
         Raises
         ------
-        InvalidBlock
+        BlockError
             If a parameter is out of range, or no rigid body with these sides determines a default restitution.
 
         See Also
@@ -246,7 +246,7 @@ class Block(Rocking):
             factors, depths = find_rigid_bodies(np.array([rates]), np.array([angles]))
             conserved, depth = factors[0].tolist(), g * float(depths[0])
             if restitution is None and math.isnan(conserved[0]):
-                raise InvalidBlock(describe_missing_body(np.array(rates), np.array(angles)), "restitution")
+                raise BlockError(describe_missing_body(np.array(rates), np.array(angles)), "restitution")
             e = choose_restitutions(restitution, conserved)
             if depth > 0.0 and all(abs(e[i] - conserved[i]) <= _RESTITUTION_TOLERANCE for i in range(2)):
                 radii = [depth / math.cos(angle) for angle in angles]
@@ -292,7 +292,7 @@ class Block(Rocking):
 
         Raises
         ------
-        InvalidBlock
+        BlockError
             If the body cannot stand (a distance or the height is not positive) or cannot rock (restitution <= 0).
 
         See Also
@@ -350,7 +350,7 @@ class Block(Rocking):
 
         Raises
         ------
-        InvalidBlock
+        BlockError
             If a size is not positive, or the mass ratio is negative.
 
         Notes
@@ -367,7 +367,7 @@ class Block(Rocking):
         """
         b, h = check_length(half_width, "half_width"), check_length(half_height, "half_height")
         g = check_gravity(gravity)
-        gamma = checks.between(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _MAX_MASS_RATIO)
+        gamma = checks.between(mass_ratio, "mass_ratio", BlockError, 0.0, _MAX_MASS_RATIO)
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         numerator = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
@@ -449,7 +449,7 @@ class Block(Rocking):
     def _get_common(self, name: str) -> float:
         plus, minus = (getattr(side, name) for side in self.sides)
         if plus != minus:
-            raise UnequalSides(
+            raise UnequalSidesError(
                 f"{name} is {plus:g} on side + and {minus:g} on side - of this block: use block.sides[0].{name} and "
                 f"block.sides[1].{name}"
             )
@@ -490,17 +490,17 @@ class Block(Rocking):
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
-        steepness = math.tan if checks.choice(model, "model", InvalidOption, MODELS) == "nonlinear" else float
+        steepness = math.tan if checks.choice(model, "model", OptionError, MODELS) == "nonlinear" else float
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
 def require_block(block: object, requirement: str = "a free Block") -> Block:
-    """Return the block, or raise `InvalidBlock` that names the required object."""
+    """Return the block, or raise `BlockError` that names the required object."""
     if not isinstance(block, Block):
         hint = "create one with Block(width=, height=), in m"
         if hasattr(block, "rose"):
             hint = "use solid.block(azimuth), the block that a Solid is in one vertical plane"
-        raise InvalidBlock(f"{requirement} is required, not a {type(block).__name__}; {hint}")
+        raise BlockError(f"{requirement} is required, not a {type(block).__name__}; {hint}")
     return block
 
 
@@ -513,7 +513,7 @@ def _resolve_half_sizes(
         return check_length(halves[0], "half_width"), check_length(halves[1], "half_height")
     if is_given == [False, False, True, True]:
         return 0.5 * check_length(full[0], "width"), 0.5 * check_length(full[1], "height")
-    raise InvalidBlock(
+    raise BlockError(
         "a block requires either {} and {}, or {} and {} (the full sizes), all in m",
         "half_width", "half_height", "width", "height",
     )  # fmt: skip

@@ -14,7 +14,7 @@ from rocking.calibration.search import MAX_R_HAT, RUN_COUNT, SearchResult, unpac
 from rocking.calibration.space import MAX_VALUES, Space, find_parameter_unit
 from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import format_count
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 #: An interval ends at a bound if more than this share of the posterior (the share beyond one end) is within the
 #: outermost part of the range, in the logarithm.
@@ -59,11 +59,11 @@ class Scores:
         """Compute the scores of predicted probabilities of m outcomes (bool)."""
         predicted, actual = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if predicted.shape != actual.shape or not predicted.size:
-            raise InvalidOption(
+            raise OptionError(
                 f"probabilities and outcomes must have the same shape; got {predicted.shape} and {actual.shape}"
             )
         if not np.all((predicted >= 0.0) & (predicted <= 1.0)):
-            raise InvalidOption("{} must be between 0 and 1", "probabilities")
+            raise OptionError("{} must be between 0 and 1", "probabilities")
         return cls(
             accuracy=float(np.mean((predicted > 0.5) == actual)),
             log_loss=float(compute_log_losses(predicted, actual).mean()),

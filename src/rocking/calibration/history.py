@@ -27,7 +27,7 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.result import Result
 from rocking.core.tables import escape_dollars, format_count, format_table
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.response.figure import choose_times
@@ -233,7 +233,7 @@ def calibrate_history(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range, there are too few samples, or the history does not determine a parameter.
 
     See Also
@@ -258,42 +258,42 @@ def calibrate_history(
     '2.50'
     """
     sample_times, measured = _check_history(times, rotation)
-    is_two_sided = checks.boolean(two_sided, "two_sided", InvalidOption)
+    is_two_sided = checks.boolean(two_sided, "two_sided", OptionError)
     known, unknowns = _split_parameters({"p": p, "alpha": alpha, "restitution": restitution}, is_two_sided)
     if initial_rotation is not None:
-        known["initial_rotation"] = checks.finite(initial_rotation, "initial_rotation", InvalidOption)
+        known["initial_rotation"] = checks.finite(initial_rotation, "initial_rotation", OptionError)
     elif motion is not None:
         known["initial_rotation"] = 0.0
     else:
         unknowns.append(_bound_initial_rotation(measured))
     if not unknowns:
-        raise InvalidOption(NO_UNKNOWNS)
+        raise OptionError(NO_UNKNOWNS)
     if len(sample_times) < 2 * len(unknowns):
-        raise InvalidOption(
+        raise OptionError(
             f"{format_count(len(sample_times), 'sample')} cannot determine {format_count(len(unknowns), 'parameter')}: "
             "provide more"
         )
     problem = _Problem(sample_times, measured, motion, model, known, tuple(unknowns), friction)
-    rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
+    rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
     return _create_calibration(problem, _fit(problem, rng))
 
 
 def _check_history(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
     """Check the times and rotations of a history, and copy them."""
     sample_times, measured = (
-        np.array(checks.numbers(values, name, InvalidOption))
+        np.array(checks.numbers(values, name, OptionError))
         for values, name in ((times, "times"), (rotation, "rotation"))
     )
     if sample_times.ndim != 1 or sample_times.shape != measured.shape:
-        raise InvalidOption(
+        raise OptionError(
             f"times and rotations must have the same shape; got {sample_times.shape} and {measured.shape}"
         )
     if not (np.all(np.isfinite(sample_times)) and np.all(np.isfinite(measured))):
-        raise InvalidOption("{} and {} must be finite; remove missing samples", "times", "rotation")
+        raise OptionError("{} and {} must be finite; remove missing samples", "times", "rotation")
     if not len(sample_times) or sample_times[0] < 0.0 or not np.all(np.diff(sample_times) > 0.0):
-        raise InvalidOption("{} must be nonnegative and increasing", "times")
+        raise OptionError("{} must be nonnegative and increasing", "times")
     if not np.any(measured) or np.abs(measured).max() >= 0.5 * math.pi:
-        raise InvalidOption("{} must be in rad, below pi/2 in size, and not zero throughout", "rotation")
+        raise OptionError("{} must be in rad, below pi/2 in size, and not zero throughout", "rotation")
     return sample_times, measured
 
 
@@ -373,7 +373,7 @@ def _split_parameters(inputs: Mapping[str, float | Range], two_sided: bool) -> t
     known, unknowns = {}, []
     for name, value in inputs.items():
         if is_known(value):
-            known[name] = checks.positive(np.ravel(value)[0], name, InvalidOption)
+            known[name] = checks.positive(np.ravel(value)[0], name, OptionError)
             continue
         low, high = parse_range(value, name, MAX_VALUES[name])
         sides = ("_plus", "_minus") if two_sided else ("",)
@@ -386,7 +386,7 @@ def _bound_initial_rotation(rotation: Floats) -> _Unknown:
     first = float(rotation[0])
     if abs(first) < 0.05 * np.abs(rotation).max():
         text = "a release test must start at the rotation of the release; set {}"
-        raise InvalidOption(text, "initial_rotation")
+        raise OptionError(text, "initial_rotation")
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
 
@@ -459,13 +459,13 @@ def _compute_covariance(problem: _Problem, logs: Floats, residuals: Floats) -> F
         if norm <= _INSENSITIVE * norms.max()
     ]
     if undetermined:
-        raise InvalidOption(
+        raise OptionError(
             f"the history does not determine {', '.join(undetermined)}: set a value, or use a longer history"
         )
     _, singular_values, right_vectors = np.linalg.svd(slopes / norms, full_matrices=False)
     if singular_values[-1] <= _INSENSITIVE * singular_values[0]:
         names = ", ".join(unknown.name for unknown in problem.unknowns)
-        raise InvalidOption(f"the history does not distinguish {names}: set the value of one")
+        raise OptionError(f"the history does not distinguish {names}: set the value of one")
     return np.asarray(variance * (right_vectors.T / singular_values**2) @ right_vectors / np.outer(norms, norms))
 
 

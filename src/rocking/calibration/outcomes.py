@@ -32,7 +32,7 @@ from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
 from rocking.core.result import Result
 from rocking.core.tables import Column, escape_dollars, format_count, format_table
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, find_distinct_motions, list_motions
 from rocking.simulation.ensemble import simulate_many
@@ -207,13 +207,13 @@ class Calibration(Result):
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If there are fewer groups than folds, or the labels do not match the motions.
         """
         labels = label_groups(groups, len(self.observed), folds)
-        rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
+        rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
         evidence = replace(self._evidence)
-        probabilities = np.empty((checks.integer(repeats, "repeats", InvalidOption, 1), len(self.observed)))
+        probabilities = np.empty((checks.integer(repeats, "repeats", OptionError, 1), len(self.observed)))
         for row in probabilities:
             fold_numbers = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
             for fold in range(folds):
@@ -331,7 +331,7 @@ def compute_probabilities(share: Floats, effective: float, outlier_probability: 
 def label_groups(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
     """Assign a group number, from 0, to each motion. By default each motion is a group."""
     labels = number_groups(range(count) if groups is None else groups, "groups", count)
-    checks.integer(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
+    checks.integer(folds, "folds", OptionError, 2, int(labels.max()) + 1)
     return labels
 
 
@@ -385,7 +385,7 @@ def calibrate(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range, all parameters are known, the numbers of motions and outcomes differ, or all
         outcomes are equal (these bound the block from one side only).
 
@@ -416,11 +416,11 @@ def calibrate(
     """
     motion_list = list_motions(motions)
     observed = check_outcomes(overturned, len(motion_list))
-    space = Space.from_bounds(p, alpha, restitution, two_sided=checks.boolean(two_sided, "two_sided", InvalidOption))
-    checks.fraction(outlier_probability, "outlier_probability", InvalidOption, below=0.5)
-    checks.integer(candidates, "candidates", InvalidOption, 128)
-    checks.integer(max_blocks, "max_blocks", InvalidOption, 1)
-    rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
+    space = Space.from_bounds(p, alpha, restitution, two_sided=checks.boolean(two_sided, "two_sided", OptionError))
+    checks.fraction(outlier_probability, "outlier_probability", OptionError, below=0.5)
+    checks.integer(candidates, "candidates", OptionError, 128)
+    checks.integer(max_blocks, "max_blocks", OptionError, 1)
+    rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
     distinct, motion_indices = find_distinct_motions(motion_list)
 
     def simulate_points(points: Floats) -> NDArray[np.float32]:
@@ -467,19 +467,19 @@ def _compute_estimates(space: Space, populations: Floats) -> dict[str, Estimate]
 def check_outcomes(overturned: ArrayLike, count: int) -> Flags:
     """Check that there is an outcome for each motion and not all are equal; return a read-only array."""
     if np.ma.is_masked(overturned):
-        raise InvalidOption("{} must not be masked; provide an outcome for each motion", "overturned", value=overturned)
+        raise OptionError("{} must not be masked; provide an outcome for each motion", "overturned", value=overturned)
     values = np.asarray(overturned)
     if values.shape != (count,):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must contain one outcome for each of the {count} motions; got shape {values.shape}",
             "overturned",
             value=overturned,
         )
     if not np.all(np.isin(values, (0, 1))):
-        raise InvalidOption("{} must contain True or False (or 1 or 0) for each motion", "overturned")
+        raise OptionError("{} must contain True or False (or 1 or 0) for each motion", "overturned")
     observed = values.astype(bool)
     if observed.all() or not observed.any():
-        raise InvalidOption(
+        raise OptionError(
             "all outcomes are equal; a calibration requires motions that overturn the block and motions that do not"
         )
     observed.flags.writeable = False

@@ -15,7 +15,7 @@ from rocking.block import Blocks
 from rocking.block.sides import compute_eccentric_rectangles, housner_restitution
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 #: Parameters of a block's side, in the order of the coordinates.
 PARAMETERS: Final = ("p", "alpha", "restitution")
@@ -72,16 +72,16 @@ class Space:
             if isinstance(value, str):
                 if name != "restitution" or value != HOUSNER:
                     alternatives = "a value or a pair (lowest, highest)" + f", or {HOUSNER!r}" * (name == "restitution")
-                    raise InvalidOption(f"{{}} must be {alternatives}; got {value!r}", name, value=value)
+                    raise OptionError(f"{{}} must be {alternatives}; got {value!r}", name, value=value)
             elif is_known(value):
                 known[name] = check_known_value(np.ravel(value)[0], name)
             else:
                 bounds[name] = parse_range(value, name, MAX_VALUES[name])
         if not bounds:
-            raise InvalidOption(NO_UNKNOWNS)
+            raise OptionError(NO_UNKNOWNS)
         max_alpha = bounds.get("alpha", (0.0, known.get("alpha", 0.0)))[1]
         if "restitution" not in {*bounds, *known} and max_alpha >= _MAX_HOUSNER_ALPHA:
-            raise InvalidOption(
+            raise OptionError(
                 f"Housner's restitution is positive for {{}} below {_MAX_HOUSNER_ALPHA:.4f} rad only", "alpha"
             )
         lower, upper = np.log(list(bounds.values())).T
@@ -184,22 +184,22 @@ def is_known(value: Any) -> bool:
 
 def check_known_value(value: object, name: str) -> float:
     """Check a known parameter against the range allowed for blocks."""
-    known = checks.positive(value, name, InvalidOption, find_parameter_unit(name))
+    known = checks.positive(value, name, OptionError, find_parameter_unit(name))
     if known > MAX_VALUES[name]:
-        raise InvalidOption(f"{{}} must be at most {MAX_VALUES[name]:g}, not {known:g}", name, value=known)
+        raise OptionError(f"{{}} must be at most {MAX_VALUES[name]:g}, not {known:g}", name, value=known)
     return known
 
 
 def parse_range(pair: Any, name: str, max_value: float) -> Range:
     """Parse the ends of a range, increasing numbers between 0 and `max_value`."""
     try:
-        low, high = (checks.real(value, f"each of {name}", InvalidOption) for value in pair)
+        low, high = (checks.real(value, f"each of {name}", OptionError) for value in pair)
     except (TypeError, ValueError):
-        raise InvalidOption(f"{{}} must be a pair (lowest, highest), not {pair!r}", name, value=pair) from None
+        raise OptionError(f"{{}} must be a pair (lowest, highest), not {pair!r}", name, value=pair) from None
     if not 0.0 < low < high <= max_value or math.isinf(high):
         limit = "" if math.isinf(max_value) else f" and at most {max_value:g}"
         hint = checks.hint_at_degrees(high) if name == "alpha" else ""
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be a pair (lowest, highest) of positive, increasing numbers{limit}, "
             f"not {low:g}, {high:g}{hint}",
             name,

@@ -18,7 +18,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.core.tables import add_unit, format_count, read_csv_rows
-from rocking.errors import InvalidOption, RockingError, UnreadableRecord
+from rocking.errors import OptionError, RecordError, RockingError
 from rocking.inputs.pulses import FAMILIES, named_pulse
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -68,11 +68,9 @@ class _Table:
         except (ValueError, KeyError):
             raise self.create_error(f"{text!r} is not {expected}; correct it", line=line, value=text) from None
 
-    def create_error(
-        self, message: str, *arguments: str, line: int | None = 1, value: object = None
-    ) -> UnreadableRecord:
+    def create_error(self, message: str, *arguments: str, line: int | None = 1, value: object = None) -> RecordError:
         """Create an error about a line of the table, by default its header."""
-        return UnreadableRecord(message, *arguments, path=str(self.path), line=line, value=value)
+        return RecordError(message, *arguments, path=str(self.path), line=line, value=value)
 
 
 def read_calibration(
@@ -123,21 +121,21 @@ def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Tabl
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
-        raise UnreadableRecord(f"the file cannot be read: {error.strerror}", path=str(path)) from None
+        raise RecordError(f"the file cannot be read: {error.strerror}", path=str(path)) from None
     except UnicodeDecodeError:
-        raise UnreadableRecord("the file is not a text table in UTF-8; save it as CSV", path=str(path)) from None
+        raise RecordError("the file is not a text table in UTF-8; save it as CSV", path=str(path)) from None
     cells = read_csv_rows(text)
     if len(cells) < 2:
-        raise UnreadableRecord("the table has no rows below its header", path=str(path))
+        raise RecordError("the table has no rows below its header", path=str(path))
     (_, header), *rows = cells
     columns = [convert_heading(cell) for cell in header]
     if duplicates := [column for column in dict.fromkeys(columns) if columns.count(column) > 1]:
         text = f"column names must be distinct; got {' and '.join(duplicates)} more than once"
-        raise UnreadableRecord(text, path=str(path), line=1)
+        raise RecordError(text, path=str(path), line=1)
     for line, row in rows:
         if len(row) != len(columns):
             mismatch = f"this row has {format_count(len(row), 'cell')} for {format_count(len(columns), 'column')}"
-            raise UnreadableRecord(f"{mismatch}; correct it", path=str(path), line=line)
+            raise RecordError(f"{mismatch}; correct it", path=str(path), line=line)
     return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
 
@@ -228,7 +226,7 @@ def read_tests(
 
     Raises
     ------
-    UnreadableRecord
+    RecordError
         If the table or a motion cannot be read, a column is missing, or a cell is invalid. The line refers to the
         table.
 
@@ -246,7 +244,7 @@ def read_tests(
     ...     read_tests(table)
     [<ShakeTest: ridgecrest-clc-090, stood>]
     """
-    table = read_table(checks.path(path, "path of a table", UnreadableRecord))
+    table = read_table(checks.path(path, "path of a table", RecordError))
     if not {"motion", "overturned"} <= {*table.columns}:
         raise table.create_error(f"the columns must include motion and overturned; got {','.join(table.columns)}")
     return _create_tests(table, channel=channel, dt=dt, units=units)
@@ -285,9 +283,9 @@ def read_observed(
 def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[str, Any]:
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
-        raise InvalidOption("a spectral acceleration requires {}, in s", "period", path=str(table.path))
+        raise OptionError("a spectral acceleration requires {}, in s", "period", path=str(table.path))
     if measure.name not in ("pga", kind):  # "pga" is the default
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} is {measure.name}, but the intensities of the outcomes are {kind}; omit it",
             "measure",
             path=str(table.path),
@@ -297,7 +295,7 @@ def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[
 
 def _pair_with_motions(table: _Table, measure: Measure, **metadata: Any) -> dict[str, Any]:
     if measure.has_block_units:
-        raise InvalidOption(f"{measure.name} is in units of the block, which is unknown for observed outcomes; use pga")
+        raise OptionError(f"{measure.name} is in units of the block, which is unknown for observed outcomes; use pga")
     motions = _load_row_motions(table, **metadata)
     motions_by_name = {
         row["motion"]: motion for (_, row), motion in zip(table.rows, motions, strict=True) if motion.pga > 0.0

@@ -21,7 +21,7 @@ from rocking.core.constants import Model
 from rocking.core.result import Result
 from rocking.core.tables import Column, escape_dollars, format_count, format_table, records_to_columns
 from rocking.engine.problem import compute_slenderness, gather_bodies
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import MotionError, OptionError
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion, find_distinct_motions, make_names_unique
 
@@ -69,11 +69,11 @@ class ShakeTest:
     def __post_init__(self) -> None:
         motion, outcome = check_motion(self.motion), self.overturned
         if motion is None:
-            raise InvalidMotion("a test requires the {} of the base; got None", "motion")
+            raise MotionError("a test requires the {} of the base; got None", "motion")
         for label in ("name", "group"):
-            checks.text(getattr(self, label), label, InvalidOption)
+            checks.text(getattr(self, label), label, OptionError)
         if not isinstance(outcome, (bool, int, np.bool_, np.integer)) or outcome not in (0, 1):
-            raise InvalidOption(
+            raise OptionError(
                 f"{{}} must be True or False, not {checks.short_repr(outcome)}", "overturned", value=outcome
             )
         object.__setattr__(self, "overturned", bool(outcome))
@@ -338,7 +338,7 @@ def validate(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If an argument is out of range, or there are no tests.
 
     See Also
@@ -368,19 +368,19 @@ def validate(
     >>> rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9)).brier.value
     0.25
     """
-    items = checks.items(tests, "tests", InvalidOption)
+    items = checks.items(tests, "tests", OptionError)
     if not items:
-        raise InvalidOption("{} must contain at least one test", "tests", value=tests)
+        raise OptionError("{} must contain at least one test", "tests", value=tests)
     for test in items:
         if not isinstance(test, ShakeTest):
-            raise InvalidOption(
+            raise OptionError(
                 f"{{}} must contain ShakeTest(motion, overturned); got {checks.short_repr(test)}", "tests", value=test
             )
-    checks.integer(bins, "bins", InvalidOption, 1, 1000)
-    checks.integer(simulations, "simulations", InvalidOption, 100)
-    rng = np.random.default_rng(checks.integer(seed, "seed", InvalidOption, 0))
+    checks.integer(bins, "bins", OptionError, 1, 1000)
+    checks.integer(simulations, "simulations", OptionError, 100)
+    rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
     if outlier_probability is not None:
-        checks.between(outlier_probability, "outlier_probability", InvalidOption, 0.0, 0.5)
+        checks.between(outlier_probability, "outlier_probability", OptionError, 0.0, 0.5)
     distinct, indices = find_distinct_motions([test.motion for test in items])
     observed = np.array([test.overturned for test in items], dtype=bool)
     clusters = levels.number_labels(
@@ -392,7 +392,7 @@ def validate(
     else:
         if isinstance(blocks, Calibration):
             if weights is not None:
-                raise InvalidOption("a calibration contains its own {}: omit the argument", "weights")
+                raise OptionError("a calibration contains its own {}: omit the argument", "weights")
             description, equation = f"calibration, {format_count(len(blocks.blocks), 'block')}", model or blocks.model
             bodies: Bodies = blocks.blocks
             shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
@@ -428,10 +428,10 @@ def _average_left_out(source: Validation, count: int, weights: object, outlier_p
     """Average the predicted probabilities of left-out tests over the repeats."""
     if weights is not None or outlier_probability is not None:
         name = "outlier_probability" if weights is None else "weights"
-        raise InvalidOption("{} cannot be combined with predictions of left-out tests: omit it", name)
+        raise OptionError("{} cannot be combined with predictions of left-out tests: omit it", name)
     predicted_count = source.probabilities.shape[1]
     if predicted_count != count:
-        raise InvalidOption(
+        raise OptionError(
             f"the predictions are of {format_count(predicted_count, 'test')}; got {format_count(count, 'test')}: "
             "{} must be those of the calibration, in their order",
             "tests",

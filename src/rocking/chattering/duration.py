@@ -32,7 +32,7 @@ from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
 from rocking.engine.schemes import compute_critical_amplitudes
 from rocking.engine.tasks import require_finished
-from rocking.errors import InvalidOption, Unfinished
+from rocking.errors import OptionError, UnfinishedError
 from rocking.kernels.sine import SequenceStatus
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED_IMPACT
 from rocking.kernels.sine.sequence import resolve_impacts, write_rest_phases, write_semianalytical_phases
@@ -118,9 +118,9 @@ def chattering_time(
     >>> round(float(chattering_time(1.03, 2.0, 0.92)), 12)
     1.125947676934
     """
-    order = checks.integer(order, "order", InvalidOption, 1, MAX_ORDER)
+    order = checks.integer(order, "order", OptionError, 1, MAX_ORDER)
     if resolved is not None:
-        resolved = checks.integer(resolved, "resolved", InvalidOption, 1, 1_000_000)
+        resolved = checks.integer(resolved, "resolved", OptionError, 1, 1_000_000)
     parameters = check_amplitude(a), check_frequency(omega), check_restitution(eta)
     methods: dict[str, Callable[[], Floats]] = {
         "exact": lambda: _compute_exact_times(*parameters),
@@ -128,7 +128,7 @@ def chattering_time(
         "series": lambda: compute_series_times(*parameters, order),
         "semianalytical": lambda: _compute_semianalytical_times(*parameters, resolved),
     }
-    selected = checks.choice(method, "method", InvalidOption, list(methods))
+    selected = checks.choice(method, "method", OptionError, list(methods))
     return methods[selected]()
 
 
@@ -224,8 +224,8 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     (True, [1, -1, 1])
     """
     amplitude, frequency, restitution = _check_case(a, omega, eta)
-    if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
-        raise InvalidOption(f"{{}} must be finite and at least 1e-15; got {tolerance!r}", "tolerance", value=tolerance)
+    if checks.finite(tolerance, "tolerance", OptionError) < 1e-15:
+        raise OptionError(f"{{}} must be finite and at least 1e-15; got {tolerance!r}", "tolerance", value=tolerance)
     if amplitude == 1.0:
         return ChatteringSequence(np.zeros(0, IMPACT), True, 0.0, 0.0, 0.0)
     capacity, half_period = 512, math.pi / frequency
@@ -236,7 +236,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
             break
         capacity *= 2
         if capacity > _MAX_CAPACITY:
-            raise InvalidOption(
+            raise OptionError(
                 f"the sequence has more than {_MAX_CAPACITY} impacts: reduce {{}} = {eta!r}", "eta", value=eta
             )
     # A sequence that lasts almost half a period may have the critical amplitude within rounding error.
@@ -279,7 +279,7 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     (0.74, 0.74)
     """
     amplitude, frequency, restitution = _check_case(a, omega, eta)
-    n = checks.integer(n, "n", InvalidOption, 1, 100_000)
+    n = checks.integer(n, "n", OptionError, 1, 100_000)
     ratios = np.full(n, math.nan)
     intervals = _resolve_sequence(amplitude, frequency, restitution, -1.0, n + 2)[1]["interval"]
     intervals = intervals[intervals > 0.0]
@@ -376,7 +376,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
 
     Warns
     -----
-    OutsideFit
+    OutsideFitWarning
         If "eq76" or "eq77" is used beyond these ranges, where the fits are meaningless.
 
     See Also
@@ -394,7 +394,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     >>> round(float(critical_amplitude(2.0, 0.92)), 12)
     1.03801553873
     """
-    selected = checks.choice(method, "method", InvalidOption, ("exact", "eq76", "eq77"))
+    selected = checks.choice(method, "method", OptionError, ("exact", "eq76", "eq77"))
     shape, flat_parameters = broadcast_flat(check_frequency(omega), check_restitution(eta))
     return compute_critical_amplitudes(selected, *flat_parameters).reshape(shape)[()]
 
@@ -452,7 +452,7 @@ def _bisect_critical_amplitude(omega: float, eta: float, alpha: float) -> float:
         while _comes_to_rest(block, high, omega):
             low, high = high, 2.0 * high
         return bisect(low, high, lambda a: not _comes_to_rest(block, a, omega), width=1e-12)[0]
-    except Unfinished:
+    except UnfinishedError:
         return math.nan
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels.sine.series import compute_phase_coefficients, sum_eq65, write_eq65_terms
 
 #: Range of frequencies, divided by p of the block, that double precision resolves.
@@ -37,7 +37,7 @@ def _check_values(
     parameter: ArrayLike, name: str, meaning: str, allowed: Callable[[Floats], Flags], bounds: str
 ) -> Floats:
     """Return the values of a parameter as an array; raise an error for the first invalid value."""
-    values = checks.numbers(parameter, name, InvalidOption)
+    values = checks.numbers(parameter, name, OptionError)
     is_finite = np.isfinite(values)
     is_valid = is_finite & allowed(values)
     if is_valid.all():
@@ -45,7 +45,7 @@ def _check_values(
     index = tuple(map(int, np.argwhere(~(is_valid if is_finite.all() else is_finite))[0]))
     condition = bounds if is_finite.all() else f"finite ({meaning})"
     position, value = f" at index {index}" if values.ndim else "", float(values[index])
-    raise InvalidOption(f"{{}} must be {condition}; got {value:g}{position}", name, value=value)
+    raise OptionError(f"{{}} must be {condition}; got {value:g}{position}", name, value=value)
 
 
 def check_amplitude(a: ArrayLike) -> Floats:
@@ -75,7 +75,7 @@ def check_lossy_restitution(eta: ArrayLike) -> Floats:
     """Return coefficients of restitution below one as an array."""
     values = check_restitution(eta)
     if (values == 1.0).any():
-        raise InvalidOption(
+        raise OptionError(
             "{} must be below 1, because without energy loss at impacts chattering never ends", "eta", value=eta
         )
     return values
@@ -90,7 +90,7 @@ def check_slenderness(alpha: ArrayLike) -> Floats:
 def require_scalar(values: Floats, name: str) -> float:
     """Return the single value of a parameter that must not be an array."""
     if values.ndim:
-        raise InvalidOption(f"{{}} must be a single number; got an array of shape {values.shape}", name)
+        raise OptionError(f"{{}} must be a single number; got an array of shape {values.shape}", name)
     return float(values)
 
 
@@ -99,7 +99,7 @@ def check_lifting_amplitude(a: ArrayLike, *, above: bool = False) -> float:
     amplitude = require_scalar(check_amplitude(a), "a")
     if amplitude < 1.0 or (above and amplitude == 1.0):
         bound = "above" if above else "at least"
-        raise InvalidOption(f"{{}} must be {bound} 1, so that the block uplifts; got {amplitude:g}", "a", value=a)
+        raise OptionError(f"{{}} must be {bound} 1, so that the block uplifts; got {amplitude:g}", "a", value=a)
     return amplitude
 
 
@@ -109,7 +109,7 @@ def broadcast_flat(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
         shape = np.broadcast_shapes(*(parameter.shape for parameter in parameters))
     except ValueError:
         shapes = ", ".join(str(parameter.shape) for parameter in parameters)
-        raise InvalidOption(f"the shapes of the parameters must be compatible; {shapes} do not broadcast") from None
+        raise OptionError(f"the shapes of the parameters must be compatible; {shapes} do not broadcast") from None
     return shape, [np.broadcast_to(parameter, shape).ravel() for parameter in parameters]
 
 
@@ -284,7 +284,7 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If a parameter is out of range, infinite or NaN, or a coefficient exceeds the range of a double (slow forcing,
         or high order with eta close to 1).
 
@@ -302,7 +302,7 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
     >>> (2.0 * series_coefficients(2.0, 0.92, order=2)).round(6)
     array([10.827448, 40.030207])
     """
-    order = checks.integer(order, "order", InvalidOption, 1, MAX_ORDER)
+    order = checks.integer(order, "order", OptionError, 1, MAX_ORDER)
     return _compute_coefficients(check_frequency(omega), check_restitution(eta), order)
 
 
@@ -324,7 +324,7 @@ def _compute_coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
         w, restitution = pairs[:, i].tolist()
         coefficients[i] = compute_phase_coefficients(1.0 / (w * w), restitution, order) / w
         if not np.isfinite(coefficients[i]).all():
-            raise InvalidOption(
+            raise OptionError(
                 f"double precision does not resolve the expansion to order {order} at omega = {w:g} and "
                 f"eta = {restitution:g}: reduce the order, or increase omega or 1 - eta"
             )

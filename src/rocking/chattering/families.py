@@ -16,7 +16,7 @@ from rocking.block import Block
 from rocking.block.single import require_block
 from rocking.core import checks
 from rocking.core.constants import Model
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import MotionError, OptionError
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
 
@@ -102,8 +102,8 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
     4.8
     """
     scale = _find_threshold(block, model)
-    frequency = _to_hertz(block, checks.positive(omega, "omega", InvalidOption))
-    n_lobes = checks.integer(count, "count", InvalidOption, minimum=1)
+    frequency = _to_hertz(block, checks.positive(omega, "omega", OptionError))
+    n_lobes = checks.integer(count, "count", OptionError, minimum=1)
 
     def create_input(a: float, ratio: float) -> SimulationInput:
         return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in range(n_lobes)], frequency), model)
@@ -193,7 +193,7 @@ def record(
     2.0
     """
     if check_motion(motion) is None:
-        raise InvalidMotion("motion must be a Motion, for example rocking.pulses.one_sine(1, 1); got None")
+        raise MotionError("motion must be a Motion, for example rocking.pulses.one_sine(1, 1); got None")
 
     def create_input(a: float, p: float) -> SimulationInput:
         block = Block.from_parameters(p, alpha, restitution)

@@ -23,7 +23,7 @@ from rocking.core.result import DatasetResult, Result
 from rocking.core.tables import array_to_rows, escape_dollars, format_table
 from rocking.core.threads import map_in_threads
 from rocking.engine.tasks import OUTCOME, detect_complete_chattering
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.motion.motion import Motion, find_exceedances
 from rocking.response import Response
@@ -130,7 +130,7 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> Chatt
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If there are not two parameters, their values are not one-dimensional, finite and increasing, or the family does
         not return a `SimulationInput`.
     RockingError
@@ -156,21 +156,21 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> Chatt
     """
     import xarray as xr
 
-    checks.mapping(parameters, "parameters", InvalidOption, '{"a": [1.0, 1.1], "omega": [1.0, 2.0]}')
+    checks.mapping(parameters, "parameters", OptionError, '{"a": [1.0, 1.1], "omega": [1.0, 2.0]}')
     if len(parameters) != 2:
-        raise InvalidOption(f"{{}} must contain two parameters; got {len(parameters)}", "parameters", value=parameters)
+        raise OptionError(f"{{}} must contain two parameters; got {len(parameters)}", "parameters", value=parameters)
     if not callable(family):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be a function of two numbers, as rocking.chattering.families.sine(block); got {family!r}",
             "family",
             value=family,
         )
-    (first, x), (second, y) = ((k, checks.axis(values, k, InvalidOption)) for k, values in parameters.items())
+    (first, x), (second, y) = ((k, checks.axis(values, k, OptionError)) for k, values in parameters.items())
     is_swapped = _is_swapped(family, str(first), str(second))
     inputs = [family(*map(float, (b, a) if is_swapped else (a, b))) for a in x for b in y]
     for entry in inputs:
         if not (isinstance(entry, SimulationInput) and isinstance(entry.motion, Motion)):
-            raise InvalidOption(
+            raise OptionError(
                 "{} must return a SimulationInput of a block and a Motion for each pair", "family", value=entry
             )
     points: list[_MapPoint] = []
@@ -449,7 +449,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If the argument is not the `Response` of a block without restraints.
 
     See Also
@@ -468,7 +468,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     0.498
     """
     if not isinstance(response, Response):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be a Response of simulate(block, motion); got {type(response).__name__}",
             "response",
             value=response,

@@ -16,7 +16,7 @@ from rocking.chattering.expansions import MAX_ORDER, asymptotic_table, first_imp
 from rocking.core import checks
 from rocking.core.result import Result, format_some_rows
 from rocking.core.tables import Column, format_count
-from rocking.errors import InvalidOption, OutsideFit
+from rocking.errors import OptionError, OutsideFitWarning
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,7 +92,7 @@ class ChatteringReport(Result):
     def table(self) -> str:
         """Return at most a dozen cycles of the iterative procedure of the paper, one per row.
 
-        Raise `InvalidOption` without energy loss at impacts.
+        Raise `OptionError` without energy loss at impacts.
         """
         header = ["n", "sign", "term", "interval, p t", "time, p t", "phase, rad", "speed before", "speed after"]
         rows = [
@@ -122,7 +122,7 @@ class ChatteringReport(Result):
     def _columns(self, table: str) -> list[Column]:
         rows = self.impacts if table == "impacts" else self.cycles
         if rows is None:
-            raise InvalidOption(
+            raise OptionError(
                 "{} must be below 1 for the iterative procedure, because without energy loss chattering never ends",
                 "eta",
             )
@@ -183,15 +183,15 @@ def chattering_report(
     time of rest, exact           1.12594768 (0.562974 s)
     """
     if p is not None:
-        p = checks.positive(p, "p", InvalidOption, "rad/s")
+        p = checks.positive(p, "p", OptionError, "rad/s")
     chattering = sequence(a, omega, eta)
     missing = 0.0 if chattering.complete else math.nan
     interval, speed = (
         chattering.impacts[["interval", "speed_before"]][0] if chattering.impacts.size else (missing, missing)
     )
-    checks.integer(order, "order", InvalidOption, 1, MAX_ORDER)
+    checks.integer(order, "order", OptionError, 1, MAX_ORDER)
     series = math.nan
-    with suppress(InvalidOption):  # double precision does not resolve this many terms
+    with suppress(OptionError):  # double precision does not resolve this many terms
         series = float(chattering_time(a, omega, eta, method="series", order=order))
     times = {
         method: float(chattering_time(a, omega, eta, method=method, resolved=resolved))
@@ -289,8 +289,8 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
     amplitudes: dict[str, float | None] = dict.fromkeys(_METHOD_LABELS)
     amplitudes["exact"] = float(critical_amplitude(omega, eta))
     with warnings.catch_warnings():
-        warnings.simplefilter("error", OutsideFit)
+        warnings.simplefilter("error", OutsideFitWarning)
         for method in [*_METHOD_LABELS][1:]:  # outside its range an approximation has no value
-            with suppress(InvalidOption, OutsideFit):
+            with suppress(OptionError, OutsideFitWarning):
                 amplitudes[method] = float(critical_amplitude(omega, eta, method=method))
     return CriticalReport(omega, eta, amplitudes)

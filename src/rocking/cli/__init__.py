@@ -15,7 +15,7 @@ from cyclopts import App, Argument, CycloptsError, MissingArgumentError, Unknown
 
 from rocking.core.checks import suggest
 from rocking.core.progress import notes_for
-from rocking.errors import INTERRUPTED, DamagedStudy, InvalidOption, RockingError, Spelling
+from rocking.errors import INTERRUPTED, DamagedStudyError, OptionError, RockingError, Spelling
 from rocking.inputs.texts import write_option_name
 
 app = App(
@@ -121,7 +121,7 @@ def _is_interrupt(error: BaseException | None) -> bool:
 
 def _format_error(error: Exception, words: list[str]) -> str:
     """Format an error as one line with option names; empty for an unexpected exception."""
-    if isinstance(error, DamagedStudy):
+    if isinstance(error, DamagedStudyError):
         return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
     if isinstance(error, RockingError):
         return error.text(create_spelling(find_command(words))).rstrip(".")
@@ -195,7 +195,7 @@ def reject_unknown_options(values: Iterable[object], arguments: Sequence[str]) -
             options_by_word = {name.lstrip("-"): name for name in candidates}
             # The cutoff allows a typo of one or two letters in six.
             hint = suggest(option.lstrip("-"), options_by_word, "see its --help", 0.8)
-            raise InvalidOption(f"{_format_command(arguments)} has no option {option}; {hint}")
+            raise OptionError(f"{_format_command(arguments)} has no option {option}; {hint}")
 
 
 def _format_command(arguments: Sequence[str]) -> str:

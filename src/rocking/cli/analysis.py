@@ -36,7 +36,7 @@ from rocking.cli.options import (
 )
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results
 from rocking.core.result import DatasetResult
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.inputs.bodies import create_block, note_likely_mistakes
 from rocking.inputs.declared import SHAPES
 from rocking.inputs.quantities import read_angle, read_array, read_length, read_tilt
@@ -85,9 +85,9 @@ def spectrum(
         Abscissa of the figure.
     """
     if alpha is None and ensemble is None:
-        raise InvalidOption("a spectrum requires {}, or the {} of a calibration", "alpha", "ensemble")
+        raise OptionError("a spectrum requires {}, or the {} of a calibration", "alpha", "ensemble")
     if ensemble is not None and (alpha is not None or restitution is not None):
-        raise InvalidOption(
+        raise OptionError(
             "the file of {} contains slendernesses and restitutions: omit {} and {}", "ensemble", "alpha", "restitution"
         )
     with output.folder() as folder:
@@ -258,7 +258,7 @@ def _create_slender_block(options: BlockOptions) -> Block:
     """Return a block for which the slenderness alone suffices: p is then 1."""
     values = options.read_values()
     if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
-        raise InvalidBlock(
+        raise BlockError(
             "the restitution of two different sides depends on {} and {} of both; also set {}", "p", "alpha", "p"
         )
     block = create_block({"p": 1.0} | values if "alpha" in values else values, _SLENDER_SHAPES)

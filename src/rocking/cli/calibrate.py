@@ -29,7 +29,7 @@ from rocking.cli.options import (
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.core.constants import Model
 from rocking.core.tables import format_count, format_table
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.inputs.quantities import read_bounds, read_number, read_tilt
 from rocking.motion.motion import Motion
 
@@ -107,12 +107,12 @@ def calibrate(
             conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
         for name in [name for name, value in conflicting.items() if value]:
             kinds = ("outcomes", "a history") if isinstance(table, MeasuredHistory) else ("a history", "outcomes")
-            raise InvalidOption(f"{{}} requires a table of {kinds[0]}, but this table contains {kinds[1]}", name)
+            raise OptionError(f"{{}} requires a table of {kinds[0]}, but this table contains {kinds[1]}", name)
         records = predict if motion is None else (motion,)
         motions = _read_motions(records, file, "motion" if isinstance(table, MeasuredHistory) else "predict")
         if isinstance(table, MeasuredHistory):
             if len(motions) > 1:
-                raise InvalidOption(
+                raise OptionError(
                     "a history requires a single motion of the base; use {}, or one {}", "motion", "pulse"
                 )
             base_motion = next(iter(motions.values()), None)
@@ -140,7 +140,7 @@ def _read_motions(records: Sequence[str], file: ScaledPulseOptions, option: str)
     """Read records and pulses and reject options of motions if there are none."""
     motions = {name: file.motion(name) for name in records} | file.pulses()
     for name in {} if motions else file.supplied("scale", "pga", "pgv", "sa", "vertical"):
-        raise InvalidOption("{} requires a motion; add one with {} or {}, or omit it", name, option, "pulse")
+        raise OptionError("{} requires a motion; add one with {} or {}, or omit it", name, option, "pulse")
     return motions
 
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from rocking.cli.options import INTEGER
 from rocking.cli.output import OUTPUT, QuietOptions
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.records.named import is_shipped
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def _open_study(folder: Path) -> StudyView:
 
     if not contains_study(folder):
         sentence = "this folder contains no study; pass one record, and drop the other files on the page"
-        raise InvalidOption(sentence, path=str(folder))
+        raise OptionError(sentence, path=str(folder))
     return StudyView(folder)
 
 

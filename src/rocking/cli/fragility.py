@@ -34,7 +34,7 @@ from rocking.cli.output import OUTPUT, OutputOptions, print_result, skip_on_erro
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import write_csv
-from rocking.errors import InvalidOption, Unfitted
+from rocking.errors import FitError, OptionError
 from rocking.inputs.notes import hazard_notes
 from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Polarity
@@ -109,16 +109,16 @@ def fragility(
         }  # fmt: skip
         _reject_options_beside_outcomes(conflicting)
     bodies = {} if outcomes is not None else block.blocks(model)
-    checks.positive(years, "years", InvalidOption)
+    checks.positive(years, "years", OptionError)
     curve = _read_hazard(hazard, site, years, measure.period)
     states = parse_limit_states(limit_states)
     if output.out is not None:
         check_nrml_names([taxonomy], "taxonomy")
         check_nrml_names(states, "a limit state")
     if standing is not None:
-        checks.positive(standing, "standing", InvalidOption)
+        checks.positive(standing, "standing", OptionError)
         standing_limit = _find_standing_limit([*states])
-    checks.fraction(confidence, "confidence", InvalidOption)
+    checks.fraction(confidence, "confidence", OptionError)
     with output.folder() as folder:
         loaded = None
         if outcomes is not None:
@@ -161,7 +161,7 @@ def fragility(
 def _reject_options_beside_outcomes(options: Mapping[str, object]) -> None:
     for option in [option for option, value in options.items() if value]:
         sentence = "{} are observed, for their own block and motions: omit {}"
-        raise InvalidOption(sentence, "outcomes", option)
+        raise OptionError(sentence, "outcomes", option)
 
 
 def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
@@ -173,7 +173,7 @@ def _find_standing_limit(names: list[str]) -> str:
     """Find the limit state that a standing block has not exceeded: overturning, or the only one."""
     if len(names) > 1 and "overturning" not in names:
         sentence = f"{{}} requires overturning or a single limit state; got {' and '.join(names)}: choose one in {{}}"
-        raise InvalidOption(sentence, "standing", "limit_states", value=names)
+        raise OptionError(sentence, "standing", "limit_states", value=names)
     return "overturning" if "overturning" in names else names[0]
 
 
@@ -191,7 +191,7 @@ def _save_outcomes_on_failure(folder: Path | None) -> Iterator[None]:
     """Write simulated outcomes even if the fit fails."""
     try:
         yield
-    except Unfitted as error:
+    except FitError as error:
         if folder is not None and error.outcomes is not None:
             write_csv(folder / "outcomes.csv", error.outcomes)
             note(f"the simulated outcomes are in {folder / 'outcomes.csv'}")
@@ -203,7 +203,7 @@ def _read_hazard(file: Path | None, site: int, years: float, period: float | Non
     if file is None:
         for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
             if is_given:
-                raise InvalidOption("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
+                raise OptionError("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
         return None
     curve = HazardCurve.read(file, site=site, period=period)
     for sentence in hazard_notes(curve.intensity, curve.measure):

@@ -12,7 +12,7 @@ from rocking.block import Block
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.core.progress import note
 from rocking.core.tables import format_table, write_csv
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.inputs.notes import block_notes
 from rocking.inputs.quantities import read_array, read_densities, read_length, read_number, read_sides
 from rocking.solid.solid import Solid
@@ -64,7 +64,7 @@ def mesh(
     """
     with output.folder() as folder:
         if restitution is not None and azimuth is None:
-            raise InvalidOption(
+            raise OptionError(
                 "{} applies only to blocks created by {}; add such a block, or omit it", "restitution", "azimuth"
             )
         solid = Solid.from_mesh(

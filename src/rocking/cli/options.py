@@ -15,7 +15,7 @@ from cyclopts import Group, Parameter, Token
 
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, escape_braces
+from rocking.errors import BlockError, MotionError, OptionError, RecordError, RockingError, escape_braces
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes, vertical_notes
@@ -137,10 +137,10 @@ class RestrainedOptions(BlockOptions):
                     forces.append(couple(INPUTS[name].read(texts[name])))
         try:
             body = bodies.create_body(block, self.read_values("restitution", "one_sided", "lean"), forces)
-        except InvalidBlock as error:
+        except BlockError as error:
             if not forces or error.argument != "offset":
                 raise
-            raise InvalidBlock(
+            raise BlockError(
                 escape_braces(str(error))
             ) from error  # offset of a restraint, not the --offset of the block
         bodies.note_likely_mistakes([block], [body])
@@ -161,9 +161,7 @@ class EnsembleOptions(RestrainedOptions):
         if self.ensemble is None:
             return {"blocks": self.body(), "model": model.model}
         if conflicting := self.block_options():
-            raise InvalidBlock(
-                f"{{}} replaces the block: omit {bodies.name_all(conflicting)}", "ensemble", *conflicting
-            )
+            raise BlockError(f"{{}} replaces the block: omit {bodies.name_all(conflicting)}", "ensemble", *conflicting)
         return read_ensemble_arguments(self.ensemble, model)
 
     def block_options(self) -> list[str]:
@@ -185,7 +183,7 @@ def _add_option_to_errors(option: str) -> Iterator[None]:
     try:
         yield
     except RockingError as error:
-        raise InvalidOption(f"{{}}: {escape_braces(str(error))}", option) from error
+        raise OptionError(f"{{}}: {escape_braces(str(error))}", option) from error
 
 
 def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
@@ -199,9 +197,9 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
         name = name.replace("-", "_")
         if not equals or name in values:
             sentence = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
-            raise InvalidOption(sentence + escape_braces(repr(text)), option, value=text)
+            raise OptionError(sentence + escape_braces(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
-            raise InvalidOption(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
+            raise OptionError(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
         values[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
     bodies.check_parameters(kind, values, "{}", option)
     with _add_option_to_errors(option):
@@ -292,7 +290,7 @@ def read_records(
         for name in names:
             try:
                 results[name] = read(name)
-            except (UnreadableRecord, InvalidMotion) as error:
+            except (RecordError, MotionError) as error:
                 if not keep_going:
                     raise
                 reasons[name] = describe_refusal(name, error)
@@ -312,7 +310,7 @@ class _RecordOptions(FileOptions):
         """Return the motions by name."""
         records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
         if not records and not pulses:
-            raise InvalidOption(
+            raise OptionError(
                 "at least one record is required: file, folder, or name of a shipped record, or {}", "pulse"
             )
         pulse_motions = self.pulses()
@@ -320,7 +318,7 @@ class _RecordOptions(FileOptions):
             records, lambda name: self.motion(name, several=len(records) > 1), keep_going=self.keep_going
         )
         if records and not motions:
-            raise UnreadableRecord(
+            raise RecordError(
                 f"none of {len(records)} records could be read; the first: {next(iter(skipped.values()))}"
             )
         for reason in skipped.values():
@@ -460,7 +458,7 @@ def parse_labels(clusters: str | None) -> str | list[str] | None:
 def read_positive_acceleration(text: str, name: str) -> float:
     """Read a positive acceleration, m/s^2, with a note if a bare number looks like a multiple of g."""
     if not read_acceleration(text, name) > 0.0:
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be positive; got {text.strip()}; use {{}} -1 to reverse a motion", name, "scale", value=text
         )
     return read_noted_acceleration(text, name)
@@ -470,9 +468,9 @@ def _read_ratio(text: str, name: str) -> float:
     """Read a level of a measure in the units of the block."""
     try:
         return read_number(text, name)
-    except InvalidOption:
+    except OptionError:
         sentence = "{} must be plain numbers with this {}, which is in units of the block; got "
-        raise InvalidOption(sentence + repr(text.strip()), name, "measure") from None
+        raise OptionError(sentence + repr(text.strip()), name, "measure") from None
 
 
 def parse_limit_states(text: str) -> dict[str, float]:
@@ -481,18 +479,18 @@ def parse_limit_states(text: str) -> dict[str, float]:
     for part in text.split(","):
         name, equals, value = part.strip().partition("=")
         if not equals and name != "overturning":
-            raise InvalidOption(
+            raise OptionError(
                 f"{{}} must be overturning or NAME=ROTATION divided by slenderness; got {part.strip()!r}",
                 "limit_states",
                 value=text,
             )
         if name in limits or (equals and name in ("", "overturning")):
             fault = f"contains {name} twice" if name in limits else f"must not name a rotation {name!r}"
-            raise InvalidOption(f"{{}} {fault}; name each limit state once, as half=0.5", "limit_states")
+            raise OptionError(f"{{}} {fault}; name each limit state once, as half=0.5", "limit_states")
         try:
             limits[name] = read_number(value, "limit_states") if equals else math.inf
-        except InvalidOption:
-            raise InvalidOption(
+        except OptionError:
+            raise OptionError(
                 f"{{}} {name} must be a number; got {value.strip()!r}", "limit_states", value=text
             ) from None
     return limits

@@ -14,7 +14,7 @@ from cyclopts import Group, Parameter
 
 from rocking.core.progress import note
 from rocking.core.tables import to_json, write_figure, write_text
-from rocking.errors import InvalidOption, Message, OutputError, escape_braces
+from rocking.errors import Message, OptionError, OutputError, escape_braces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,7 +67,7 @@ def write_tables(folder: Path, result: Result) -> None:
 
 
 @contextmanager
-def skip_on_error(files: str, error_type: type[InvalidOption] = InvalidOption) -> Iterator[None]:
+def skip_on_error(files: str, error_type: type[OptionError] = OptionError) -> Iterator[None]:
     """Skip files whose content is rejected, with a note."""
     try:
         yield

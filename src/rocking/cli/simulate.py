@@ -37,7 +37,7 @@ from rocking.cli.output import (
 )
 from rocking.core.progress import note
 from rocking.core.tables import format_table, to_json
-from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.errors import OptionError, RecordError
 from rocking.inputs.notes import reading_notes
 from rocking.inputs.pulses import FAMILIES, PulseFamily
 from rocking.records.named import (
@@ -107,7 +107,7 @@ def simulate(
     options: dict[str, Any] = {**model.arguments(), **start.read_values()}
     slip = read_friction(start.sliding)
     for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
-        raise InvalidOption("{} writes files; set their folder with {}", name, "out")
+        raise OptionError("{} writes files; set their folder with {}", name, "out")
     with output.folder() as folder:
         loaded = motion.read_all(names)
         if loaded.is_single:
@@ -119,7 +119,7 @@ def simulate(
             )
         else:
             if energy and not each:
-                raise InvalidOption("{} draws single responses; with several records also use {}", "energy", "each")
+                raise OptionError("{} draws single responses; with several records also use {}", "energy", "each")
             sliding = slip.get("friction")
             results = replace(
                 survey(body, loaded.motions, sliding=sliding, **summary_options, **options), skipped=loaded.skipped
@@ -210,7 +210,7 @@ def records(
         print("\n\n".join([listing.summary() for listing in listings] + [*reasons.values()]))
     if reasons:
         unreadable = ", ".join([*reasons][:5]) + (f" and {len(reasons) - 5} more" if len(reasons) > 5 else "")
-        raise UnreadableRecord(f"{len(reasons)} of {len(files)} files cannot be read: {unreadable}")
+        raise RecordError(f"{len(reasons)} of {len(files)} files cannot be read: {unreadable}")
 
 
 def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:

@@ -25,7 +25,7 @@ from rocking.core.progress import note
 from rocking.core.result import Result
 from rocking.core.tables import format_count, write_text
 from rocking.core.threads import set_options
-from rocking.errors import InvalidOption, OutputError, StudyError, Unfitted
+from rocking.errors import FitError, OptionError, OutputError, StudyError
 from rocking.inputs.quantities import read_array
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.results import StudyOutcome, check_fractiles
@@ -101,7 +101,7 @@ def run(
         Fixed share of the units to compute, as 3/10. Shares may run at the same time, as an array of jobs.
     """
     if into is not None and not folder.endswith(".toml"):
-        raise InvalidOption(f"{into} is only allowed with a TOML file, which {folder} is not; pass one folder only")
+        raise OptionError(f"{into} is only allowed with a TOML file, which {folder} is not; pass one folder only")
     is_file = folder.endswith(".toml")
     opened = _create_study(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
     with set_options(threads=threads):
@@ -178,7 +178,7 @@ def export(
         Write the scales between which this outcome of a block changes instead.
     """
     if file.suffix not in WRITERS:
-        raise InvalidOption(
+        raise OptionError(
             f"the name of an exported file must end with one of {', '.join(WRITERS)}; got {file.name}",
             "file",
             value=file,
@@ -218,11 +218,11 @@ def report(
     """
     intensity_measure, limits = measure.intensity_measure, parse_limit_states(limit_states)
     fractions = check_fractiles(read_array(fractiles, "fractiles").tolist())
-    checks.fraction(confidence, "confidence", InvalidOption)
+    checks.fraction(confidence, "confidence", OptionError)
     opened, results = Study(folder), dict[str, Result]()
     fit = opened.fragility if together else opened.block_fragilities
     with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
-        with skip_on_error("fragility", Unfitted):
+        with skip_on_error("fragility", FitError):
             results["fragility"] = fit(measure=intensity_measure, limit_states=limits, confidence=confidence)
         results["spectrum"] = opened.spectrum(fractions.tolist())
         for name, analysis in results.items():

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from rocking.core.threads import progress_option, set_options
-from rocking.errors import Message, OutsideFit, Spelling, spell_argument
+from rocking.errors import Message, OutsideFitWarning, Spelling, spell_argument
 
 if TYPE_CHECKING:
     import rich.progress
@@ -60,7 +60,7 @@ def notes_for(audience: Audience, spelling: Spelling = spell_argument) -> Iterat
     global _listener
 
     def show(message: Warning | str, category: type[Warning], *location: Any) -> None:
-        if issubclass(category, OutsideFit):
+        if issubclass(category, OutsideFitWarning):
             note(str(message))
         else:
             default_show(message, category, *location)
@@ -68,7 +68,7 @@ def notes_for(audience: Audience, spelling: Spelling = spell_argument) -> Iterat
     previous = _listener
     with warnings.catch_warnings():
         default_show = warnings.showwarning
-        warnings.simplefilter("always", OutsideFit)
+        warnings.simplefilter("always", OutsideFitWarning)
         warnings.showwarning = show  # type: ignore[assignment]
         _listener = _Listener(audience, spelling, set())
         try:

@@ -26,7 +26,7 @@ from rocking.core.tables import (
     write_netcdf,
     write_text,
 )
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -132,12 +132,12 @@ class Result(ABC):
     def to_dataframe(self, table: str | None = None) -> pd.DataFrame:
         """Return a table (one of `TABLES`, by default the first) as a data frame with units in the column names.
 
-        Raises `InvalidOption` if the table does not exist.
+        Raises `OptionError` if the table does not exist.
         """
         names = [*self.TABLES]
         if not names:
-            raise InvalidOption(f"a {type(self).__name__} has no tables; use to_dict or to_json")
-        return columns_to_frame(self._columns(checks.choice(table or names[0], "table", InvalidOption, names)))
+            raise OptionError(f"a {type(self).__name__} has no tables; use to_dict or to_json")
+        return columns_to_frame(self._columns(checks.choice(table or names[0], "table", OptionError, names)))
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
         """Write a table of `to_dataframe` to a CSV file, with "inf" for infinity, like `to_json`."""
@@ -146,7 +146,7 @@ class Result(ABC):
     def to_excel(self, path: str | Path) -> None:
         """Write all tables as sheets of a workbook (.xlsx), like `to_json`.
 
-        Raises `InvalidOption` without openpyxl.
+        Raises `OptionError` without openpyxl.
         """
         write_excel(path, {table: self.to_dataframe(table) for table in self.TABLES or [""]})
 
@@ -169,10 +169,10 @@ class Result(ABC):
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If the result has no figure, the size is not two positive numbers, or `ax` is not an Axes object.
         """
-        raise InvalidOption(f"a {type(self).__name__} has no figure; use summary or to_dict")
+        raise OptionError(f"a {type(self).__name__} has no figure; use summary or to_dict")
 
     def _headline(self) -> str:
         """Return the result in one line, for the representation."""
@@ -234,11 +234,11 @@ class DatasetResult(Result):
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If a dimension or label does not exist, or the result contains numbers aggregated over that dimension.
         """
         for name in labels.keys() & {*self.POOLED}:
-            raise InvalidOption(
+            raise OptionError(
                 f"this result contains numbers aggregated over {name}; repeat the analysis for a part, or select from "
                 "`data`",
                 value=labels,
@@ -248,11 +248,11 @@ class DatasetResult(Result):
         try:
             for name, values in selection.items():
                 numeric = data[name].dtype.kind == "f"
-                coordinate = checks.numbers(values, name, InvalidOption) if numeric else values
+                coordinate = checks.numbers(values, name, OptionError) if numeric else values
                 data = data.sel({name: coordinate}, method="nearest" if numeric else None)
         except (KeyError, TypeError, ValueError, IndexError):
             names = ", ".join(map(str, data.sizes))
-            raise InvalidOption(
+            raise OptionError(
                 f"no values match {checks.short_repr(labels)}; the dimensions are {names}", value=labels
             ) from None
         return type(self)(self._restrict(data))

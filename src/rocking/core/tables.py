@@ -19,7 +19,7 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidOption, OutputError, describe_install
+from rocking.errors import OptionError, OutputError, describe_install
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -299,7 +299,7 @@ def write_excel(path: str | Path, sheets: Mapping[str, pd.DataFrame]) -> None:
             for name, frame in sheets.items():
                 frame.to_excel(workbook, sheet_name=name, freeze_panes=(1, 0), index=False, float_format="%.15g")
     except ImportError:
-        raise InvalidOption(f"an Excel workbook requires openpyxl: {describe_install('excel')}, or write CSV") from None
+        raise OptionError(f"an Excel workbook requires openpyxl: {describe_install('excel')}, or write CSV") from None
     write_bytes(path, content.getvalue())
 
 

@@ -12,7 +12,7 @@ from contextvars import ContextVar
 from typing import Final, NamedTuple, TypeVar
 
 from rocking.core import checks
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 Item = TypeVar("Item")
 Output = TypeVar("Output")
@@ -44,7 +44,7 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If `threads` is not a positive integer, or `progress` is not a boolean.
 
     See Also
@@ -69,9 +69,9 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
     def __init__(self, *, threads: int | None = None, progress: bool | None = None) -> None:
         before = _options.get(_DEFAULT)
         if threads is not None:
-            threads = checks.integer(threads, "threads", InvalidOption, minimum=1)
+            threads = checks.integer(threads, "threads", OptionError, minimum=1)
         if progress is not None:
-            progress = checks.boolean(progress, "progress", InvalidOption)
+            progress = checks.boolean(progress, "progress", OptionError)
         self._token = _options.set(
             _Options(before.threads if threads is None else threads, before.progress if progress is None else progress)
         )

@@ -17,7 +17,7 @@ from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
 from rocking.dynamics.maps import StroboscopicMap, split_states
 from rocking.dynamics.orbits import compute_moduli, compute_multipliers
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels.periodic import TRAP, iterate
 from rocking.kernels.state import Records, new_scratch
 
@@ -74,7 +74,7 @@ def find_attractor(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
     period = int(recurrences[0]) + 1
     try:
         fixed_point = _find_fixed_point(strobe, orbit[-1], period, size)
-    except (np.linalg.LinAlgError, InvalidOption):  # a multiplier of exactly 1; a step that leads behind a stop
+    except (np.linalg.LinAlgError, OptionError):  # a multiplier of exactly 1; a step that leads behind a stop
         return None
     if fixed_point is None:
         return None

@@ -19,7 +19,7 @@ from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.maps import StroboscopicMap, check_magnitudes, compute_scale, describe_input
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels.periodic import PeriodOutcome
 from rocking.motion.motion import Motion
 
@@ -196,11 +196,11 @@ def basins(
     overturns to side +: 0.12
     """
     strobe = StroboscopicMap(body, motion, model, chattering)
-    x, v = checks.axis(positions, "positions", InvalidOption), checks.axis(velocities, "velocities", InvalidOption)
+    x, v = checks.axis(positions, "positions", OptionError), checks.axis(velocities, "velocities", OptionError)
     check_magnitudes(x, "positions")
     check_magnitudes(v, "velocities")
-    checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
-    max_periods = checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)
+    checks.grid_size({"positions": len(x), "velocities": len(v)}, OptionError)
+    max_periods = checks.integer(n_periods, "n_periods", OptionError, minimum=1)
     grid = _BasinGrid(strobe, x, v, max_periods)
     grid.follow_all()
     return Basins(grid.to_dataset())

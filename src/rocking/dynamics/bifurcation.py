@@ -32,7 +32,7 @@ from rocking.dynamics.maps import (
 )
 from rocking.dynamics.orbits import count_orbit_impacts
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels.periodic import measure_stretches
 from rocking.motion.motion import Motion
 
@@ -86,13 +86,13 @@ class BifurcationDiagram(DatasetResult):
 
         Each entry contains the values before and after, and the periods there. By default the direction is the first
         one; `start` is the index of the initial state. The codes 0, -1 and -2 stand for missing periods, as in
-        ``data``. Raise `InvalidOption` if there is no such direction or start.
+        ``data``. Raise `OptionError` if there is no such direction or start.
         """
         directions = self.data.direction.values.tolist()
         index = directions.index(
-            checks.choice(directions[0] if direction is None else direction, "direction", InvalidOption, directions)
+            checks.choice(directions[0] if direction is None else direction, "direction", OptionError, directions)
         )
-        number = checks.integer(start, "start", InvalidOption, minimum=0, maximum=self.data.sizes["start"] - 1)
+        number = checks.integer(start, "start", OptionError, minimum=0, maximum=self.data.sizes["start"] - 1)
         values, periods = self.data.value.values, self.data.period.values[index, :, number]
         if directions[index] == "down":
             values, periods = values[::-1], periods[::-1]
@@ -200,7 +200,7 @@ def bifurcation_diagram(
 
     Raises
     ------
-    InvalidMotion, InvalidBlock
+    MotionError, BlockError
         If the function does not return a body and a motion.
 
     See Also
@@ -220,17 +220,17 @@ def bifurcation_diagram(
     [1, 1, 1, 2, 2]
     """
     if not callable(case):
-        raise InvalidOption("{} must be a function of the parameter that returns a body and one period", "case")
-    selected = checks.choice(direction, "direction", InvalidOption, get_args(Direction))
-    parameters = checks.axis(values, "values", InvalidOption)
-    initial_states = checks.numbers(starts, "starts", InvalidOption)
+        raise OptionError("{} must be a function of the parameter that returns a body and one period", "case")
+    selected = checks.choice(direction, "direction", OptionError, get_args(Direction))
+    parameters = checks.axis(values, "values", OptionError)
+    initial_states = checks.numbers(starts, "starts", OptionError)
     if initial_states.ndim not in (1, 2) or initial_states.shape[-1] != 2 or initial_states.size == 0:
-        raise InvalidOption("{} must be one pair (coordinate, velocity) or several", "starts")
+        raise OptionError("{} must be one pair (coordinate, velocity) or several", "starts")
     initial_states = initial_states.reshape(-1, 2)
-    n_transient = checks.integer(transient_periods, "transient_periods", InvalidOption, minimum=0)
-    n_recorded = checks.integer(recorded_periods, "recorded_periods", InvalidOption, minimum=2)
-    parameter_name = checks.text(parameter, "parameter", InvalidOption)
-    checks.grid_size({"values": parameters.size, "starts": len(initial_states), "recorded": n_recorded}, InvalidOption)
+    n_transient = checks.integer(transient_periods, "transient_periods", OptionError, minimum=0)
+    n_recorded = checks.integer(recorded_periods, "recorded_periods", OptionError, minimum=2)
+    parameter_name = checks.text(parameter, "parameter", OptionError)
+    checks.grid_size({"values": parameters.size, "starts": len(initial_states), "recorded": n_recorded}, OptionError)
 
     is_afresh, directions = selected == "afresh", ("up", "down") if selected == "both" else (selected,)
     indices = {d: range(parameters.size)[:: -1 if name == "down" else 1] for d, name in enumerate(directions)}
@@ -303,7 +303,7 @@ def bifurcation_diagram(
 
 def _create_map(pair: Any, model: Model | None, chattering: str | ChatteringScheme) -> StroboscopicMap:
     if not isinstance(pair, tuple) or len(pair) != 2:
-        raise InvalidOption("{} must return a body and one period of a motion", "case")
+        raise OptionError("{} must return a body and one period of a motion", "case")
     return stroboscopic_map(*pair, model=model, chattering=chattering)
 
 
@@ -508,14 +508,12 @@ def lyapunov_exponents(
     '-0.693147 -0.693147, ln 0.5 = -0.693147'
     """
     strobe = stroboscopic_map(body, motion, model=model, chattering=chattering)
-    initial_state = checks.numbers(state, "state", InvalidOption)
+    initial_state = checks.numbers(state, "state", OptionError)
     if initial_state.shape != (2,):
-        raise InvalidOption(
-            f"{{}} must be one pair (coordinate, velocity), not of shape {initial_state.shape}", "state"
-        )
+        raise OptionError(f"{{}} must be one pair (coordinate, velocity), not of shape {initial_state.shape}", "state")
     strobe._check_starts(initial_state, "state")
-    count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=_N_BATCHES)
-    n_transient = checks.integer(transient_periods, "transient_periods", InvalidOption, minimum=0)
+    count = checks.integer(n_periods, "n_periods", OptionError, minimum=_N_BATCHES)
+    n_transient = checks.integer(transient_periods, "transient_periods", OptionError, minimum=0)
     record, arguments = strobe._to_records(initial_state[None])[1][0], strobe._create_derivative_arguments()
     frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((n_transient + count, 2), np.nan), 0
     for start, stop in pairwise(

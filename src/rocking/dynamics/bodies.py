@@ -22,7 +22,7 @@ from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.problem import never_rests
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.kernels import state
 from rocking.motion.motion import Motion
 from rocking.records.named import check_motion
@@ -102,10 +102,10 @@ class LinearBody(ABC):
     def _check_parameters(self, *positive: str) -> None:
         """Check the restitution and that the named parameters are positive, and convert numbers to floats."""
         for name in positive:
-            object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, self.units[name]))
-        restitution = checks.finite(self.restitution, "restitution", InvalidBlock)  # type: ignore[attr-defined]
+            object.__setattr__(self, name, checks.positive(getattr(self, name), name, BlockError, self.units[name]))
+        restitution = checks.finite(self.restitution, "restitution", BlockError)  # type: ignore[attr-defined]
         if not 0.0 <= restitution <= 1.0:
-            raise InvalidBlock(f"{{}} must be from 0 to 1, not {restitution:g}", "restitution", value=restitution)
+            raise BlockError(f"{{}} must be from 0 to 1, not {restitution:g}", "restitution", value=restitution)
         object.__setattr__(self, "restitution", restitution)
 
 
@@ -120,7 +120,7 @@ class LinearBodies:
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If the sequence is empty or contains bodies of several kinds.
 
     See Also
@@ -143,9 +143,9 @@ class LinearBodies:
             or any(type(body) is not type(bodies[0]) for body in bodies)
             or not isinstance(bodies[0], LinearBody)
         ):
-            raise InvalidBlock("members must be bodies of rocking.dynamics, all of the same kind")
+            raise BlockError("members must be bodies of rocking.dynamics, all of the same kind")
         if len({body.gravity for body in bodies}) > 1:
-            raise InvalidBlock("all bodies must have the same {}", "gravity")
+            raise BlockError("all bodies must have the same {}", "gravity")
         object.__setattr__(self, "members", bodies)
 
     @property
@@ -217,9 +217,7 @@ class LinearBodies:
 def _require_linear_model(model: Model) -> None:
     if model != "linear":
         advice = 'call rocking.dynamics.simulate, or set {} to "linear"'
-        raise InvalidOption(
-            f"bodies of rocking.dynamics have linear equations of motion: {advice}", "model", value=model
-        )
+        raise OptionError(f"bodies of rocking.dynamics have linear equations of motion: {advice}", "model", value=model)
 
 
 @dataclass(frozen=True)
@@ -236,7 +234,7 @@ class BouncingBall(LinearBody):
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If the restitution is not between 0 and 1, or the gravity is not positive.
 
     See Also
@@ -324,12 +322,12 @@ class ImpactOscillator(LinearBody):
 
     def __post_init__(self) -> None:
         self._check_parameters("frequency")
-        damping = checks.finite(self.damping_ratio, "damping_ratio", InvalidBlock)
+        damping = checks.finite(self.damping_ratio, "damping_ratio", BlockError)
         if not 0.0 <= damping < 1.0:
-            raise InvalidBlock(f"{{}} must be at least 0 and below 1, not {damping:g}", "damping_ratio", value=damping)
-        stop = checks.finite(self.stop, "stop", InvalidBlock)
-        if self.second_stop is not None and not checks.finite(self.second_stop, "second_stop", InvalidBlock) > -stop:
-            raise InvalidBlock(
+            raise BlockError(f"{{}} must be at least 0 and below 1, not {damping:g}", "damping_ratio", value=damping)
+        stop = checks.finite(self.stop, "stop", BlockError)
+        if self.second_stop is not None and not checks.finite(self.second_stop, "second_stop", BlockError) > -stop:
+            raise BlockError(
                 f"{{}} = {self.second_stop:g} m must be above -{{}} = {-stop:g} m, the position of the first stop",
                 "second_stop", "stop", value=self.second_stop,
             )  # fmt: skip
@@ -486,9 +484,9 @@ def simulate(
 
     Raises
     ------
-    InvalidBlock, InvalidMotion
+    BlockError, MotionError
         If the body is none of these, or the motion is not a `Motion` or has a vertical component.
-    InvalidOption
+    OptionError
         If an argument is out of range, the body starts behind a stop, or it never rests and has neither motion nor
         duration.
 
@@ -514,7 +512,7 @@ def simulate(
 
 def _require_linear_body(body: object) -> LinearBody:
     if not isinstance(body, LinearBody):
-        raise InvalidBlock(
+        raise BlockError(
             "a BouncingBall, ImpactOscillator or InvertedPendulum of rocking.dynamics is required, not "
             f"{type(body).__name__}; use rocking.simulate for blocks"
         )
@@ -533,10 +531,10 @@ def _choose_duration(body: LinearBody, motion: Motion | None, duration: float | 
         return duration
     if not _is_pressed(body):
         if motion is None:
-            raise InvalidOption("this body is not pressed against a stop and may never rest; specify {}", "duration")
+            raise OptionError("this body is not pressed against a stop and may never rest; specify {}", "duration")
         return motion.end
     if never_rests(body.as_bodies()):
-        raise InvalidOption(
+        raise OptionError(
             f"a body with {{}} 1, as this {body.description}, never comes to rest; specify {{}}",
             *("restitution", "duration"),
         )

@@ -19,7 +19,7 @@ from rocking.core.tables import Column, add_unit, escape_dollars, format_cell, f
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import PeriodicOrbit, compute_moduli, compute_peak, create_orbit
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ class Branch(Result):
 
     def orbit(self, index: int) -> PeriodicOrbit:
         """Return the orbit at a point of the branch, with its multipliers."""
-        index = checks.integer(index, "index", InvalidOption, minimum=-len(self), maximum=len(self) - 1)
+        index = checks.integer(index, "index", OptionError, minimum=-len(self), maximum=len(self) - 1)
         body, motion = self.family(float(self.values[index]))
         return create_orbit(StroboscopicMap(body, motion, self.model, self.chattering), self.states[index], self.period)
 

@@ -28,7 +28,7 @@ from rocking.dynamics.orbit_equations import (
     interpolate_at_zero,
 )
 from rocking.dynamics.orbits import PeriodicOrbit
-from rocking.errors import InvalidOption, RockingError
+from rocking.errors import OptionError, RockingError
 from rocking.motion.motion import Motion
 
 #: Smallest cosine between the tangents of consecutive points.
@@ -85,7 +85,7 @@ def continue_orbit(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If the value is beyond the bounds, the orbit does not belong to the family there, or a number is out of range.
 
     See Also
@@ -123,11 +123,11 @@ def continue_orbit(
     flip 15.26823701
     """
     if not isinstance(orbit, PeriodicOrbit):
-        raise InvalidOption("{} must be a PeriodicOrbit, as periodic_orbits returns", "orbit", value=orbit)
-    low, high = checks.increasing_pair(bounds, "bounds", InvalidOption)
-    start = checks.between(value, "value", InvalidOption, low, high)
-    max_step = checks.positive(step, "step", InvalidOption)
-    n_points = checks.integer(max_points, "max_points", InvalidOption, minimum=1)
+        raise OptionError("{} must be a PeriodicOrbit, as periodic_orbits returns", "orbit", value=orbit)
+    low, high = checks.increasing_pair(bounds, "bounds", OptionError)
+    start = checks.between(value, "value", OptionError, low, high)
+    max_step = checks.positive(step, "step", OptionError)
+    n_points = checks.integer(max_points, "max_points", OptionError, minimum=1)
     equations = OrbitEquations.from_orbit(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
     backward, forward = (_BranchWalk(equations, z, direction, max_step) for direction in (-1.0, 1.0))

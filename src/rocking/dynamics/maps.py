@@ -19,7 +19,7 @@ from rocking.dynamics.bodies import LinearBody
 from rocking.engine.problem import MAX_SPEED, require_body, set_start
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import Setup
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
+from rocking.errors import BlockError, MotionError, OptionError
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, build_ground
 from rocking.kernels.periodic import TRAP, PeriodicProblem, build_step_rows, differentiate, iterate
@@ -44,21 +44,21 @@ class PeriodicForcing:
     def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | ChatteringScheme) -> None:
         one_period = check_motion(motion)
         if one_period is None:
-            raise InvalidMotion(
+            raise MotionError(
                 "motion must be one period of a Motion, for example rocking.pulses.sine(a, f, cycles=1); got None"
             )
         if one_period.vertical is not None:
-            raise InvalidMotion("motion must not have a vertical component for a stroboscopic map")
+            raise MotionError("motion must not have a vertical component for a stroboscopic map")
         self.body, self.motion = require_body(body), one_period
         self.bodies = self.body.as_bodies()
         self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
         if model is not None:
-            checks.choice(model, "model", InvalidOption, MODELS)
+            checks.choice(model, "model", OptionError, MODELS)
             self.model = model
         self.chattering = chattering_scheme(chattering)
         self.forcing_period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
         if not np.max(np.abs(self.motion.coefficients[:, 0])) < _LIFTING_ACCELERATION * self.body.gravity:
-            raise InvalidMotion(
+            raise MotionError(
                 f"the accelerations of the motion must be below {_LIFTING_ACCELERATION:g} g for a stroboscopic map"
             )
         self._ground = build_repeated_ground(self.motion, self.body.gravity)
@@ -68,11 +68,11 @@ class PeriodicForcing:
         self._body_records, self._settings = run.records, run.settings
         self._settings["stop"], self._settings["no_end_time"] = np.inf, True
         if np.any(self._body_records["yielding"]):
-            raise InvalidBlock(
+            raise BlockError(
                 "yielding tendons have internal state, which stroboscopic maps do not support: remove the tendon"
             )
         if np.any(self._body_records["variable_restitution"] & (self._body_records["seed"] >= 0)):
-            raise InvalidOption(
+            raise OptionError(
                 "stroboscopic maps do not support restitution drawn at random at each impact: specify a number, or a "
                 "restitution that decreases with the speed"
             )
@@ -100,7 +100,7 @@ class PeriodicForcing:
 
     def _check_starts(self, starts: ArrayLike, name: str) -> Floats:
         """Return initial states, shape (n, 2), after checking that they are finite and in front of the stops."""
-        states = checks.numbers(starts, name, InvalidOption)
+        states = checks.numbers(starts, name, OptionError)
         self._to_records(states, name)
         check_magnitudes(states, name)
         return states.reshape(-1, 2)
@@ -118,7 +118,7 @@ class PeriodicForcing:
             )
             if np.any(leads_into_stop):
                 x, v = float(coordinate[leads_into_stop][0]), float(velocity[leads_into_stop][0])
-                raise InvalidOption(
+                raise OptionError(
                     f"{{}} must not point into a stop; got {v:g} m/s at {x:g} m; change its sign, or begin in front "
                     "of the stop", velocities or name, value=v,
                 )  # fmt: skip
@@ -135,9 +135,9 @@ class PeriodicForcing:
 
     def _check_pairs(self, values: ArrayLike, name: str, coordinate: str) -> Floats:
         """Return pairs of numbers as an array, shape (..., 2)."""
-        pairs = checks.numbers(values, name, InvalidOption)
+        pairs = checks.numbers(values, name, OptionError)
         if pairs.ndim == 0 or pairs.shape[-1] != 2:
-            raise InvalidOption(
+            raise OptionError(
                 f"{{}} must contain pairs ({coordinate}, velocity) along the last axis; got shape {pairs.shape}", name
             )
         return pairs
@@ -217,7 +217,7 @@ def split_states(count: int, periods: int) -> Sequence[slice]:
 def check_magnitudes(values: Floats, name: str) -> None:
     """Raise an error for coordinates or velocities that are not finite or too large."""
     if not values.size or not np.all(np.abs(values) <= MAX_SPEED):
-        raise InvalidOption(f"{{}} must be finite numbers between -{MAX_SPEED:g} and {MAX_SPEED:g}", name)
+        raise OptionError(f"{{}} must be finite numbers between -{MAX_SPEED:g} and {MAX_SPEED:g}", name)
 
 
 def describe_input(subject: Body | Motion) -> str:
@@ -270,7 +270,7 @@ class StroboscopicMap(PeriodicForcing):
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If the states have another shape, or a state is behind a stop.
         """
         final_states, _, _ = self.advance(states, n_periods)
@@ -279,7 +279,7 @@ class StroboscopicMap(PeriodicForcing):
     def orbit(self, states: ArrayLike, n_periods: int) -> Floats:
         """Return states after 0, 1, ... periods, shape (..., n_periods + 1, 2), as the map does."""
         pairs, records = self._to_records(states)
-        count = checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)
+        count = checks.integer(n_periods, "n_periods", OptionError, minimum=1)
         rows = np.full((len(records), count, 3), np.nan)
         self._iterate(records, count, rows)
         known = ~np.isnan(rows[..., 0])
@@ -292,7 +292,7 @@ class StroboscopicMap(PeriodicForcing):
     def advance(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
         """Return states after a number of periods, the `PeriodOutcome` of each, and the numbers of resolved impacts."""
         pairs, records = self._to_records(states)
-        self._iterate(records, checks.integer(n_periods, "n_periods", InvalidOption, minimum=1))
+        self._iterate(records, checks.integer(n_periods, "n_periods", OptionError, minimum=1))
         outcomes, impacts = (np.array(records[name]).reshape(pairs.shape[:-1]) for name in ("ending", "impacts"))
         return self._from_records(records).reshape(pairs.shape), outcomes, impacts
 
@@ -306,7 +306,7 @@ class StroboscopicMap(PeriodicForcing):
         pairs, records = self._to_records(states)
         product = np.broadcast_to(np.eye(2), (len(records), 2, 2)).copy()
         change, ended = np.empty_like(product), np.zeros(len(records), dtype=np.bool_)
-        for _ in range(checks.integer(n_periods, "n_periods", InvalidOption, minimum=1)):
+        for _ in range(checks.integer(n_periods, "n_periods", OptionError, minimum=1)):
             signs, initial_states = _compute_signs(records["side"]), records.copy()
             self._iterate(records)
             differentiate(*self._create_derivative_arguments(), state.expose_fields(initial_states), change)
@@ -321,7 +321,7 @@ class StroboscopicMap(PeriodicForcing):
 
         An impact is a pair: time since the start of the period, s, and velocity after the impact. The sign of the
         velocity is the side that a block enters. Between two stops the velocity points away from the stop. NaN if the
-        body overturns earlier. Raise `InvalidOption` if the impacts have another shape, or a velocity does not point
+        body overturns earlier. Raise `OptionError` if the impacts have another shape, or a velocity does not point
         away from its stop.
         """
         pairs = self._check_pairs(impacts, "impacts", "phase in s")
@@ -334,7 +334,7 @@ class StroboscopicMap(PeriodicForcing):
         records["side"] = np.where(flat[:, 1] < 0.0, 1, 0)
         records["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
         if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
-            raise InvalidOption("every velocity in {} must point away from the stop of the impact", "impacts")
+            raise OptionError("every velocity in {} must point away from the stop of the impact", "impacts")
         records["peak"] = self._initial_peak
         self._iterate(records)
         return self._from_records(records).reshape(pairs.shape)
@@ -429,9 +429,9 @@ def stroboscopic_map(
 
     Raises
     ------
-    InvalidMotion
+    MotionError
         If the motion is not a `Motion`, or has zero length.
-    InvalidOption
+    OptionError
         If the body does not support the model.
 
     See Also

@@ -29,7 +29,7 @@ from rocking.dynamics.orbits import (
     simulate_periods,
 )
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption, RockingError
+from rocking.errors import OptionError, RockingError
 from rocking.motion.motion import Motion
 from rocking.response import Response
 
@@ -116,13 +116,13 @@ class OrbitEquations:
         """Create the equations of an orbit at a value of the parameter."""
         pair = family(value) if callable(family) else None
         if not isinstance(pair, tuple) or len(pair) != 2:
-            raise InvalidOption(
+            raise OptionError(
                 "{} must be a function of the parameter that returns a body and one period of a motion", "family"
             )
         strobe = StroboscopicMap(*pair, orbit.model, orbit.chattering)
         scale = compute_scale(strobe)
         if not np.all(np.abs(strobe(orbit.state, orbit.period) - orbit.state) / scale < 1e-8):
-            raise InvalidOption(
+            raise OptionError(
                 f"the orbit is not periodic for {{}} at {{}} = {value:g}; use the body and motion of the orbit",
                 "family",
                 "value",
@@ -144,9 +144,7 @@ class OrbitEquations:
     def _create_half_map(self, value: float) -> HalfMap:
         strobe = self.create_map(value)
         if not has_mirror_symmetry(strobe):
-            raise InvalidOption(
-                f"the body and motion have no mirror symmetry at {{}} = {value:g}", "value", value=value
-            )
+            raise OptionError(f"the body and motion have no mirror symmetry at {{}} = {value:g}", "value", value=value)
         return HalfMap(strobe)
 
     def is_mirrored_throughout(self, value: float) -> bool:

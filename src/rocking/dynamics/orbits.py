@@ -19,7 +19,7 @@ from rocking.core.tables import Column, add_unit, escape_dollars, format_count, 
 from rocking.dynamics.bodies import LinearBody, convert_to_positions
 from rocking.dynamics.maps import StroboscopicMap, compute_scale, estimate_mean_acceleration, has_mirror_symmetry
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.simulation.simulate import compute_response
@@ -326,7 +326,7 @@ def periodic_orbits(
     <PeriodicOrbit: stable orbit of 1 period with 1 impact, multipliers -0.0342 + 0.499i, -0.0342 - 0.499i>
     <PeriodicOrbit: stable orbit of 1 period with complete chattering, multipliers 0, 0>
     """
-    n_periods = checks.integer(period, "period", InvalidOption, minimum=1)
+    n_periods = checks.integer(period, "period", OptionError, minimum=1)
     search = _OrbitSearch(StroboscopicMap(body, motion, model, chattering), n_periods)
     distinct = np.empty((0, 2))
     for state in search.find_recurrent(search.create_starts(starts), n_periods):
@@ -356,7 +356,7 @@ class _OrbitSearch:
         """Return the requested initial states, or create about the requested number."""
         if requested is not None and np.ndim(requested) > 0:
             return self.strobe._check_starts(requested, "starts")
-        n_starts = 1024 if requested is None else checks.integer(requested, "starts", InvalidOption, minimum=1)
+        n_starts = 1024 if requested is None else checks.integer(requested, "starts", OptionError, minimum=1)
         strobe, (low, high) = self.strobe, self.strobe.body.stops
         is_two_sided = strobe._is_two_sided
         max_speed = self._estimate_max_speed()

@@ -16,7 +16,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, Model
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels import ground, state
 from rocking.kernels.ground import Ground
 from rocking.motion import piecewise
@@ -70,7 +70,7 @@ def compute_slenderness(bodies: Bodies) -> Floats:
     """Return the slenderness of each body as it stands, rad, the smaller of two sides, which normalises rotations."""
     parameter = bodies.parameters().get("alpha")
     if parameter is None:
-        raise InvalidOption(f"slenderness is defined for blocks only, not for {bodies.kind}")
+        raise OptionError(f"slenderness is defined for blocks only, not for {bodies.kind}")
     return np.asarray(parameter[0].min(axis=1))
 
 
@@ -103,7 +103,7 @@ def set_start(
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If a state is inadmissible, or a number is not finite or absurdly large.
     """
     stops = bodies.stops
@@ -129,7 +129,7 @@ def set_start(
         low, high = body.stops
         range_text = f"from {low:g} to {high:g} {unit}" if high > low else f"at least {low:g} {unit}"
         value, rate_value = (float(np.broadcast_to(values, u.shape)[k]) for values in (position, speed))
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be {range_text}, in front of the body's stop, and {{}} must not point into it; got "
             f"{value:g} {unit} and {rate_value:g} {unit}/s",
             argument,
@@ -162,16 +162,16 @@ def _check_start(
         return
     kind = bodies[0].coordinate
     label = name or f"initial_{kind.name}"
-    u = float(coordinate[0]) if isinstance(coordinate, np.ndarray) else checks.finite(coordinate, label, InvalidOption)
-    v = checks.finite(rate, "initial_velocity", InvalidOption)
+    u = float(coordinate[0]) if isinstance(coordinate, np.ndarray) else checks.finite(coordinate, label, OptionError)
+    v = checks.finite(rate, "initial_velocity", OptionError)
     if abs(v) > MAX_SPEED:
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be at most {MAX_SPEED:g} {kind.unit}/s in size, not {v:g}", "initial_velocity", value=v
         )
     if abs(u) >= overturn_angle:
         limit = "pi/2" if overturn_angle == 0.5 * math.pi else f"{overturn_angle:g}"
         hint = checks.hint_at_degrees(u) if kind.unit == "rad" else ""
-        raise InvalidOption(f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", label, value=coordinate)
+        raise OptionError(f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", label, value=coordinate)
 
 
 def never_rests(bodies: Bodies) -> bool:
@@ -184,14 +184,14 @@ def build_settings(
     bodies: Bodies, model: Model, scheme: ChatteringScheme, duration: float | None, *, record: bool
 ) -> state.Record:
     """Check and return the settings of a simulation; a duration is required if nothing comes to rest."""
-    checks.choice(model, "model", InvalidOption, MODELS)
+    checks.choice(model, "model", OptionError, MODELS)
     if duration is None:
         if never_rests(bodies):
-            raise InvalidOption(
+            raise OptionError(
                 "a block with {} 1 never comes to rest; give {} to limit the simulation", "restitution", "duration"
             )
     else:
-        duration = checks.positive(duration, "duration", InvalidOption, "s")
+        duration = checks.positive(duration, "duration", OptionError, "s")
     stop = math.inf if duration is None else duration
     fields = (model == "nonlinear", scheme.code, scheme.bracket, stop, duration is None, record)
     return state.expose_fields(np.array([fields], dtype=state.SETTINGS))[0]

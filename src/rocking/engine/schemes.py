@@ -15,7 +15,7 @@ from rocking.block.body import Bodies
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, split_range
 from rocking.core.constants import Model
-from rocking.errors import InvalidOption, OutsideFit
+from rocking.errors import OptionError, OutsideFitWarning
 from rocking.kernels import state
 from rocking.motion.motion import Motion
 
@@ -67,7 +67,7 @@ class ChatteringScheme(ABC):
         """Check that all parameters are positive numbers."""
         unit = "m/s, or of a block fractions of p alpha" if self.unit == "speed" else self.unit
         for parameter in fields(self):
-            checks.positive(getattr(self, parameter.name), parameter.name, InvalidOption, unit)
+            checks.positive(getattr(self, parameter.name), parameter.name, OptionError, unit)
 
     @property
     def label(self) -> str:
@@ -85,7 +85,7 @@ class ChatteringScheme(ABC):
         """Return the thresholds for the impacts of both sides of every body, shape (n, 2).
 
         The unit is the unit of the measure `code`. Without a motion the rocking is free; `factor` multiplies the
-        motion. Raise `InvalidOption` if the scheme does not support such bodies or motions.
+        motion. Raise `OptionError` if the scheme does not support such bodies or motions.
         """
 
     def __str__(self) -> str:
@@ -95,13 +95,13 @@ class ChatteringScheme(ABC):
 
     @classmethod
     def from_text(cls, value: str) -> ChatteringScheme:
-        """Create the scheme from the text after "NAME=", or raise `InvalidOption`."""
+        """Create the scheme from the text after "NAME=", or raise `OptionError`."""
         if not fields(cls):
-            raise InvalidOption(f"the chattering scheme {cls.name} has no parameter; got {value!r}")
+            raise OptionError(f"the chattering scheme {cls.name} has no parameter; got {value!r}")
         try:
             return cls(float(value))  # type: ignore[call-arg]
         except ValueError:
-            raise InvalidOption(
+            raise OptionError(
                 f"the parameter of the chattering scheme {cls.name} must be a number, not {value!r}"
             ) from None
 
@@ -122,12 +122,12 @@ class AsymptoticTime(ChatteringScheme):
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If `critical` is none of these.
 
     Warns
     -----
-    OutsideFit
+    OutsideFitWarning
         If a fit is used outside its range of frequencies (0.5 to 8, divided by p) and restitutions (0.5 to 0.97).
 
     See Also
@@ -156,7 +156,7 @@ class AsymptoticTime(ChatteringScheme):
     critical: Critical = "eq76"
 
     def __post_init__(self) -> None:
-        checks.choice(self.critical, "critical", InvalidOption, get_args(Critical))
+        checks.choice(self.critical, "critical", OptionError, get_args(Critical))
 
     @property
     def label(self) -> str:
@@ -174,7 +174,7 @@ class AsymptoticTime(ChatteringScheme):
 
         is_sine = motion is not None and motion.description.family == "sine" and motion.vertical is None
         if not (isinstance(bodies, Blocks) and not bodies.terms and bodies.is_symmetric and motion and is_sine):
-            raise InvalidOption(
+            raise OptionError(
                 '{} "time" requires symmetric blocks under sinusoidal motions (rocking.pulses.sine) without a '
                 'vertical component; use "certified"',
                 "chattering",
@@ -344,16 +344,16 @@ def chattering_scheme(chattering: str | ChatteringScheme) -> ChatteringScheme:
     name, separator, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
     if name not in _SCHEMES:
         kinds = "" if isinstance(chattering, str) else " or a scheme"
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be one of {', '.join(_SCHEMES)}{kinds}, not {chattering!r}", "chattering", value=chattering
         )
     if not separator:
         return _SCHEMES[name]()
     try:
         return _SCHEMES[name].from_text(value)
-    except InvalidOption as error:
+    except OptionError as error:
         sentence = f'{{}} "{chattering}": {error.message.template}'
-        raise InvalidOption(sentence, "chattering", *error.message.arguments) from None
+        raise OptionError(sentence, "chattering", *error.message.arguments) from None
 
 
 #: Fits of the paper for the critical amplitude: coefficient of eta^i omega^j in row i, column j.
@@ -380,7 +380,7 @@ def compute_critical_amplitudes(method: str, omega: Floats, eta: Floats) -> Floa
             warnings.warn(
                 f"Eq. {method[2:]} was fitted for omega from {min_omega:g} to {max_omega:g} and eta from {min_eta:g} "
                 f'to {max_eta:g}, not for omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g}; use "exact"',
-                OutsideFit,
+                OutsideFitWarning,
                 stacklevel=2,
             )
         fitted: Floats = polynomial.polyval2d(eta, omega, _EQ76 if method == "eq76" else _EQ77)

@@ -20,7 +20,7 @@ from rocking.core.tables import format_count
 from rocking.core.threads import map_in_threads
 from rocking.engine.problem import build_settings, compute_peaks, find_common_step, prepare_ground, set_start
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidMotion, Unfinished
+from rocking.errors import MotionError, UnfinishedError
 from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, max_absolute_weight
 from rocking.kernels.lane_steps import WIDTH
@@ -153,7 +153,7 @@ def simulate_each(setup: Setup, motion: Motion, factors: Floats) -> Iterator[tup
 def require_finished(unfinished: bool) -> None:
     """Raise an error if a required simulation was aborted."""
     if unfinished:
-        raise Unfinished(
+        raise UnfinishedError(
             f"a simulation was aborted after more than {BUDGET:,} steps, so its outcome is unknown; "
             "simulate this case alone for its partial response, or give a duration"
         )
@@ -168,7 +168,7 @@ def describe_missing(missing: Flags | int) -> str:
 def check_components(bodies: Bodies, motion: Motion | None) -> None:
     """Raise an error if a motion has a vertical component although the bodies move along a line."""
     if motion is not None and motion.vertical is not None and bodies[0].coordinate.unit != ROTATION.unit:
-        raise InvalidMotion(
+        raise MotionError(
             f"this {bodies[0].description} moves along one line; use a motion without a vertical component"
         )
 

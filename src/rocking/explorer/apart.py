@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking import errors
-from rocking.errors import InvalidBlock, RockingError
+from rocking.errors import BlockError, RockingError
 from rocking.solid.mesh import Region, compute_properties
 from rocking.solid.support import Sections, compute_sections
 
@@ -59,7 +59,7 @@ def read_mesh_in_process(name: str, data: bytes, options: Mapping[str, Any]) -> 
     except subprocess.SubprocessError:
         allowed = f"{_MAX_TIME} s or {_MAX_MEMORY // 2**30} GiB"
         sentence = f"takes more than {allowed} to read: make the mesh coarser, or use it in Python"
-        raise InvalidBlock(sentence, path=name) from None
+        raise BlockError(sentence, path=name) from None
     return decode_answer(process.stdout)
 
 

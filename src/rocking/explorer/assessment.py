@@ -15,7 +15,7 @@ from rocking.block import Blocks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.bisection import bisect
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption, Unfitted
+from rocking.errors import FitError, OptionError
 from rocking.explorer.catalogue import find_title, number_stations, read_entries
 from rocking.explorer.inputs import Case, require_rest
 from rocking.explorer.motions import WrittenMotion, read_motion
@@ -90,14 +90,14 @@ def read_assessment(case: Case, texts: Texts, uploads: UploadStore) -> Assessmen
     nonempty = {name: texts[name].strip() for name in ASSESSMENT if texts.get(name, "").strip()}
     entries = read_entries(nonempty.get("records", ""))
     if not entries:
-        raise InvalidOption("an assessment needs {}: tick one or more in the list", "records")
+        raise OptionError("an assessment needs {}: tick one or more in the list", "records")
     if not all("motion" in entry for entry in entries):
-        raise InvalidOption("an entry of the list of {} names no motion: take it out", "records")
+        raise OptionError("an entry of the list of {} names no motion: take it out", "records")
     require_rest(side.restitution for side in case.block.sides)
     measure = _read_measure(nonempty)
     count = read_number(nonempty.get("levels", "16"), "levels")
     if not (_MIN_LEVELS <= count <= _MAX_LEVELS and count == int(count)):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} are from {_MIN_LEVELS} to {_MAX_LEVELS} in number, not {count:g}", "levels", value=nonempty["levels"]
         )
     chosen_ends = {
@@ -108,7 +108,7 @@ def read_assessment(case: Case, texts: Texts, uploads: UploadStore) -> Assessmen
         default_range = _suggest_levels(case, measure, (_read_nonzero_motion(entry, uploads) for entry in entries))
     low, high = chosen_ends.get("level_from", default_range[0]), chosen_ends.get("level_to", default_range[1])
     if not 0.0 < low < high < math.inf:
-        raise InvalidOption("{} must be positive, and below the last of the levels", "level_from")
+        raise OptionError("{} must be positive, and below the last of the levels", "level_from")
     friction = check_friction(read_number(nonempty["friction"], "friction")) if "friction" in nonempty else None
     return Assessment(
         case, entries, number_stations(entries, uploads), uploads, measure, np.linspace(low, high, int(count)), friction
@@ -119,7 +119,7 @@ def _read_measure(texts: Texts) -> Measure:
     if texts.get("measure", "pga") == "pga":
         return Measure("pga")
     if texts["measure"] != "sa":
-        raise InvalidOption(f"{{}} is pga or sa, not {texts['measure'][:20]!r}", "measure", value=texts["measure"])
+        raise OptionError(f"{{}} is pga or sa, not {texts['measure'][:20]!r}", "measure", value=texts["measure"])
     return Measure("sa", ASSESSMENT["measure_period"].read(texts.get("measure_period", "1")))
 
 
@@ -197,7 +197,7 @@ def _fit_outcomes(header: dict[str, Any], assessment: Assessment, outcomes_by_re
     data, known_clusters = (levels[is_known], outcomes.ravel()[is_known]), clusters[is_known]
     try:
         fragility = fit_fragility(*data, clusters=known_clusters, measure=assessment.measure)
-    except Unfitted as error:
+    except FitError as error:
         reason = phrase("assessment.no_fit", reason=str(error))
         return Payload({**header, "fit": None, "why": reason, "outcomes": count}, arrays)
     curve, intensities = fragility.curves[0], np.linspace(0.0, assessment.levels[-1], 121)
@@ -277,7 +277,7 @@ def _find_overturning_factor(case: Case) -> dict[str, Any] | None:
 def _read_nonzero_motion(entry: Texts, uploads: UploadStore) -> Motion:
     motion = read_motion(entry, uploads).motion
     if motion is None or motion.pga == 0.0:
-        raise InvalidOption(f"{find_title(entry, uploads)} shakes nothing: take it out of {{}}", "records")
+        raise OptionError(f"{find_title(entry, uploads)} shakes nothing: take it out of {{}}", "records")
     return motion
 
 

@@ -12,7 +12,7 @@ from urllib.parse import parse_qsl
 
 from rocking import records
 from rocking.analysis.levels import number_labels
-from rocking.errors import InvalidOption, RockingError
+from rocking.errors import OptionError, RockingError
 from rocking.explorer.parameters import PARAMETERS, Texts, field_label, list_names
 from rocking.explorer.uploads import UploadStore, compute_measures
 
@@ -70,13 +70,13 @@ def read_entries(text: str) -> list[dict[str, str]]:
     """
     parts = [part for part in text.split(";") if part]
     if len(text) > _MAX_LETTERS or len(parts) > MAX_ENTRIES:
-        raise InvalidOption(
+        raise OptionError(
             f"a list of {{}} has {MAX_ENTRIES} entries and {_MAX_LETTERS} letters at most: take some out", "records"
         )
     entries = [dict(parse_qsl(part)) for part in parts]
     unknown_names = {name for entry in entries for name in entry.keys() - {*list_names("motion"), "key"}}
     if unknown_names:
-        raise InvalidOption(
+        raise OptionError(
             f"an entry of the list of {{}} has {', '.join(list_names('motion'))}, not {min(unknown_names)[:20]!r}",
             "records",
             value=text,

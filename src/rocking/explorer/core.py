@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import BlockError, OptionError
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.inputs import read_case
 from rocking.explorer.meshes import describe_body
@@ -74,7 +74,7 @@ class Explorer:
         description = {"key": key, "name": uploads.file(key).name, "azimuth": 0.0}
         try:
             return description | {"azimuth": uploads.body(f"file:{key}", {}, None, None).solid.weakest_azimuth}
-        except InvalidBlock as error:
+        except BlockError as error:
             if error.argument is None:
                 uploads.remove(key)
                 raise
@@ -146,7 +146,7 @@ class Explorer:
         """Return plan, resistance in every direction, and words for the body of a mesh."""
         case = self.simulate(texts).case
         if case.body is None:
-            raise InvalidOption("this block is of no {}: open one", "mesh")
+            raise OptionError("this block is of no {}: open one", "mesh")
         return describe_body(case.body, case.azimuth)
 
     def summary(self, texts: Texts) -> list[tuple[str, str]]:
@@ -161,7 +161,7 @@ class Explorer:
     def export(self, texts: Texts, form: str, window: tuple[float, float] | None = None) -> bytes:
         """Return a response as the content of a file in one of `EXPORTS`; a figure shows a window (s)."""
         if form not in EXPORTS:
-            raise InvalidOption(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
+            raise OptionError(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
         response = self.simulate(texts).response
         with tempfile.TemporaryDirectory(prefix="rocking-") as folder:
             file = Path(folder) / f"response.{form}"

@@ -15,7 +15,7 @@ from rocking.block import Block
 from rocking.block.single import require_block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
+from rocking.errors import BlockError, MotionError, OptionError
 from rocking.explorer.meshes import MeshBody, find_pivots
 from rocking.explorer.motions import motion_to_texts, read_motion_values
 from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, clean_texts
@@ -88,7 +88,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     if "duration" not in values:
         require_rest(side.restitution for side in block.sides)
     elif values["duration"] < _MIN_DURATION:
-        raise InvalidOption(f"{{}} must be {_MIN_DURATION:g} s or more here", "duration", value=values["duration"])
+        raise OptionError(f"{{}} must be {_MIN_DURATION:g} s or more here", "duration", value=values["duration"])
     return Case(
         texts=case_texts,
         block=block,
@@ -109,9 +109,9 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
 
 
 def require_rest(restitutions: Iterable[float]) -> None:
-    """Raise `InvalidOption` unless a block with these restitutions comes to rest within an acceptable time."""
+    """Raise `OptionError` unless a block with these restitutions comes to rest within an acceptable time."""
     if math.prod(restitutions) > _MAX_RESTITUTION_PRODUCT:
-        raise InvalidOption(
+        raise OptionError(
             f"the product of {{}} on both sides is above {_MAX_RESTITUTION_PRODUCT:g}, so that the block hardly comes "
             "to rest: lower it, or simulate it in Python",
             "restitution",
@@ -121,7 +121,7 @@ def require_rest(restitutions: Iterable[float]) -> None:
 def require_possible(peak: float) -> None:
     """Reject a peak acceleration, m/s^2, that no motion can have, before the motions are created."""
     if peak > MAX_ACCELERATION:
-        raise InvalidMotion(TOO_STRONG)
+        raise MotionError(TOO_STRONG)
 
 
 def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str]:
@@ -172,7 +172,7 @@ def _read_block(texts: Texts, values: Values, uploads: UploadStore) -> _WrittenB
     names = values.keys() & BLOCK_NAMES - {"restitution"}
     shape = next((shape for shape in SHAPES if {*shape.needed} <= names <= {*shape.needed, *shape.optional}), None)
     if shape is None:
-        raise InvalidBlock(
+        raise BlockError(
             "a block has either {} and {} (m) and perhaps {}, or {} (rad/s) and {}, or {}, {} and {} (m), or {} and "
             "{} (degrees)",
             *(name for shape in SHAPES[:-1] for name in (*shape.needed, *shape.optional)),

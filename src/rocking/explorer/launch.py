@@ -18,7 +18,7 @@ from urllib.parse import urlencode
 
 from rocking.core.progress import note
 from rocking.core.threads import set_options
-from rocking.errors import InvalidOption, describe_install
+from rocking.errors import OptionError, describe_install
 from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
 from rocking.response import Response
 
@@ -37,9 +37,9 @@ _BACKLOG: Final = 128
 
 
 def require_packages() -> None:
-    """Raise `InvalidOption` unless the packages of the explorer are installed."""
+    """Raise `OptionError` unless the packages of the explorer are installed."""
     if any(util.find_spec(name) is None for name in ("starlette", "uvicorn", "bokeh")):
-        raise InvalidOption(f"the explorer needs packages that are not installed: {describe_install('explorer')}")
+        raise OptionError(f"the explorer needs packages that are not installed: {describe_install('explorer')}")
 
 
 @dataclass(frozen=True)
@@ -118,18 +118,16 @@ def start_listening(
 
 def _bind_socket(address: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
-        raise InvalidOption(f"{{}} must be a whole number from 0 to 65535, not {port}", "port", value=port)
+        raise OptionError(f"{{}} must be a whole number from 0 to 65535, not {port}", "port", value=port)
     try:
         # An empty address means all addresses.
         family, kind, _, _, socket_address = socket.getaddrinfo(address or "::", port, type=socket.SOCK_STREAM)[0]
     except OSError as error:
-        raise InvalidOption(
-            f"{{}}: this machine has no {address} ({error.strerror})", "address", value=address
-        ) from None
+        raise OptionError(f"{{}}: this machine has no {address} ({error.strerror})", "address", value=address) from None
     ip = ip_address(str(socket_address[0]).partition("%")[0])
     ip = (ip.ipv4_mapped if isinstance(ip, IPv6Address) else None) or ip
     if ip.is_unspecified:
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} {address!r} is every address of this machine: name the one that others shall use",
             "address",
             value=address,
@@ -144,7 +142,7 @@ def _bind_socket(address: str, port: int) -> socket.socket:
         listener.listen(_BACKLOG)
     except OSError as error:
         listener.close()
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} {port} of {address} cannot be used ({error.strerror}): choose another one", "port", value=port
         ) from None
     return listener
@@ -213,7 +211,7 @@ def explore(response: Response, *, height: int = 760) -> Frame:
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If `response` is not a response, or a package of the ``explorer`` extra is missing.
 
     See Also
@@ -228,7 +226,7 @@ def explore(response: Response, *, height: int = 760) -> Frame:
     '0.24'
     """
     if not isinstance(response, Response):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be a Response, as rocking.simulate returns it, not a {type(response).__name__}", "response"
         )
     from rocking.explorer.inputs import response_to_texts

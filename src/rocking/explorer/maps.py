@@ -20,7 +20,7 @@ from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.explorer.inputs import Case, require_possible, require_rest
 from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_arguments, write_pulse
 from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, list_names
@@ -113,10 +113,10 @@ def _has_one_slenderness(case: Case) -> bool:
 def read_grid(case: Case, texts: Texts) -> MapGrid:
     """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same for ``y``, and the number of ``points`` of each."""
     if case.motion is None or case.motion.pga == 0.0:
-        raise InvalidOption("a map needs something that shakes the block: choose a record or a pulse", "motion")
+        raise OptionError("a map needs something that shakes the block: choose a record or a pulse", "motion")
     x, y = (_read_axis(direction, case, texts) for direction in ("x", "y"))
     if x.name == y.name or {x.name, y.name} in ({"omega", "p"}, {"a", "pga"}):  # vary the same quantity
-        raise InvalidOption("{} and {} vary the same: choose another pair of axes", x.name, y.name)
+        raise OptionError("{} and {} vary the same: choose another pair of axes", x.name, y.name)
     # Blocks of a map over the restitution have equal sides, and the highest restitution comes to rest last.
     eta = [float(axis.values[-1]) for axis in (x, y) if axis.name == "restitution"]
     require_rest(eta * 2 or [side.restitution for side in case.block.sides])
@@ -261,9 +261,9 @@ def _read_axis(direction: str, case: Case, texts: Texts) -> Axis:
     name = texts.get(direction, "")
     if name not in list_axes(case):
         reason = "; the slenderness of a mesh follows from its azimuth, which no map varies" if case.body else ""
-        raise InvalidOption(f"this case is mapped over {', '.join(list_axes(case))}, not over {name[:20]!r}{reason}")
+        raise OptionError(f"this case is mapped over {', '.join(list_axes(case))}, not over {name[:20]!r}{reason}")
     if direction == "x" and name in ("a", "pga"):
-        raise InvalidOption("amplitudes go upwards: choose another parameter for the axis to the right")
+        raise OptionError("amplitudes go upwards: choose another parameter for the axis to the right")
     return read_range(name, texts, (f"{direction}_from", f"{direction}_to", "points"), AXES[name].close)
 
 
@@ -274,11 +274,11 @@ def read_range(name: str, texts: Texts, keys: tuple[str, str, str], default_ends
         for key, default in zip(keys, (*default_ends, 200), strict=True)
     )
     if not (_MIN_POINTS <= count <= _MAX_POINTS and count == int(count)):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be a whole number from {_MIN_POINTS} to {_MAX_POINTS}, not {count:g}", keys[2], value=count
         )
     if not 0.0 < low < high < math.inf:
-        raise InvalidOption(f"{{}} must be positive and below {{}}; got {low:g} and {high:g}", *keys[:2], value=low)
+        raise OptionError(f"{{}} must be positive and below {{}}; got {low:g} and {high:g}", *keys[:2], value=low)
     return Axis(name, np.linspace(low, high, int(count)))
 
 

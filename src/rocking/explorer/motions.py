@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking import records
 from rocking.core import checks
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import MotionError, OptionError
 from rocking.explorer.parameters import PARAMETERS, PULSES, Texts, Values, clean_texts, list_names
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.declared import SCALINGS
@@ -51,14 +51,14 @@ def read_motion_values(texts: Texts, values: Values, uploads: UploadStore) -> Wr
         read = _add_vertical(read, name, values, uploads)
     if target is not None:
         if read.motion is None:
-            raise InvalidOption("there is no motion to scale: choose one, or leave the scaling out")
+            raise OptionError("there is no motion to scale: choose one, or leave the scaling out")
         python = f"{read.python}.{_write_scaling(*target)}"
         read = read._replace(motion=_scale_motion(read.motion, *target), python=python)
     return read
 
 
 def _read_level(text: str, name: str) -> float:
-    return checks.positive(read_acceleration(text, name), name, InvalidOption, "m/s^2")
+    return checks.positive(read_acceleration(text, name), name, OptionError, "m/s^2")
 
 
 def _write_scaling(level: float, measure: Measure) -> str:
@@ -80,7 +80,7 @@ def _add_vertical(
     """Add the vertical component."""
     name, (kind, _, key) = values["vertical"], horizontal_name.partition(":")
     if horizontal.motion is None or is_pulse(horizontal_name) or kind == "given":
-        raise InvalidOption("{} goes with a record: choose one, or leave the component out", "vertical")
+        raise OptionError("{} goes with a record: choose one, or leave the component out", "vertical")
     if name.startswith("file:"):
         other_key, _, channel = name.removeprefix("file:").partition("#")
         vertical = _read_file(other_key, values, channel or None, uploads)
@@ -90,7 +90,7 @@ def _add_vertical(
     elif kind == "file":
         vertical, words = _read_file(key, values, name, uploads), (name,)
     else:
-        raise InvalidOption(f"{{}}: there is no shipped record {name[:40]!r}", "vertical", value=name)
+        raise OptionError(f"{{}}: there is no shipped record {name[:40]!r}", "vertical", value=name)
     return WrittenMotion(
         _combine(horizontal.motion, vertical.motion),
         f"{horizontal.python}.with_vertical({vertical.python})",
@@ -145,7 +145,7 @@ def read_pulse_arguments(text: str) -> dict[str, Any]:
     family, arguments = read_pulse(text)
     for name in ("cycles", "gamma"):
         if arguments.get(name, 0.0) > MAX_CYCLES:
-            raise InvalidMotion(
+            raise MotionError(
                 f"{{}} of a pulse may be {MAX_CYCLES:g} here at most, not {arguments[name]:g}",
                 name,
                 value=arguments[name],

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 from rocking import records
 from rocking.core.constants import VERSION
 from rocking.engine.schemes import chattering_scheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.explorer.payload import load_english_texts
 from rocking.inputs.declared import INPUTS, SCALINGS, Input, index_by_name
 from rocking.inputs.declared import SHAPES as ALL_SHAPES
@@ -165,9 +165,9 @@ def clean_texts(texts: Texts) -> dict[str, str]:
     nonempty = {name: value.strip() for name, value in texts.items() if value.strip()}
     for name, value in nonempty.items():
         if name not in NAMES:
-            raise InvalidOption(f"a case has no {name[:40]!r}; it has {', '.join(NAMES)}")
+            raise OptionError(f"a case has no {name[:40]!r}; it has {', '.join(NAMES)}")
         if len(value) > _MAX_TEXT_LENGTH:
-            raise InvalidOption(f"{{}} is {len(value)} letters long; at most {_MAX_TEXT_LENGTH} are read", name)
+            raise OptionError(f"{{}} is {len(value)} letters long; at most {_MAX_TEXT_LENGTH} are read", name)
     return {"motion": DEFAULT["motion"], **nonempty} if nonempty else dict(DEFAULT)
 
 

@@ -15,7 +15,7 @@ from rocking.core.arrays import Floats
 from rocking.dynamics.bifurcation import find_period, record_states
 from rocking.dynamics.maps import PeriodOutcome, StroboscopicMap, compute_scale, stroboscopic_map
 from rocking.dynamics.orbits import compute_multipliers
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.explorer.inputs import Case, require_possible
 from rocking.explorer.maps import AXES, Axis, change_pulse, read_range
 from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_arguments, write_pulse_call
@@ -310,10 +310,10 @@ def read_sweep(case: Case, texts: Texts) -> Sweep:
     """Read a sweep: ``sweep`` (``a`` or ``omega``), ``sweep_from``, ``sweep_to``, and ``sweep_points``."""
     sine = find_sine(case)
     if sine is None:
-        raise InvalidOption("a diagram needs a sine, of which one period repeats for ever: choose one", "motion")
+        raise OptionError("a diagram needs a sine, of which one period repeats for ever: choose one", "motion")
     name = texts.get("sweep") or "a"
     if name not in ("a", "omega"):
-        raise InvalidOption(f"a case is swept over a or omega, not over {name[:20]!r}")
+        raise OptionError(f"a case is swept over a or omega, not over {name[:20]!r}")
     omega = compute_sweep_values(case, sine)["omega"]
     ends = (0.9, float(f"{max(1.5, 2.5 * omega):.2g}")) if name == "a" else AXES["omega"].close
     sweep = Sweep(case, sine, read_range(name, texts, ("sweep_from", "sweep_to", "sweep_points"), ends))

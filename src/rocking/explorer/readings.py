@@ -9,7 +9,7 @@ import numpy as np
 from rocking.block.single import require_block
 from rocking.core.arrays import clear_rounding
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.explorer.core import Explorer
 from rocking.explorer.parameters import READING, Texts
 from rocking.explorer.payload import Payload, phrase
@@ -65,7 +65,7 @@ def find_state(
     time_value = READING["at"].read(time)
     duration = simulated.response.duration
     if not 0.0 <= time_value <= duration:
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be within the response, from 0 to {duration:.6g} s, not {time_value:g} s", "at", value=time
         )
     response = simulated.response if window is None else simulated.select_response(*check_window(window, duration))

@@ -23,7 +23,7 @@ from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from rocking.core.tables import to_plain
-from rocking.errors import InvalidOption, RockingError
+from rocking.errors import OptionError, RockingError
 from rocking.explorer import assessment, maps, periodic, readings
 from rocking.explorer.catalogue import list_records, read_entries
 from rocking.explorer.code import map_as_python, sweep_as_python
@@ -98,14 +98,14 @@ class Query:
             return None
         value = read_number(text[:40], name)
         if not math.isfinite(value):
-            raise InvalidOption("{} must be a finite number", name, value=value)
+            raise OptionError("{} must be a finite number", name, value=value)
         return value
 
     def numbers(self, first: str, second: str) -> tuple[float, float]:
         """Return two required numbers."""
         pair = self.number(first), self.number(second)
         if pair[0] is None or pair[1] is None:
-            raise InvalidOption("{} and {} are needed", first, second)
+            raise OptionError("{} and {} are needed", first, second)
         return pair[0], pair[1]
 
     @property
@@ -297,7 +297,7 @@ class App:
 
     def _require_study(self) -> StudyView:
         if self.study is None:
-            raise InvalidOption("no study is open: start with rocking explore FOLDER")
+            raise OptionError("no study is open: start with rocking explore FOLDER")
         return self.study
 
     def _find_study_texts(self, query: Query) -> dict[str, str]:

@@ -14,7 +14,7 @@ from rocking.chattering.maps import chattering_episodes
 from rocking.core.arrays import Floats, Integers, clear_rounding
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import Certified
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.explorer.inputs import Case
 from rocking.explorer.payload import phrase
 from rocking.inputs.notes import block_notes, motion_notes
@@ -180,12 +180,12 @@ def check_window(window: tuple[float, float], duration: float) -> tuple[float, f
     """Return the ends of a window, s, within a response of this duration; reject invalid windows."""
     start, end = window
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
-        raise InvalidOption("the window must go from a time to a later one, both in s", value=window)
+        raise OptionError("the window must go from a time to a later one, both in s", value=window)
     start, end = max(start, 0.0), min(end, duration)
     if not start < end:
-        raise InvalidOption(f"the window is outside the response, which lasts {duration:.6g} s")
+        raise OptionError(f"the window is outside the response, which lasts {duration:.6g} s")
     if end - start < _MIN_WINDOW:
-        raise InvalidOption(f"the window is {end - start:.3g} s wide; widen it to {_MIN_WINDOW:g} s or more")
+        raise OptionError(f"the window is {end - start:.3g} s wide; widen it to {_MIN_WINDOW:g} s or more")
     return start, end
 
 

@@ -15,7 +15,7 @@ import rocking
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption, StudyError
+from rocking.errors import OptionError, StudyError
 from rocking.explorer.motions import motion_to_texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.uploads import UploadStore
@@ -92,13 +92,13 @@ class StudyView:
         axes = self.axes()
         x, y = (texts.get(direction, "") for direction in ("x", "y"))
         for direction, name in {"x": x, "y": y}.items():
-            checks.choice(name, direction, InvalidOption, [*axes])
+            checks.choice(name, direction, OptionError, [*axes])
         quantity = texts.get("quantity", self.quantities[0])
-        checks.choice(quantity, "quantity", InvalidOption, [*self.quantities])
+        checks.choice(quantity, "quantity", OptionError, [*self.quantities])
         if x == y:
-            raise InvalidOption("{} and {} must be two different parameters of the study", "x", "y")
+            raise OptionError("{} and {} must be two different parameters of the study", "x", "y")
         if axes[x].size * axes[y].size > _MAX_POINTS:
-            raise InvalidOption(f"{axes[x].size} by {axes[y].size} points are too many for a map")
+            raise OptionError(f"{axes[x].size} by {axes[y].size} points are too many for a map")
         values = np.full((axes[y].size, axes[x].size), np.nan)
         fixed = [
             column == self._find_value(name, texts) for name, column in self._columns.items() if name not in (x, y)
@@ -155,7 +155,7 @@ class StudyView:
         )
         if not math.isfinite(coordinate) or (last and not 1 <= round(coordinate) <= last):
             expected = f"a number from 1 to {last}" if last else "a finite number"
-            raise InvalidOption(f"{{}} must be {expected}, not {coordinate:g}", f"at_{direction}", value=coordinate)
+            raise OptionError(f"{{}} must be {expected}, not {coordinate:g}", f"at_{direction}", value=coordinate)
         return float(round(coordinate)) if last else coordinate
 
     def _find_parameters(self, block: float) -> dict[str, list[float]]:
@@ -183,7 +183,7 @@ class StudyView:
         count = len(self._choices[name])
         index = read_number(texts.get(name) or "0", name)
         if not (0 <= index < count and math.floor(index) == index):
-            raise InvalidOption(f"{{}} must be a whole number from 0 to {count - 1}, not {index:g}", name, value=index)
+            raise OptionError(f"{{}} must be a whole number from 0 to {count - 1}, not {index:g}", name, value=index)
         return int(index)
 
     def _find_label(self, name: str) -> tuple[dict[str, Any] | str, str]:

@@ -13,7 +13,7 @@ from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 from rocking.core import checks
-from rocking.errors import InvalidBlock, InvalidMotion, RockingError, UnreadableRecord
+from rocking.errors import BlockError, MotionError, RecordError, RockingError
 from rocking.explorer.meshes import MeshBody, read_body, read_options
 from rocking.explorer.parameters import MESH_KINDS
 from rocking.inputs.notes import motion_notes
@@ -112,7 +112,7 @@ class UploadStore:
         """Store a record, and return its key."""
         upload = Upload(clean_file_name(name), data)
         if (lines := max(data.count(b"\n"), data.count(b"\r"))) > _MAX_LINES and b"\0" not in data:
-            raise UnreadableRecord(
+            raise RecordError(
                 f"{lines} lines, of which at most {_MAX_LINES} are read here; cut the record into smaller files",
                 path=upload.name,
             )
@@ -123,13 +123,13 @@ class UploadStore:
         upload = Upload(clean_file_name(name), data)
         if not _is_mesh(upload.name):
             kinds = ", ".join(MESH_KINDS)
-            raise UnreadableRecord(f"is no mesh by its name: files of {kinds} are read here", path=upload.name)
+            raise RecordError(f"is no mesh by its name: files of {kinds} are read here", path=upload.name)
         return self._add_upload(upload)
 
     def _add_upload(self, upload: Upload) -> str:
         key = hashlib.sha256(upload.data).hexdigest()[:_KEY_LENGTH]
         if len(upload.data) > MAX_FILE_SIZE:
-            raise UnreadableRecord(TOO_LARGE_MESSAGE, path=upload.name)
+            raise RecordError(TOO_LARGE_MESSAGE, path=upload.name)
         with self._lock:
             others = {name: file for name, file in self._files.items() if name != key}
             while (
@@ -139,7 +139,7 @@ class UploadStore:
                 # Meshes are in no list on the page, so the oldest one is removed.
                 mesh = next((name for name, file in others.items() if _is_mesh(file.name)), None)
                 if mesh is None:
-                    raise UnreadableRecord(
+                    raise RecordError(
                         f"it cannot be kept: {MAX_FILES} files and {MAX_BYTES // 2**20} MiB are kept at most; take "
                         "some out of the list of records first",
                         path=upload.name,
@@ -193,14 +193,14 @@ class UploadStore:
     def motion(self, key: str) -> Motion:
         """Return a motion of the program."""
         if key not in self._motions:
-            raise UnreadableRecord("this link names a motion of another program: open the page from there again")
+            raise RecordError("this link names a motion of another program: open the page from there again")
         return self._motions[key]
 
     def file(self, key: str, kind: str = "record") -> Upload:
         """Return a stored file."""
         with self._lock:
             if key not in self._files:
-                raise UnreadableRecord(f"this {kind} is not here any more: drop its file on the page again")
+                raise RecordError(f"this {kind} is not here any more: drop its file on the page again")
             return self._files[key]
 
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
@@ -216,7 +216,7 @@ class UploadStore:
         """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts of a case."""
         upload = self.file(name.removeprefix("file:"), "mesh") if name.startswith("file:") else None
         if upload is None:
-            checks.choice(name, "mesh", InvalidBlock, [*SHIPPED_MESHES])
+            checks.choice(name, "mesh", BlockError, [*SHIPPED_MESHES])
         options = read_options(texts, tolerance, gravity)
         key = name, upload.name if upload else "", json.dumps(options)
         body = self._bodies.get(key, lambda: read_body(name, upload, options))
@@ -236,7 +236,7 @@ class UploadStore:
             try:
                 identification, channels = formats.read_content(upload.stream(), _create_request(**options))
                 break
-            except (UnreadableRecord, InvalidMotion) as error:
+            except (RecordError, MotionError) as error:
                 name = error.argument
                 if name not in _PLACEHOLDERS or options[name] is not None:
                     raise
@@ -269,7 +269,7 @@ def _read_channel(upload: Upload, channel: Channel) -> Motion:
     """Return a channel as a motion; reject motions longer than the limit of the page."""
     samples = len(channel.acceleration)
     if samples > MAX_SAMPLES:
-        raise InvalidMotion(f"{samples} samples; at most {MAX_SAMPLES} are shown here", path=upload.name)
+        raise MotionError(f"{samples} samples; at most {MAX_SAMPLES} are shown here", path=upload.name)
     return channel.motion()
 
 

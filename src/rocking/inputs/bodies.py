@@ -11,7 +11,7 @@ from rocking.block import Block, RestrainedBlock, Restraint
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.progress import note
-from rocking.errors import InvalidBlock, InvalidOption, escape_braces
+from rocking.errors import BlockError, OptionError, escape_braces
 from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, INPUTS, READERS, SHAPES, Shape
 from rocking.inputs.notes import block_notes, restraint_notes
@@ -29,7 +29,7 @@ _FREQUENCY_PARAMETER: Final = (
 
 
 def find_shape(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
-    """Return the description that contains the named inputs, or raise `InvalidBlock` if there is not exactly one."""
+    """Return the description that contains the named inputs, or raise `BlockError` if there is not exactly one."""
     provided = [name for name in BLOCK if name in {*names} and name != "restitution"]
     for shape in shapes:
         if {*shape.needed} <= {*provided} <= {*shape.needed, *shape.optional}:
@@ -38,14 +38,14 @@ def find_shape(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
     candidates = {needed: allowed for needed, allowed in candidates.items() if allowed & {*provided}} or candidates
     started = [needed for needed in candidates if {*needed} & {*provided}] or [*candidates]
     if not provided:
-        raise InvalidBlock(f"a block is required; give {name_either(candidates)}", *itertools.chain(*candidates))
+        raise BlockError(f"a block is required; give {name_either(candidates)}", *itertools.chain(*candidates))
     if any(not {*provided} <= candidates[needed] for needed in started):
         sentence = (
             f"{name_all(provided)} are from different descriptions of a block; give only {name_either(candidates)}"
         )
-        raise InvalidBlock(sentence, *provided, *itertools.chain(*candidates))
+        raise BlockError(sentence, *provided, *itertools.chain(*candidates))
     hint = f"; {_FREQUENCY_PARAMETER}" if provided == ["alpha"] and "p" in started[0] else ""
-    raise InvalidBlock(
+    raise BlockError(
         f"a block requires more than {name_all(provided)}; give {name_either(started)}{hint}",
         *provided,
         *itertools.chain(*started),
@@ -98,10 +98,10 @@ def check_parameters(factory: Callable[..., object], provided: Iterable[str], ow
     for name in provided:
         if name not in parameters:
             hint = checks.suggest(name, [*parameters], f"there are {', '.join(parameters)}")
-            raise InvalidOption(f"{owner} has no {escape_braces(name)}; {hint}", *names, name)
+            raise OptionError(f"{owner} has no {escape_braces(name)}; {hint}", *names, name)
     missing = [name for name, item in parameters.items() if item.default is item.empty and name not in {*provided}]
     if missing:
-        raise InvalidOption(f"{owner} also requires {' and '.join(missing)}", *names)
+        raise OptionError(f"{owner} also requires {' and '.join(missing)}", *names)
 
 
 def name_all(names: Sequence[str]) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 from rocking.block import Block, Damper, Load, Restraint, Spring, Tendon, Thrust
 from rocking.core.progress import note
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.inputs import quantities
 from rocking.inputs.notes import level_notes
 from rocking.records.units import normalise_spelling
@@ -109,7 +109,7 @@ class Input:
         pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
         pairs_read = [tuple(map(float, quantities.read_axis(pair, self.name, reader))) for pair in pairs]
         if any(len(pair) != 2 for pair in pairs_read):
-            raise InvalidOption(
+            raise OptionError(
                 "{} must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs", self.name, value=value
             )
         return [*pairs_read]

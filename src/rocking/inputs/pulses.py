@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from rocking import pulses
 from rocking.core import checks
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.inputs import quantities
 from rocking.inputs.declared import READERS, Input, index_by_name
 from rocking.motion.motion import Motion
@@ -67,7 +67,7 @@ class PulseFamily:
         """Return the declaration of a parameter."""
         if name not in self._defaults:
             hint = checks.suggest(name, [*self._defaults], f"it accepts {_join_names(self._defaults)}")
-            raise InvalidOption(f"the pulse {self.name} has no {name}; {hint}")
+            raise OptionError(f"the pulse {self.name} has no {name}; {hint}")
         return _VELOCITY if name == "amplitude" and self.is_of_velocity else PARAMETERS[name]
 
     def unit(self, parameter: str) -> str:
@@ -84,7 +84,7 @@ class PulseFamily:
             self.parameter(name)
         missing = [name for name in self.needed if name not in values]
         if missing:
-            raise InvalidOption(f"the pulse {self.name} also requires {_join_names(missing)}")
+            raise OptionError(f"the pulse {self.name} also requires {_join_names(missing)}")
         return self.make(**{name: _round_count(value) if name == "lobes" else value for name, value in values.items()})
 
     @cached_property
@@ -97,10 +97,10 @@ FAMILIES: Final = {family.name: family for family in (PulseFamily(getattr(pulses
 
 def find_family(name: str) -> PulseFamily:
     """Return the family of pulses with a name; blanks, hyphens and underscores are equivalent."""
-    plain_name = checks.text(name, "pulse", InvalidOption).strip().lower().replace("_", "-").replace(" ", "-")
+    plain_name = checks.text(name, "pulse", OptionError).strip().lower().replace("_", "-").replace(" ", "-")
     if plain_name not in FAMILIES:
         hint = checks.suggest(plain_name, [*FAMILIES], f"there are {_join_names(FAMILIES)}")
-        raise InvalidOption(f"there is no pulse {name!r}; {hint}")
+        raise OptionError(f"there is no pulse {name!r}; {hint}")
     return FAMILIES[plain_name]
 
 
@@ -121,7 +121,7 @@ def named_pulse(text: str) -> Motion:
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If there is no such family or parameter, a parameter is missing or repeated, or a value cannot be read.
 
     See Also
@@ -146,18 +146,18 @@ def read_pulse(text: str) -> tuple[PulseFamily, dict[str, Any]]:
 
 def split_pulse(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
     """Return family and parameters of a text of `named_pulse` as written, mostly one value each, without blanks."""
-    name, _, rest = checks.text(text, "pulse", InvalidOption).partition(":")
+    name, _, rest = checks.text(text, "pulse", OptionError).partition(":")
     family, texts = find_family(name), dict[str, list[str]]()
     for part in filter(None, rest.split(",")):
         name, equals, value = (word.strip() for word in part.partition("="))
         if equals and name in texts:
-            raise InvalidOption(f"{name} is given twice in {rest!r}")
+            raise OptionError(f"{name} is given twice in {rest!r}")
         if equals:
             texts[name] = [value]
         elif texts:
             [*texts.values()][-1].append(name)  # another value of the previous parameter
         else:
-            raise InvalidOption(
+            raise OptionError(
                 f"a pulse must have the form NAME:PARAMETER=VALUE,PARAMETER=VALUE, but {part!r} has no name"
             )
     return family, texts
@@ -167,7 +167,7 @@ def _read_value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:
     quantity = family.quantity(parameter)
     label = f"the {parameter} of a {family.name} pulse"
     if len(texts) > 1 and not (family.make is pulses.n_lobe and parameter == "amplitude"):
-        raise InvalidOption(f"{label} must be one value, not {', '.join(texts)}")
+        raise OptionError(f"{label} must be one value, not {', '.join(texts)}")
     if quantity is None:
         return texts[0]
     values = [quantity(text, label) for text in texts]

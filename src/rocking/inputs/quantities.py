@@ -12,7 +12,7 @@ import numpy as np
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import round_decimal
-from rocking.errors import InvalidOption, escape_braces
+from rocking.errors import OptionError, escape_braces
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import ACCELERATION_UNITS, TIME_UNITS, Unit, normalise_spelling
 
@@ -69,7 +69,7 @@ def read_number(text: str, name: str) -> float:
     """Return a number without a unit."""
     value, unit = _split_unit(text)
     if value is None or unit:
-        raise InvalidOption(f"{{}} must be a number, not {text.strip()!r}", name, value=text)
+        raise OptionError(f"{{}} must be a number, not {text.strip()!r}", name, value=text)
     return value
 
 
@@ -80,7 +80,7 @@ def _create_reader(units: Mapping[str, Unit], expected: str) -> Quantity:
         value, spelling = _split_unit(text)
         unit = units.get(normalise_spelling(spelling))
         if value is None or unit is None:
-            raise InvalidOption(f"{{}} must be {expected}, not {text.strip()!r}", name, value=text)
+            raise OptionError(f"{{}} must be {expected}, not {text.strip()!r}", name, value=text)
         return value * unit.multiplier / unit.divisor
 
     return read
@@ -99,7 +99,7 @@ def read_length(text: str, name: str) -> float:
     """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
     value = read_position(text, name)
     if not value > 0.0:
-        raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", name, value=text)
+        raise OptionError(f"{{}} must be a positive length, in m, not {text.strip()}", name, value=text)
     return value
 
 
@@ -109,12 +109,12 @@ def read_tilt(text: str, name: str) -> float:
     if abs(value) < 0.5 * math.pi:
         return value
     if abs(value) < 90.0 and not _split_unit(text)[1]:
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be below pi/2 rad; got {text.strip()}, which is read as rad; did you mean {text.strip()}deg?",
             name,
             value=text,
         )
-    raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name, value=text)
+    raise OptionError(f"{{}} must be below 90deg in size, not {text.strip()}", name, value=text)
 
 
 def read_sides(text: str, name: str, quantity: Quantity = read_number) -> float | list[float]:
@@ -132,7 +132,7 @@ def read_bounds(text: str, name: str, quantity: Quantity = read_number) -> float
 def _read_one_or_two(text: str, name: str, quantity: Quantity, expected: str) -> float | list[float]:
     numbers = [quantity(part, name) for part in text.split(",")]
     if len(numbers) > 2:
-        raise InvalidOption(f"{{}} must be {expected}, not {text!r}", name, value=text)
+        raise OptionError(f"{{}} must be {expected}, not {text!r}", name, value=text)
     return numbers[0] if len(numbers) == 1 else numbers
 
 
@@ -150,19 +150,19 @@ def read_array(text: str, name: str, quantity: Quantity = read_number) -> Floats
     if len(parts) == 1:
         return np.array([quantity(part, name) for part in text.split(",")])
     if len(parts) not in (3, 4) or not parts[2].strip().isdecimal() or (len(parts) == 4 and parts[3] != "log"):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be numbers, as 1,2,5, or a range START:STOP:COUNT[:log], not {text!r}", name, value=text
         )
     start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
     if not 2 <= count <= _MAX_COUNT:
         sentence = f"{{}} must be a range START:STOP:COUNT with a COUNT from 2 to {_MAX_COUNT}, not {text!r}"
-        raise InvalidOption(sentence, name, value=text)
+        raise OptionError(sentence, name, value=text)
     if not math.isfinite(stop - start):
-        raise InvalidOption(f"{{}} must be a range with finite ends, not {text!r}", name, value=text)
+        raise OptionError(f"{{}} must be a range with finite ends, not {text!r}", name, value=text)
     if len(parts) == 3:
         return _round_decimals(np.linspace(start, stop, count))
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
-        raise InvalidOption(f"{{}} must be a range with positive ends because of :log, not {text!r}", name, value=text)
+        raise OptionError(f"{{}} must be a range with positive ends because of :log, not {text!r}", name, value=text)
     return _round_decimals(np.geomspace(start, stop, count))
 
 
@@ -170,7 +170,7 @@ def read_level_at_period(text: str, name: str, quantity: Quantity = read_acceler
     """Return an acceleration, m/s^2, and a period, s, from "0.4g@1.0"."""
     level, at, period = text.partition("@")
     if not at:
-        raise InvalidOption(f"{{}} must be an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
+        raise OptionError(f"{{}} must be an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
     return quantity(level, name), read_duration(period, name)
 
 
@@ -182,22 +182,22 @@ def read_scaling(
     if not options:
         return None
     if len(options) > 1:
-        raise InvalidOption(
+        raise OptionError(
             f"{' and '.join(['{}'] * len(options))} scale the same motion; use only one of them", *options
         )
     ((name, value),) = options.items()
     if name == "pga":
-        return checks.finite(quantity(str(value), name), name, InvalidOption), Measure("pga")
+        return checks.finite(quantity(str(value), name), name, OptionError), Measure("pga")
     if name == "sa":
         read_level, read_period = (
-            checks.finite(number, name, InvalidOption) for number in read_level_at_period(str(value), name, quantity)
+            checks.finite(number, name, OptionError) for number in read_level_at_period(str(value), name, quantity)
         )
         return read_level, Measure("sa", read_period)
     read = read_number if name == "scale" else read_velocity
     value_read = read(value, name) if isinstance(value, str) else float(value)
     if name == "scale":
-        return checks.finite(value_read, name, InvalidOption), FACTOR
-    return checks.positive(value_read, name, InvalidOption, "m/s"), Measure("pgv")
+        return checks.finite(value_read, name, OptionError), FACTOR
+    return checks.positive(value_read, name, OptionError, "m/s"), Measure("pgv")
 
 
 def _round_decimals(numbers: Floats) -> Floats:
@@ -219,7 +219,7 @@ def read_densities(text: str, name: str) -> float | dict[str, float]:
     for entry in text.split(","):
         part, equals, value = entry.rpartition("=")
         if not equals:
-            raise InvalidOption(
+            raise OptionError(
                 f"{{}} must be a number, or PART=NUMBER separated by commas, not {escape_braces(repr(text))}",
                 name,
                 value=text,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rocking.core import checks
-from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
+from rocking.errors import MotionError, RecordError, RockingError, StudyError
 
 _Error = TypeVar("_Error", bound=RockingError)
 
@@ -51,7 +51,7 @@ class Tables:
         """Add to an error about a record the line that names the record."""
         try:
             yield
-        except (UnreadableRecord, InvalidMotion) as error:
+        except (RecordError, MotionError) as error:
             first = self.find_line("motions", "records")
             lines = self.text.splitlines()[first - 1 :]
             line = next((k for k, text in enumerate(lines, start=first) if name in text), first)

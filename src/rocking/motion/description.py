@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from rocking.core import checks
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 
 _DOWNWARD_CHANNEL: Final = re.compile(r"\s*(?:down|dwn|dn)\b", re.IGNORECASE)
 _SCALED_TO_LEVEL: Final = re.compile(r"(scaled by \S+) to .*")
@@ -86,7 +86,7 @@ class Description:
 
     Raises
     ------
-    InvalidMotion
+    MotionError
         If `family` or `text` is not text, or a parameter is not a number.
 
     See Also
@@ -106,10 +106,10 @@ class Description:
     origin: Origin | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        checks.text(self.family, "family of a description", InvalidMotion)
-        checks.text(self.text, "text of a description", InvalidMotion)
+        checks.text(self.family, "family of a description", MotionError)
+        checks.text(self.text, "text of a description", MotionError)
         parameters = self.parameters.items()
-        numbers = {name: checks.real(value, f"{name} of a description", InvalidMotion) for name, value in parameters}
+        numbers = {name: checks.real(value, f"{name} of a description", MotionError) for name, value in parameters}
         object.__setattr__(self, "parameters", MappingProxyType(numbers))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -14,7 +14,7 @@ from rocking.core.arrays import Floats
 from rocking.core.bisection import bisect
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import add_unit
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 from rocking.motion import piecewise
 
 #: Default damping of a spectral acceleration.
@@ -68,20 +68,20 @@ class MotionMeasures:
 
     def acceleration(self, time: ArrayLike) -> Any:
         """Return the ground acceleration at times (s), m/s^2, shaped like `time` and zero outside the motion."""
-        times = checks.numbers(time, "time", InvalidMotion)
+        times = checks.numbers(time, "time", MotionError)
         result = piecewise.evaluate_at(self.breakpoints, self.coefficients, times)
         result = np.where((times < 0.0) | (times > self.duration), 0.0, result)
         return result if result.ndim else float(result)
 
     def velocity(self, time: ArrayLike) -> Any:
         """Return the ground velocity at times (s), m/s, from rest, constant after the end of the motion."""
-        times = checks.numbers(time, "time", InvalidMotion)
+        times = checks.numbers(time, "time", MotionError)
         result = piecewise.evaluate_at(self.breakpoints, self._compute_velocity(), times)
         return result if result.ndim else float(result)
 
     def displacement(self, time: ArrayLike) -> Any:
         """Return the ground displacement at times (s), m, from rest, with the last velocity after the end."""
-        times = checks.numbers(time, "time", InvalidMotion)
+        times = checks.numbers(time, "time", MotionError)
         result = piecewise.evaluate_at(self.breakpoints, self._compute_displacement(), times)
         result = result + self.velocity(self.duration) * np.maximum(times - self.duration, 0.0)
         return result if result.ndim else float(result)
@@ -127,12 +127,12 @@ class MotionMeasures:
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
         """Return the time between two fractions of the Arias intensity, s, or NaN if the intensity is zero.
 
-        Raises `InvalidMotion` unless ``0 <= start < end <= 1``.
+        Raises `MotionError` unless ``0 <= start < end <= 1``.
         """
-        start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
+        start, end = (checks.finite(value, "ends of a significant duration", MotionError) for value in (start, end))
         if not 0.0 <= start < end <= 1.0:
             sentence = f"a significant duration requires 0 <= {{}} < {{}} <= 1; got {start:g} and {end:g}"
-            raise InvalidMotion(sentence, "start", "end", value=(start, end))
+            raise MotionError(sentence, "start", "end", value=(start, end))
         start_time, end_time = find_significant_span(self, start, end)
         return end_time - start_time
 
@@ -156,23 +156,23 @@ class MotionMeasures:
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If a period is not positive and finite, or below a millionth of the duration (use `pga`), or the damping is
             out of range.
         """
         from rocking.kernels import oscillator  # imported on first use because it loads the library
 
-        periods = checks.numbers(period, "period of a spectral acceleration", InvalidMotion)
+        periods = checks.numbers(period, "period of a spectral acceleration", MotionError)
         if not np.all(np.isfinite(periods) & (periods > 0.0)):
-            raise InvalidMotion("the {} of a spectral acceleration must be a positive number of seconds", "period")
+            raise MotionError("the {} of a spectral acceleration must be a positive number of seconds", "period")
         duration_text = f"the duration, {self.duration:.6g} s"
         if np.any(periods < 1e-6 * self.duration):
             sentence = f"a {{}} shorter than one millionth of {duration_text}, would take too long to compute; use pga"
-            raise InvalidMotion(sentence, "period")
+            raise MotionError(sentence, "period")
         if np.any(periods > 1e6 * self.duration):
             sentence = f"a {{}} longer than one million times {duration_text}, gives only the displacement; use pgd"
-            raise InvalidMotion(sentence, "period")
-        damping_ratio = check_damping(damping, InvalidMotion)
+            raise MotionError(sentence, "period")
+        damping_ratio = check_damping(damping, MotionError)
         frequencies = np.ravel(2.0 * np.pi / periods)
         peaks = np.empty_like(frequencies)
         workspace = np.empty(2 * self.coefficients.shape[1] + oscillator.TERMS)
@@ -197,7 +197,7 @@ class MotionMeasures:
             add_unit("significant_duration_5_75", "s"): self.significant_duration(0.05, 0.75),
             add_unit("significant_duration_5_95", "s"): self.significant_duration(0.05, 0.95),
         }
-        for period in np.ravel(checks.numbers(periods, "periods of a spectral acceleration", InvalidMotion)).tolist():
+        for period in np.ravel(checks.numbers(periods, "periods of a spectral acceleration", MotionError)).tolist():
             values[add_unit(f"spectral_acceleration_{period:g}s", "m/s^2")] = self.spectral_acceleration(period)
         return values
 

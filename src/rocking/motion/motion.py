@@ -13,7 +13,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 from rocking.motion import piecewise
 from rocking.motion.description import Description, compose_label
 from rocking.motion.processing import Processable
@@ -56,7 +56,7 @@ class Motion(Processable):
 
     Raises
     ------
-    InvalidMotion
+    MotionError
         If the arrays have incompatible shapes, invalid breakpoints or numbers that are not finite, if the degree is
         above 20, or if the motion exceeds the supported range: durations from 1e-9 to 1e15 s, and accelerations up to
         1e30 m/s^2, also of pieces extended to 1e-9 s.
@@ -85,24 +85,24 @@ class Motion(Processable):
 
     def __post_init__(self) -> None:
         breakpoints, coefficients = piecewise.check_pieces(self.breakpoints, self.coefficients)
-        checks.text(self.name, "name of a motion", InvalidMotion)
+        checks.text(self.name, "name of a motion", MotionError)
         if not isinstance(self.description, Description):
             type_name = type(self.description).__name__
             sentence = f"the description of a motion must be a Description(family, parameters, text), not a {type_name}"
-            raise InvalidMotion(sentence, value=self.description)
+            raise MotionError(sentence, value=self.description)
         if isinstance(self.history, str) or not isinstance(self.history, Iterable):
             sentence = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
-            raise InvalidMotion(sentence, value=self.history)
-        history = tuple(checks.text(entry, "sentence of a motion's history", InvalidMotion) for entry in self.history)
+            raise MotionError(sentence, value=self.history)
+        history = tuple(checks.text(entry, "sentence of a motion's history", MotionError) for entry in self.history)
         error = checks.between(
-            self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.MAX_ACCELERATION
+            self.error, "approximation error of a motion", MotionError, 0.0, piecewise.MAX_ACCELERATION
         )
         if self.vertical is not None and not isinstance(self.vertical, Motion):
             type_name = type(self.vertical).__name__
             sentence = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type_name}"
-            raise InvalidMotion(sentence, "vertical", value=self.vertical)
+            raise MotionError(sentence, "vertical", value=self.vertical)
         if self.vertical is not None and self.vertical.vertical is not None:
-            raise InvalidMotion("{} must be a motion without a vertical component of its own", "vertical")
+            raise MotionError("{} must be a motion without a vertical component of its own", "vertical")
         checked_fields = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
         for name, value in checked_fields.items():
             object.__setattr__(self, name, value)
@@ -134,7 +134,7 @@ class Motion(Processable):
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If there are fewer than two samples, a sample is not finite, or `dt` is not a number within its range.
 
         See Also
@@ -180,10 +180,10 @@ class Motion(Processable):
     def scaled(self, factor: float) -> Motion:
         """Return the motion times a factor.
 
-        A negative factor reverses only the horizontal component. Raises `InvalidMotion` if the factor is not finite, or
+        A negative factor reverses only the horizontal component. Raises `MotionError` if the factor is not finite, or
         the scaled motion would exceed the supported range.
         """
-        multiplier = checks.finite(factor, "factor", InvalidMotion)
+        multiplier = checks.finite(factor, "factor", MotionError)
         return self._multiply(multiplier, FACTOR.describe_scaling(multiplier, multiplier))
 
     def scaled_to(self, level: float, measure: MeasureName | Measure = "pga") -> Motion:
@@ -204,9 +204,9 @@ class Motion(Processable):
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If `level` is not positive, the motion is zero, or the scaled motion would exceed the supported range.
-        InvalidOption
+        OptionError
             If `measure` is not a measure of a motion alone.
 
         See Also
@@ -216,7 +216,7 @@ class Motion(Processable):
         intensity_measure = Measure.parse(measure, among=SCALING_MEASURES)
         if intensity_measure.name == "factor":
             return self.scaled(level)
-        target = checks.positive(level, "level", InvalidMotion, intensity_measure.units)
+        target = checks.positive(level, "level", MotionError, intensity_measure.units)
         factor = target / intensity_measure.require_positive_value(self, self.name)
         return self._multiply(factor, intensity_measure.describe_scaling(target, factor))
 
@@ -226,7 +226,7 @@ class Motion(Processable):
         Scaling, delay, processing and addition apply to both components, reversal only to the horizontal one. A record
         with a channel named "Down" or "DWN" is inverted.
 
-        `vertical` (m/s^2, positive upwards) starts at the same time. None removes the component. Raises `InvalidMotion`
+        `vertical` (m/s^2, positive upwards) starts at the same time. None removes the component. Raises `MotionError`
         if `vertical` is not a motion, or itself has a vertical component.
         """
         origin = vertical.description.origin if isinstance(vertical, Motion) else None
@@ -312,7 +312,7 @@ class Motion(Processable):
         with np.errstate(over="ignore", invalid="ignore"):
             coefficients = self.coefficients * factor
         if not np.all(np.abs(coefficients[:, 0]) <= piecewise.MAX_ACCELERATION) or not np.isfinite(coefficients).all():
-            raise InvalidMotion(piecewise.TOO_STRONG)
+            raise MotionError(piecewise.TOO_STRONG)
         return replace(
             self,
             coefficients=coefficients,

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import HIGHEST_DEGREE
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 
 #: Pieces that meet within this fraction of the largest value do not jump.
 _JUMP_TOLERANCE: Final = 1e-12
@@ -261,9 +261,9 @@ def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Float
     rows = _convert_array(coefficients, "coefficients", 2, hint)
     for array, name in ((ends, "breakpoints"), (rows, "coefficients")):
         if not np.all(np.isfinite(array)):
-            raise InvalidMotion("the {} of a motion must be finite numbers", name)
+            raise MotionError("the {} of a motion must be finite numbers", name)
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
-        raise InvalidMotion(
+        raise MotionError(
             "a motion of n pieces requires n + 1 {} and {} of shape (n, degree + 1); got "
             f"{ends.shape} and {rows.shape}",
             "breakpoints",
@@ -272,21 +272,21 @@ def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Float
         )
     widths = np.diff(ends)
     if ends[0] != 0.0 or not np.all(widths > 0.0):
-        raise InvalidMotion("the {} of a motion must start at 0 and increase strictly", "breakpoints")
+        raise MotionError("the {} of a motion must start at 0 and increase strictly", "breakpoints")
     if rows.shape[1] > HIGHEST_DEGREE + 1:
-        raise InvalidMotion(
+        raise MotionError(
             f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}: "
             "split them into shorter ones of a lower degree"
         )
     if not MIN_DURATION <= ends[-1] <= _MAX_DURATION:
-        raise InvalidMotion(
+        raise MotionError(
             f"a motion must last from {MIN_DURATION:g} to {_MAX_DURATION:g} s, not {ends[-1]:g} s: check its units"
         )
     with np.errstate(over="ignore"):
         if not np.all(evaluate_pieces(np.abs(rows), widths) <= MAX_ACCELERATION):
-            raise InvalidMotion(TOO_STRONG)
+            raise MotionError(TOO_STRONG)
         if not np.all(evaluate_pieces(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
-            raise InvalidMotion(
+            raise MotionError(
                 f"a piece of a motion is too steep: it would exceed {MAX_ACCELERATION:g} m/s^2 within "
                 f"{MIN_DURATION:g} s; check units and times"
             )
@@ -299,42 +299,40 @@ def check_samples(acceleration: ArrayLike) -> Floats:
     """Return accelerations, at least two and all finite."""
     values = _convert_array(acceleration, "accelerations", 1)
     if len(values) < 2:
-        raise InvalidMotion(f"a motion requires at least two samples; got {len(values)}")
+        raise MotionError(f"a motion requires at least two samples; got {len(values)}")
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad):
-        raise InvalidMotion(
-            f"every sample of a motion must be a finite number; got {values[bad[0]]} at sample {bad[0]}"
-        )
+        raise MotionError(f"every sample of a motion must be a finite number; got {values[bad[0]]} at sample {bad[0]}")
     return values
 
 
 def check_step(dt: float) -> float:
     """Return a sampling step, s."""
     if np.ndim(dt) != 0:
-        raise InvalidMotion("{} must be one number; for uneven times use Motion.from_points(times, acceleration)", "dt")
-    positive = checks.positive(dt, "dt", InvalidMotion, "s")
-    return checks.between(positive, "dt", InvalidMotion, MIN_DURATION, 1.0 / MIN_DURATION, "s: check its units")
+        raise MotionError("{} must be one number; for uneven times use Motion.from_points(times, acceleration)", "dt")
+    positive = checks.positive(dt, "dt", MotionError, "s")
+    return checks.between(positive, "dt", MotionError, MIN_DURATION, 1.0 / MIN_DURATION, "s: check its units")
 
 
 def check_times(times: ArrayLike, count: int) -> Floats:
     """Return the times of this many samples, s."""
     values = _convert_array(times, "times", 1)
     if len(values) != count:
-        raise InvalidMotion(
+        raise MotionError(
             f"{{}} must contain one value for each of the {count} accelerations; got {len(values)}",
             "times",
             value=times,
         )
     if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
-        raise InvalidMotion("the {} of a motion must be finite and increase strictly", "times")
+        raise MotionError("the {} of a motion must be finite and increase strictly", "times")
     return values
 
 
 def _convert_array(values: ArrayLike, name: str, dimensions: int, hint: str = "") -> Floats:
-    array = np.array(checks.numbers(values, f"{name} of a motion", InvalidMotion), order="C")
+    array = np.array(checks.numbers(values, f"{name} of a motion", MotionError), order="C")
     if array.ndim != dimensions:
         sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
-        raise InvalidMotion(sentence, name, value=values)
+        raise MotionError(sentence, name, value=values)
     return array
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidMotion
+from rocking.errors import MotionError
 from rocking.motion import piecewise
 from rocking.motion.description import Description, Origin, compute_start_delay
 from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
@@ -78,7 +78,7 @@ class Processable(MotionMeasures):
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If an azimuth is unknown or not a number, the components are nearly parallel, begin at different times by
             the clock of their files, or have different vertical components.
 
@@ -88,18 +88,18 @@ class Processable(MotionMeasures):
         """
         if not isinstance(other, Processable):
             sentence = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
-            raise InvalidMotion(sentence, "other", value=other)
+            raise MotionError(sentence, "other", value=other)
         first_azimuth, second_azimuth = _resolve_azimuths(self, other, recorded)
         if delay := compute_start_delay(self.description, other.description, self.dt):
             early, late = (self, other) if delay > 0.0 else (other, self)
             first, second = checks.short_repr(early.name), checks.short_repr(late.name)
-            raise InvalidMotion(
+            raise MotionError(
                 f"according to their files, {second} begins {abs(delay):.6g} s after {first}; remove the start of the "
                 f"latter with processed(trim=({abs(delay):.6g}, {early.duration:.6g}))"
             )
-        target = checks.finite(azimuth, "azimuth", InvalidMotion)
+        target = checks.finite(azimuth, "azimuth", MotionError)
         if self.vertical is not None and other.vertical not in (None, self.vertical):
-            raise InvalidMotion(
+            raise MotionError(
                 "the components have different vertical components; use with_vertical to add only one of them"
             )
         first_factor, second_factor = compute_rotation_factors((first_azimuth, second_azimuth), target)
@@ -122,7 +122,7 @@ class Processable(MotionMeasures):
 
     def delayed(self, delay: float) -> Self:
         """Return the motion after a time of zero acceleration, s. ``processed(trim=...)`` removes an early part."""
-        wait = checks.positive(delay, "delay", InvalidMotion, "s")
+        wait = checks.positive(delay, "delay", MotionError, "s")
         return self._derive(
             "delayed",
             f"delayed by {wait:.6g} s",
@@ -149,7 +149,7 @@ class Processable(MotionMeasures):
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If period or damping is out of range, or both damping and `ringing` are missing.
 
         Notes
@@ -195,7 +195,7 @@ class Processable(MotionMeasures):
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If no step is specified, an argument is invalid or out of place, or `baseline` or `band_pass` is applied to
             a motion that jumps or is not linear between even samples (resample it in a previous call).
         """
@@ -207,11 +207,11 @@ class Processable(MotionMeasures):
             low, high = _unpack_pair(band_pass, "band_pass")
             steps.append(lambda motion: _apply_band_pass(motion, low, high, 4 if order is None else order))
         elif order is not None:
-            raise InvalidMotion("{} requires {}; give both, or neither", "order", "band_pass")
+            raise MotionError("{} requires {}; give both, or neither", "order", "band_pass")
         if resample is not None:
             steps.append(lambda motion: _resample(motion, resample))
         if window is None and not steps:
-            raise InvalidMotion("at least one of trim, baseline, band_pass and resample is required")
+            raise MotionError("at least one of trim, baseline, band_pass and resample is required")
         vertical = self.vertical
         if vertical is not None and window is not None and window[0] > vertical.duration - piecewise.MIN_DURATION:
             vertical = None  # the vertical motion has ended by then
@@ -242,17 +242,17 @@ def _unpack_pair(values: tuple[T, T], argument: str) -> tuple[T, T]:
     try:
         first, second = values
     except (TypeError, ValueError) as error:
-        raise InvalidMotion(f"{{}} must be two numbers, not {values!r}", argument, value=values) from error
+        raise MotionError(f"{{}} must be two numbers, not {values!r}", argument, value=values) from error
     return first, second
 
 
 def _find_window(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
     """Return the ends (s) of the part to keep, at the nearest samples if these are even."""
-    first = checks.finite(start, "start of the part to keep", InvalidMotion)
-    last = checks.finite(end, "end of the part to keep", InvalidMotion)
+    first = checks.finite(start, "start of the part to keep", MotionError)
+    last = checks.finite(end, "end of the part to keep", MotionError)
     duration = float(motion.breakpoints[-1])
     if not 0.0 <= first < last <= duration * (1.0 + 1e-12):
-        raise InvalidMotion(
+        raise MotionError(
             f"{{}} requires 0 <= start < end <= {duration:.6g} s, the duration; got {first:.6g} and {last:.6g}",
             "trim",
             value=(start, end),
@@ -261,7 +261,7 @@ def _find_window(motion: Piecewise, start: float, end: float) -> tuple[float, fl
     if step is None:
         return first, min(last, duration)
     if round(last / step) <= round(first / step):
-        raise InvalidMotion(f"{{}} must keep at least two samples, {step:.6g} s apart", "trim", value=(start, end))
+        raise MotionError(f"{{}} must keep at least two samples, {step:.6g} s apart", "trim", value=(start, end))
     return round(first / step) * step, round(last / step) * step
 
 
@@ -294,7 +294,7 @@ def _remove_baseline(motion: Piecewise, degree: int) -> ProcessedPieces:
     """Subtract the polynomial of this degree with the best least-squares fit to the samples."""
     step = _require_even_step(motion, "baseline")
     times, samples = piecewise.sample_breakpoints(motion)
-    degree = checks.integer(degree, "degree of a baseline", InvalidMotion, 0, min(10, len(samples) - 1))
+    degree = checks.integer(degree, "degree of a baseline", MotionError, 0, min(10, len(samples) - 1))
     baseline = np.polynomial.Legendre.fit(times, samples, degree)(times)
     return _join_samples(samples - baseline, step, f"baseline of degree {degree} removed")
 
@@ -306,20 +306,20 @@ def _apply_band_pass(motion: Piecewise, low: float | None, high: float | None, o
     step = _require_even_step(motion, "band_pass")
     nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
     corners = [
-        checks.positive(corner, "corner frequency", InvalidMotion, "Hz") for corner in (low, high) if corner is not None
+        checks.positive(corner, "corner frequency", MotionError, "Hz") for corner in (low, high) if corner is not None
     ]
     if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
         sentence = (
             f"{{}} must be (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one may be None"
         )
-        raise InvalidMotion(sentence, "band_pass", value=(low, high))
+        raise MotionError(sentence, "band_pass", value=(low, high))
     if corners[0] * duration < 0.1:
         sentence = (
             f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s; use at least"
         )
         sentence += f" {0.1 / duration:.6g} Hz"
-        raise InvalidMotion(sentence, value=(low, high))
-    order = checks.integer(order, "order of a filter", InvalidMotion, 1, 12)
+        raise MotionError(sentence, value=(low, high))
+    order = checks.integer(order, "order of a filter", MotionError, 1, 12)
     kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     frequencies = corners if kind == "bandpass" else corners[0]
     sections = signal.butter(order, frequencies, btype=kind, output="sos", fs=1.0 / step)
@@ -332,12 +332,12 @@ def _apply_band_pass(motion: Piecewise, low: float | None, high: float | None, o
 
 def _resample(motion: Piecewise, step: float) -> ProcessedPieces:
     """Sample the motion at the multiples of `step` (s) up to its end, joined by straight lines."""
-    new_dt = checks.positive(step, "new sampling step", InvalidMotion, "s")
+    new_dt = checks.positive(step, "new sampling step", MotionError, "s")
     duration = float(motion.breakpoints[-1])
     count = math.floor(duration / new_dt * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MAX_SAMPLES:
         sentence = f"a step of {new_dt:.6g} s gives {count} samples of a motion of {duration:.6g} s; use a step that"
-        raise InvalidMotion(f"{sentence} gives 2 to {_MAX_SAMPLES}", value=step)
+        raise MotionError(f"{sentence} gives 2 to {_MAX_SAMPLES}", value=step)
     times = np.minimum(new_dt * np.arange(count), duration)
     samples = piecewise.evaluate_at(motion.breakpoints, motion.coefficients, times)
     return _join_samples(samples, new_dt, f"resampled to a step of {new_dt:.6g} s")
@@ -346,9 +346,9 @@ def _resample(motion: Piecewise, step: float) -> ProcessedPieces:
 def _require_even_step(motion: Piecewise, argument: str) -> float:
     step = piecewise.find_even_step(motion)
     if step is None:
-        raise InvalidMotion("{} requires samples at even steps; call processed(resample=...) first", argument)
+        raise MotionError("{} requires samples at even steps; call processed(resample=...) first", argument)
     if piecewise.has_jumps(motion):
-        raise InvalidMotion(
+        raise MotionError(
             "{} requires a motion that is linear between samples; call processed(resample=...) first", argument
         )
     return step
@@ -368,16 +368,16 @@ def _compute_floor_motion(
     solution about its start, from the series of the solutions of the states (1, 0) and (0, 1) and of the one from rest.
     """
     end = float(motion.breakpoints[-1])
-    natural_period = checks.positive(period, "period", InvalidMotion, "s")
-    rate, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, InvalidMotion)
+    natural_period = checks.positive(period, "period", MotionError, "s")
+    rate, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, MotionError)
     if ringing is None and damping_ratio == 0.0:
-        raise InvalidMotion("the motion of a floor without {} does not decay; give {}, in s", "damping", "ringing")
+        raise MotionError("the motion of a floor without {} does not decay; give {}, in s", "damping", "ringing")
     # By default a free oscillation continues until it has decayed to a thousandth.
     tail = -math.log(1e-3) / (damping_ratio * rate) if ringing is None else ringing
-    tail = tail if ringing is None else checks.between(ringing, "ringing", InvalidMotion, 0.0, 1e15, "s")
+    tail = tail if ringing is None else checks.between(ringing, "ringing", MotionError, 0.0, 1e15, "s")
     step = _MAX_ANGLE / rate
     if not (end + tail) / step <= 1e6:
-        raise InvalidMotion(
+        raise MotionError(
             f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s; use a longer one, or "
             "a shorter {}",
             *("period", "ringing"),
@@ -445,20 +445,20 @@ def _resolve_azimuths(first_motion: Processable, second_motion: Processable, rec
         recorded = [(motion.description.origin or Origin()).azimuth for motion in (first_motion, second_motion)]
         if None in recorded:
             name = checks.short_repr((first_motion, second_motion)[recorded.index(None)].name)
-            raise InvalidMotion(
+            raise MotionError(
                 f"the azimuth of {name} is unknown; give {{}}=(first, second), "
                 "the directions of both components in degrees clockwise from north",
                 "recorded",
             )
-    azimuths = checks.numbers(recorded, "recorded", InvalidMotion)
+    azimuths = checks.numbers(recorded, "recorded", MotionError)
     if azimuths.shape != (2,) or not np.all(np.isfinite(azimuths)):
-        raise InvalidMotion(
+        raise MotionError(
             "{} must be the azimuths of both components, two numbers in degrees", "recorded", value=recorded
         )
     first, second = azimuths.tolist()
     angle = abs((second - first + 90.0) % 180.0 - 90.0)
     if angle < 15.0:
-        raise InvalidMotion(
+        raise MotionError(
             f"the components have azimuths of {first:g} and {second:g} deg, along one line within {angle:g} deg; use "
             "two perpendicular components"
         )

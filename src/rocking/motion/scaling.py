@@ -13,7 +13,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import add_unit
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import MotionError, OptionError
 from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
 
 #: Intensity measures of the analyses.
@@ -52,7 +52,7 @@ class Measure:
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If the measure is unknown, or `period` or `damping` is missing, out of place or out of range.
 
     See Also
@@ -73,26 +73,26 @@ class Measure:
     damping: float = DAMPING
 
     def __post_init__(self) -> None:
-        checks.choice(self.name, "measure", InvalidOption, get_args(MeasureName))
-        damping = check_damping(self.damping, InvalidOption)
+        checks.choice(self.name, "measure", OptionError, get_args(MeasureName))
+        damping = check_damping(self.damping, OptionError)
         object.__setattr__(self, "damping", damping)
         if self.name == "sa":
             if self.period is None:
-                raise InvalidOption('{} "sa" requires {}, in s', "measure", "period")
-            object.__setattr__(self, "period", checks.positive(self.period, "period", InvalidOption, "s"))
+                raise OptionError('{} "sa" requires {}, in s', "measure", "period")
+            object.__setattr__(self, "period", checks.positive(self.period, "period", OptionError, "s"))
         elif self.period is not None or damping != DAMPING:
             argument = "damping" if self.period is None else "period"
-            raise InvalidOption(f'{{}} applies only to {{}} "sa", not to "{self.name}"', argument, "measure")
+            raise OptionError(f'{{}} applies only to {{}} "sa", not to "{self.name}"', argument, "measure")
 
     @classmethod
     def parse(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
         """Return a measure, or the measure with an accepted name."""
         name = measure.name if isinstance(measure, Measure) else measure
-        checks.choice(name, "measure", InvalidOption, among)
+        checks.choice(name, "measure", OptionError, among)
         if isinstance(measure, Measure):
             return measure
         if measure == "sa":
-            raise InvalidOption('{} "sa" requires a period, in s; use rocking.Measure("sa", period=1.0)', "measure")
+            raise OptionError('{} "sa" requires a period, in s; use rocking.Measure("sa", period=1.0)', "measure")
         return cls(measure)
 
     @property
@@ -168,7 +168,7 @@ class Measure:
         """Return `value`, or raise an error for a motion `name` that is zero throughout."""
         value = self.value(motion)
         if not value > 0.0:
-            raise InvalidMotion(f"{name} is zero throughout, so that it cannot be scaled to a {self.quantity}")
+            raise MotionError(f"{name} is zero throughout, so that it cannot be scaled to a {self.quantity}")
         return value
 
     @property
@@ -201,7 +201,7 @@ FACTOR: Final = Measure("factor")
 
 def check_intensities(values: ArrayLike) -> Floats:
     """Return the intensities of a curve as an array of the same shape."""
-    intensities = checks.numbers(values, "intensities", InvalidOption)
+    intensities = checks.numbers(values, "intensities", OptionError)
     if not np.all(intensities >= 0.0):
-        raise InvalidOption("intensities must be nonnegative numbers")
+        raise OptionError("intensities must be nonnegative numbers")
     return intensities

@@ -16,7 +16,7 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -92,7 +92,7 @@ def open_figure(
     short_title = _LONG_NUMBER.sub(lambda match: f"{float(match[0]):.4g}", title)
     if ax is not None:
         if not hasattr(ax, "get_figure"):
-            raise InvalidOption(f"{{}} must be Matplotlib axes, not {ax!r}", "ax", value=ax)
+            raise OptionError(f"{{}} must be Matplotlib axes, not {ax!r}", "ax", value=ax)
         figure = ax.get_figure(root=True)
         assert figure is not None
         ax.set_title(short_title, wrap=True)
@@ -228,9 +228,9 @@ def collect_handles(*panels: Axes) -> list[Artist]:
 
 
 def _check_size(figsize: tuple[float, float]) -> tuple[float, float]:
-    sides = checks.positive_numbers(figsize, "figsize", InvalidOption)
+    sides = checks.positive_numbers(figsize, "figsize", OptionError)
     if sides.size != 2:
-        raise InvalidOption("{} must be (width, height), in inches", "figsize", value=figsize)
+        raise OptionError("{} must be (width, height), in inches", "figsize", value=figsize)
     return float(sides[0]), float(sides[1])
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rocking.core.arrays import Floats
 from rocking.core.tables import escape_dollars
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.plot.canvas import (
     ABOVE,
     GROUND,
@@ -212,7 +212,7 @@ def draw_blocks(
 ) -> Figure:
     """Draw a number for each block as the colour of a marker, in one or several panels with one colour scale."""
     if options.get("ax") is not None and len(panels) > 1:
-        raise InvalidOption(f"{len(panels)} panels require a separate figure; omit ax, or select one panel")
+        raise OptionError(f"{len(panels)} panels require a separate figure; omit ax, or select one panel")
     names, columns = [*panels], min(len(panels), _PANELS_PER_ROW)
     rows = [[*names[k : k + columns], *"." * (columns - len(names[k:]))] for k in range(0, len(names), columns)]
     all_values = np.concatenate([*panels.values()])

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from rocking.core import checks
-from rocking.errors import UnreadableRecord
+from rocking.errors import RecordError
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
 from rocking.records.units import choose_unit
@@ -124,9 +124,9 @@ def info(name: str) -> Record:
     (0.01, 31932, 'g', 'CC0 1.0')
     """
     catalogue = _read_catalogue()
-    if checks.text(name, "name of a shipped record", UnreadableRecord) not in catalogue:
+    if checks.text(name, "name of a shipped record", RecordError) not in catalogue:
         hint = suggest_records(name, f"there are {', '.join(catalogue)}")
-        raise UnreadableRecord(f"no shipped record is named {name!r}; {hint}")
+        raise RecordError(f"no shipped record is named {name!r}; {hint}")
     return Record(name=name, **catalogue[name])
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import add_unit, format_table, round_decimal
-from rocking.errors import InvalidMotion, InvalidOption, UnreadableRecord
+from rocking.errors import MotionError, OptionError, RecordError
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
 from rocking.records.formats.source import Request
@@ -29,7 +29,7 @@ Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
 def check_motion(motion: Motion | None) -> Motion | None:
     """Return a motion (None is free rocking), or raise an error."""
     if motion is not None and not isinstance(motion, Motion):
-        raise InvalidMotion(_describe_wrong_type(motion))
+        raise MotionError(_describe_wrong_type(motion))
     return motion
 
 
@@ -42,10 +42,10 @@ def list_motions(motions: Motions) -> list[Motion]:
     if isinstance(motions, Iterable) and not isinstance(motions, (Motion, str, Path, np.ndarray)):
         gathered = list(motions)
     if not gathered:
-        raise InvalidOption("{} must contain at least one motion", "motions")
+        raise OptionError("{} must contain at least one motion", "motions")
     for motion in gathered:
         if not isinstance(motion, Motion):
-            raise InvalidMotion(_describe_wrong_type(motion))
+            raise MotionError(_describe_wrong_type(motion))
     return gathered
 
 
@@ -125,7 +125,7 @@ def load_vertical(name: str, record: str, *, several: bool = False, **options: A
         return load_motion(name, several=True, **options)
     if record == STANDARD_INPUT or not path_exists(record):
         text = f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels"
-        raise UnreadableRecord(f"{text}; check the name")
+        raise RecordError(f"{text}; check the name")
     return formats.read_channel(record, Request.create(**options, several=several), vertical=name).motion()
 
 
@@ -138,7 +138,7 @@ def reject_redundant_arguments(name: str, **arguments: object) -> None:
     """Raise an error if an argument specifies a property of a shipped record."""
     text = "a shipped record has one channel, with known step and units; omit {}"
     for argument in (key for key, value in arguments.items() if value is not None):
-        raise UnreadableRecord(text, argument, path=name)
+        raise RecordError(text, argument, path=name)
 
 
 def path_exists(name: str | Path) -> bool:
@@ -165,7 +165,7 @@ def _find_records(name: str) -> list[str]:
         matches = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
         matches = matches or fnmatch.filter(catalogue.names(), name)
     if not matches:
-        raise UnreadableRecord("no file or shipped record matches this name; check the folder and the name", path=name)
+        raise RecordError("no file or shipped record matches this name; check the folder and the name", path=name)
     return matches
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import UnreadableRecord
+from rocking.errors import RecordError
 
 #: Values of the argument `units=`.
 UNIT_NAMES = ("g", "m/s2", "cm/s2", "gal", "mm/s2", "mg")
@@ -87,5 +87,5 @@ def choose_unit(units: str) -> Unit:
     unit = find_unit(units) if isinstance(units, str) else None
     if unit is None or unit.name not in UNIT_NAMES:
         text = f"the {{}} {units!r} are unknown; use one of {', '.join(UNIT_NAMES)}"
-        raise UnreadableRecord(text, "units", value=units)
+        raise RecordError(text, "units", value=units)
     return unit

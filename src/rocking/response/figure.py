@@ -14,7 +14,7 @@ from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
 from rocking.engine.problem import compute_thresholds
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.plot.canvas import (
     ABOVE,
     GROUND,
@@ -70,9 +70,9 @@ def resolve_window(response: Simulated, window: Sequence[float] | None) -> tuple
     """Return a valid window of a response, s, or its active span."""
     if window is None:
         return find_active_span(response)
-    ends: Any = checks.numbers(window, "window", InvalidOption)
+    ends: Any = checks.numbers(window, "window", OptionError)
     if ends.shape != (2,) or not 0.0 <= ends[0] < ends[1] <= response.duration:
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be (start, end), in s, with 0 <= start < end <= {response.duration:.6g}, the duration",
             "window",
             value=window,
@@ -105,7 +105,7 @@ def draw_histories(
     The frame ends at twice the slenderness (or balance). A separate panel shows the longest chattering sequence: the
     interval to the next impact against the time to rest, both logarithmic. In `ax` only the rotation is drawn.
     """
-    checks.choice(units, "rotation_units", InvalidOption, get_args(RotationUnits))
+    checks.choice(units, "rotation_units", OptionError, get_args(RotationUnits))
     span = resolve_window(response, window)
     time, coordinate = choose_times(response, *span), response.block.coordinate
     is_rotation = coordinate.unit == "rad"

@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
 from rocking.kernels.march import march
@@ -93,7 +93,7 @@ class Gradient:
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If the motion is not linear between samples.
         """
         return _convert_to_samples(self.motion, self.coefficients)
@@ -104,11 +104,11 @@ class Gradient:
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If there is no vertical component, or it is not linear between samples.
         """
         if self.motion is None or self.motion.vertical is None or self.vertical is None:
-            raise InvalidOption("the motion has no vertical component; add one by `with_vertical`")
+            raise OptionError("the motion has no vertical component; add one by `with_vertical`")
         return _convert_to_samples(self.motion.vertical, self.vertical)
 
     def __repr__(self) -> str:
@@ -140,7 +140,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
 
     Raises
     ------
-    InvalidOption
+    OptionError
         If the response is not a `Response`, the quantity does not exist, or `at` is missing, superfluous or out of
         range.
 
@@ -165,9 +165,9 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     ['-0.00175', '-0.01310', '0.01048', '0.04288', '0.03351']
     """
     if not isinstance(response, Response):
-        raise InvalidOption("{} must be a Response, as rocking.simulate returns", "response", value=response)
+        raise OptionError("{} must be a Response, as rocking.simulate returns", "response", value=response)
     require_sticking(response.slips)
-    checks.choice(of, "of", InvalidOption, get_args(Quantity))
+    checks.choice(of, "of", OptionError, get_args(Quantity))
     if of == "peak":
         target = _target_peak(response, at)
     elif of in ("rotation", "velocity"):
@@ -217,7 +217,7 @@ class _Target:
 
 def _target_peak(response: Response, at: float | None) -> _Target:
     if at is not None:
-        raise InvalidOption('{} does not apply to a "peak"', "at", value=at)
+        raise OptionError('{} does not apply to a "peak"', "at", value=at)
     trail, value, instant = response.solution.trail, response.peak_rotation, response.peak_time
     reason = ""
     if response.overturned:
@@ -232,8 +232,8 @@ def _target_peak(response: Response, at: float | None) -> _Target:
 def _target_state(response: Response, of: Quantity, at: float | None) -> _Target:
     """Create the target for the rotation or velocity at a time."""
     if at is None:
-        raise InvalidOption(f"a {of} requires {{}}, the time in s", "at")
-    time = checks.between(at, "at", InvalidOption, 0.0, response.duration, "s")
+        raise OptionError(f"a {of} requires {{}}, the time in s", "at")
+    time = checks.between(at, "at", OptionError, 0.0, response.duration, "s")
     trail, history = response.solution.trail, response._history
     motion_state = history.states(time)
     row = int(np.searchsorted(trail.nodes["time"], time, side="right")) - 1
@@ -250,8 +250,8 @@ def _target_time(response: Response, of: Quantity, at: float | None) -> _Target:
     """Create the target for the time of an event or impact."""
     trail, rows = response.solution.trail, response.events if of == "event" else response.impacts
     if not len(rows):
-        raise InvalidOption(f"the response has no {of}; choose another quantity {{}}", "of", value=of)
-    k = checks.integer(at, "at", InvalidOption, -len(rows), len(rows) - 1)
+        raise OptionError(f"the response has no {of}; choose another quantity {{}}", "of", value=of)
+    k = checks.integer(at, "at", OptionError, -len(rows), len(rows) - 1)
     nodes = trail.nodes
     row = int(
         (find_event_steps(nodes, overturns=response.overturned) if of == "event" else find_impact_steps(nodes))[k]
@@ -348,7 +348,7 @@ def _sum_over_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
 def _convert_to_samples(motion: Motion | None, values: Floats) -> Floats:
     """Convert derivatives by the coefficients of lines to accelerations at their ends."""
     if motion is None or values.shape[1] != 2 or piecewise.has_jumps(motion):
-        raise InvalidOption("the motion is not linear between samples; use the derivatives by its `coefficients`")
+        raise OptionError("the motion is not linear between samples; use the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)
     derivatives = np.zeros(len(values) + 1)
     derivatives[:-1] = values[:, 0] - rates

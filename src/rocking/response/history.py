@@ -14,7 +14,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisect, find_middles, halve
 from rocking.core.tables import format_count
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
@@ -63,7 +63,7 @@ class TimeHistory:
 
     def states_and_sides(self, time: ArrayLike) -> tuple[Floats, Integers]:
         """Return `states`, and the side at each time: 0, 1, or negative at rest."""
-        times = checks.numbers(time, "time", InvalidOption)
+        times = checks.numbers(time, "time", OptionError)
         flat = times.ravel()
         rows = self.find_rows(flat)
         states = self.states_in(flat, rows)
@@ -73,7 +73,7 @@ class TimeHistory:
 
     def slips(self, time: ArrayLike, gravity: float) -> Floats:
         """Return displacement, m, and velocity, m/s, of the foot at times of any shape; NaN outside [0, end]."""
-        times = checks.numbers(time, "time", InvalidOption)
+        times = checks.numbers(time, "time", OptionError)
         flat = times.ravel()
         slips = gravity * self.states_in(flat, self.find_rows(flat), columns=5)[:, 3:]
         slips[self.is_outside(flat)] = np.nan

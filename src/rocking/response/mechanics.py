@@ -20,7 +20,7 @@ from rocking.block.body import Body, ContactLaw
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisect
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels.ground import component_coefficients
 from rocking.kernels.state import Record
 from rocking.motion import piecewise
@@ -38,11 +38,11 @@ ForceMeasure = Callable[[Floats, Floats], Floats]
 
 
 def check_friction(value: object) -> float:
-    """Return a coefficient of friction, or raise `InvalidOption` if it is not in (0, 3]."""
-    coefficient = checks.positive(value, "friction", InvalidOption)
+    """Return a coefficient of friction, or raise `OptionError` if it is not in (0, 3]."""
+    coefficient = checks.positive(value, "friction", OptionError)
     if coefficient > _MAX_FRICTION:
         text = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}; use the tangent of an angle of friction"
-        raise InvalidOption(text, "friction", value=value)
+        raise OptionError(text, "friction", value=value)
     return coefficient
 
 
@@ -81,7 +81,7 @@ class Contact:
 
     def compute_forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
         """Return both forces at times of any shape; NaN outside the response."""
-        times = checks.numbers(time, "time", InvalidOption)
+        times = checks.numbers(time, "time", OptionError)
         flat = times.ravel()
         outside = self.history.is_outside(flat)
         within = np.where(outside, 0.0, flat)
@@ -328,12 +328,12 @@ def _solve_linear_balance(record: Record, added_weight: Floats, added_push: Floa
 
 
 def build_energy(body: Body, record: Record, *, nonlinear: bool) -> Energy:
-    """Return the energy of a block; raise `InvalidOption` for a yielding tendon or a missing balance."""
+    """Return the energy of a block; raise `OptionError` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
-        raise InvalidOption(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")
+        raise OptionError(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")
     if record["yielding"]:
-        raise InvalidOption("the energy is not defined for a yielding tendon; omit the strength of the tendon")
+        raise OptionError("the energy is not defined for a yielding tendon; omit the strength of the tendon")
     energy = Energy(body, record, nonlinear)
     if not np.any(np.isfinite(energy.balance)):
-        raise InvalidOption("this block has no overturning energy, because its restraints hold it at any rotation")
+        raise OptionError("this block has no overturning energy, because its restraints hold it at any rotation")
     return energy

@@ -14,7 +14,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.result import Result
 from rocking.core.tables import Column, columns_to_records, format_columns
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 
 #: Relative step and number of factors in summaries and tables.
 RELATIVE: Final = 1e-6
@@ -215,14 +215,14 @@ class Perturbed(Result):
 
 
 def check_factors(relative: float, count: int) -> list[float]:
-    """Return the factors of `list_factors`, or raise `InvalidOption` if an argument is out of range."""
-    step = checks.between(relative, "relative", InvalidOption, 1e-12, 0.1)
-    if checks.integer(count, "count", InvalidOption, 3, 1001) % 2 == 0:
+    """Return the factors of `list_factors`, or raise `OptionError` if an argument is out of range."""
+    step = checks.between(relative, "relative", OptionError, 1e-12, 0.1)
+    if checks.integer(count, "count", OptionError, 3, 1001) % 2 == 0:
         sentence = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
-        raise InvalidOption(sentence, "count", value=count)
+        raise OptionError(sentence, "count", value=count)
     if step * (count - 2) >= 1.0:
         sentence = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
-        raise InvalidOption(sentence, "relative", value=step)
+        raise OptionError(sentence, "relative", value=step)
     return list_factors(step, count)
 
 
@@ -234,7 +234,7 @@ def list_factors(relative: float, count: int) -> list[float]:
 
 def choose_steps(precision: float) -> tuple[float, int]:
     """Return the relative step and number (eleven) of factors within a precision, for `Response.perturbed`."""
-    limit = checks.between(precision, "precision", InvalidOption, 1e-6, 0.1)
+    limit = checks.between(precision, "precision", OptionError, 1e-6, 0.1)
     return limit / (_N_WITHIN_PRECISION - 2), _N_WITHIN_PRECISION
 
 

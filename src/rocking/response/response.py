@@ -14,7 +14,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import Row, format_rows, rows_to_dict
 from rocking.core.tables import Column, add_unit, columns_to_frame, columns_to_records, write_csv, write_netcdf
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.response import figure, summary
 from rocking.response.figure import RotationUnits
 from rocking.response.history import create_times
@@ -242,11 +242,11 @@ class Response(Simulated):
         return create_times(self.duration, self._default_dt)
 
     def _columns(self, table: str, dt: float | None = None) -> list[Column]:
-        checks.choice(table, "table", InvalidOption, self.TABLES)
+        checks.choice(table, "table", OptionError, self.TABLES)
         if table == "histories":
             return self._build_histories(dt)
         if dt is not None:
-            raise InvalidOption(f"{{}} is the step of the histories, and does not apply to {table}; omit it", "dt")
+            raise OptionError(f"{{}} is the step of the histories, and does not apply to {table}; omit it", "dt")
         return self._convert_table(table)
 
     def _convert_table(self, table: str) -> list[Column]:
@@ -259,10 +259,10 @@ class Response(Simulated):
         motion, (name, rate, _, unit, _) = self.motion, self.block.coordinate
         if dt is None:
             dt = self._default_dt
-        step = checks.positive(dt, "dt", InvalidOption, "s")
+        step = checks.positive(dt, "dt", OptionError, "s")
         if self.duration > _MAX_POINTS * step:
             problem = f"more than {_MAX_POINTS:,} points of {self.duration:g} s"
-            raise InvalidOption(f"{{}} = {step:g} s gives {problem}; use a longer step", "dt", value=dt)
+            raise OptionError(f"{{}} = {step:g} s gives {problem}; use a longer step", "dt", value=dt)
         times = create_times(self.duration, step)
         states = self.states(times)
         columns = [
@@ -336,7 +336,7 @@ class Response(Simulated):
         """Draw the velocity against the rotation, with impacts as jumps and the energy of the balance; as `plot`.
 
         Rotations are normalised by the slenderness of their side (or the balance of a restrained block), velocities by
-        p times this value. Without a balance, rotations are in rad. Raises `InvalidOption` also as `kinetic_energy`.
+        p times this value. Without a balance, rotations are in rad. Raises `OptionError` also as `kinetic_energy`.
         """
         return figure.draw_phase_plane(self, window, title=title or figure.make_title(self), ax=ax, figsize=figsize)
 

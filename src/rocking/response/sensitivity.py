@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import format_count
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
 from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
@@ -215,7 +215,7 @@ def bound_rest_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
 
 def compute_changes(history: TimeHistory, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:
     """Compute the derivative of the coordinate at times of any shape by each input, see `Sensitivity.rotation`."""
-    times, nodes = checks.numbers(time, "time", InvalidOption), history.trail.nodes
+    times, nodes = checks.numbers(time, "time", OptionError), history.trail.nodes
     flat = times.ravel()
     order = np.argsort(flat, kind="stable")
     order = order[~history.is_outside(flat[order])]
@@ -228,7 +228,7 @@ def compute_changes(history: TimeHistory, time: ArrayLike, of: Iterable[str]) ->
     changes = {}
     for name in of:
         if name not in _INPUTS:
-            raise InvalidOption(f"{{}} must be among {', '.join(_INPUTS)}, not {name!r}", "of", value=name)
+            raise OptionError(f"{{}} must be among {', '.join(_INPUTS)}, not {name!r}", "of", value=name)
         values = np.full(flat.shape, np.nan)
         values[order] = signs * _vary_input(history.trail, _INPUTS.index(name), ascending, len(nodes), events)[0]
         changes[name] = values.reshape(times.shape)
@@ -236,8 +236,8 @@ def compute_changes(history: TimeHistory, time: ArrayLike, of: Iterable[str]) ->
 
 
 def require_sticking(slips: bool) -> None:
-    """Raise `InvalidOption` if the base slips, because derivatives through slip are not available."""
+    """Raise `OptionError` if the base slips, because derivatives through slip are not available."""
     if slips:
-        raise InvalidOption(
+        raise OptionError(
             "derivatives are not available for a response that slips; use response.perturbed() or omit {}", "friction"
         )

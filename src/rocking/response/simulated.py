@@ -16,7 +16,7 @@ from rocking.core.arrays import Floats, unwrap_scalar
 from rocking.core.constants import Model
 from rocking.core.result import Result
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.motion.motion import Motion
 from rocking.response.history import Solution, TimeHistory, add_all_impacts
@@ -83,7 +83,7 @@ class Simulated(Result):
     def _contact(self) -> Contact:
         law = self.block.contact
         if law is None:
-            raise InvalidOption(f"the ground forces of this body are unknown: {self.block.description}")
+            raise OptionError(f"the ground forces of this body are unknown: {self.block.description}")
         return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
 
     @property
@@ -221,7 +221,7 @@ class Simulated(Result):
     def sensitivity(self) -> Sensitivity:
         """Derivatives of the peak and of event and impact times by the motion, the initial state and the block.
 
-        Raises `InvalidOption` for a response that slips.
+        Raises `OptionError` for a response that slips.
         """
         require_sticking(self.slips)
         trail, history = self.solution.trail, self._history
@@ -289,7 +289,7 @@ class Simulated(Result):
     def _repeat(self, factor: float) -> Repeat:
         try:
             repeated: Simulated = self if factor == 1.0 else self.solution.repeat(factor)
-        except InvalidOption:  # balanced: `simulate` requires a duration
+        except OptionError:  # balanced: `simulate` requires a duration
             return Repeat(factor, "balances", math.nan, math.nan, math.nan, math.nan, self.events[:0])
         rests = repeated.events["time"][repeated.events["kind"] == "rest"]
         last_rest = float(rests[-1]) if len(rests) and not repeated.moves_at_end else math.nan
@@ -299,7 +299,7 @@ class Simulated(Result):
     def states(self, time: ArrayLike) -> Floats:
         """Return coordinate, velocity and acceleration of the body (rotation for a block) at times, s, of any shape.
 
-        They are the last dimension, of length 3; NaN outside [0, duration]. Raises `InvalidOption` if `time` is not
+        They are the last dimension, of length 3; NaN outside [0, duration]. Raises `OptionError` if `time` is not
         numeric.
         """
         return self._history.states(time)
@@ -349,7 +349,7 @@ class Simulated(Result):
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If `time` is not numeric, the body is not a block, one of its tendons yields, or its restraints hold it at
             any rotation.
         """

@@ -21,7 +21,7 @@ from rocking.core.progress import Progress
 from rocking.engine.problem import build_settings, gather_bodies
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, simulate_tasks, split_bodies
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
@@ -108,9 +108,9 @@ class Scales:
         parsed = Measure.parse(measure, among=SCALING_MEASURES)
         if levels is None:
             if parsed.name != "factor":
-                raise InvalidOption("{} requires {}", "measure", "levels")
+                raise OptionError("{} requires {}", "measure", "levels")
             return cls()
-        return cls(parsed, checks.positive_numbers(levels, "levels", InvalidOption))
+        return cls(parsed, checks.positive_numbers(levels, "levels", OptionError))
 
     @property
     def count(self) -> int:
@@ -152,7 +152,7 @@ class Product:
 
     Raises
     ------
-    InvalidOption, InvalidMotion
+    OptionError, MotionError
         If an option is out of range, or bodies on a line have vertical motion.
 
     See Also
@@ -179,7 +179,7 @@ class Product:
     friction: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        checks.choice(self.polarity, "polarity", InvalidOption, list(SIGNS))
+        checks.choice(self.polarity, "polarity", OptionError, list(SIGNS))
         build_settings(self.bodies, self.model, self.chattering, self.duration, record=False)  # raises before the work
         check_friction(self.bodies, self.model, self.friction)
         for motion in self.motions:
@@ -201,11 +201,11 @@ class Product:
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If the bodies are not blocks.
         """
         if not isinstance(self.bodies, Blocks) or self.bodies.terms:
-            raise InvalidOption(f"this result is defined for blocks only, not for {self.bodies.kind}")
+            raise OptionError(f"this result is defined for blocks only, not for {self.bodies.kind}")
         return self.bodies
 
 
@@ -381,11 +381,11 @@ def simulate_many(
     [[True, False, True, False]]
     """
     product = build_product(blocks, motions, levels, measure, polarity, model, chattering, duration, friction)
-    names = [*VARIABLES, *(TIMES if checks.boolean(times, "times", InvalidOption) else ())]
+    names = [*VARIABLES, *(TIMES if checks.boolean(times, "times", OptionError) else ())]
     names += SLIPS if product.friction is not None else ()
     setup = build_setup(product)
     outcomes = simulate_product(product, setup, names)
-    if checks.boolean(robust, "robust", InvalidOption):
+    if checks.boolean(robust, "robust", OptionError):
         factors = [factor for factor in list_factors(RELATIVE, COUNT) if factor != 1.0]
         repeats = [simulate_product(product, setup, ["overturned"], factor) for factor in factors]
         outcomes["overturned_share"] = np.mean(

@@ -15,7 +15,7 @@ from rocking.core.constants import Model
 from rocking.engine.problem import compute_peaks, require_body, set_start
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.engine.tasks import SLICE, Setup, count_slices
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
@@ -79,9 +79,9 @@ def simulate(
 
     Raises
     ------
-    InvalidBlock, InvalidMotion
+    BlockError, MotionError
         If `block` is not a body, `motion` is not a `Motion`, or a body on a line has vertical motion.
-    InvalidOption
+    OptionError
         If an option is out of range, or `friction` is not available for the block.
 
     See Also
@@ -129,7 +129,7 @@ def compute_response(
     trail, start = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
     ending, table = march_in_slices(trail, start)
     if ending == state.Ending.BALANCED:
-        raise InvalidOption("the block remains balanced on its corner; give {} or another initial state", "duration")
+        raise OptionError("the block remains balanced on its corner; give {} or another initial state", "duration")
     events = table["event"][: start["events"]]
     overturned = ending == state.Ending.OVERTURNED
     return Response(

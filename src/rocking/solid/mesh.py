@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.errors import InvalidBlock, InvalidOption, describe_install, escape_braces
+from rocking.errors import BlockError, OptionError, describe_install, escape_braces
 from rocking.inputs.notes import density_notes, height_notes
 from rocking.motion.processing import sine_cosine
 from rocking.solid import support as polygons
@@ -76,7 +76,7 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
                 file = PurePath(mesh.name)
                 path, scene = file.name, _read_stream(mesh, file.name)
             else:
-                raise InvalidBlock(
+                raise BlockError(
                     "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, "
                     f"not {checks.short_repr(mesh)}",
                     "mesh",
@@ -87,7 +87,7 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
         placements = [(str(node), *graph[node]) for node in sorted(graph.nodes_geometry)]
         shapes = [(node, geometry[key], transform) for node, transform, key in placements]
     if max_faces is not None and (count := sum(len(getattr(shape, "faces", ())) for _, shape, _ in shapes)) > max_faces:
-        raise InvalidBlock(
+        raise BlockError(
             f"contains {count} triangles; use a coarser mesh of at most {max_faces}",
             path=path or name,
         )
@@ -95,20 +95,20 @@ def read_parts(mesh: Mesh, max_faces: int | None = None) -> MeshParts:
         _place_part(node, shape, transform) for node, shape, transform in shapes if len(getattr(shape, "faces", ()))
     )
     if not parts:
-        raise InvalidBlock(
+        raise BlockError(
             "contains no faces; a mesh of triangles is required, not points, lines or other text", path=path or name
         )
     if not all(np.all(np.isfinite(part.vertices)) for part in parts):
-        raise InvalidBlock("has corners that are not finite numbers; export the mesh again", path=path or name)
+        raise BlockError("has corners that are not finite numbers; export the mesh again", path=path or name)
     return MeshParts(parts, name, up)
 
 
 def _read_file(file: Path, path: str) -> Scene:
     if file.is_dir():
-        raise InvalidBlock("this is a folder, not a file; choose a file in it", path=path)
+        raise BlockError("this is a folder, not a file; choose a file in it", path=path)
     if not file.is_file():
         hint = f"; the mesh that ships is {', '.join(SHIPPED_MESHES)}" if not file.suffix else ""
-        raise InvalidBlock(f"there is no such file{hint}", path=path)
+        raise BlockError(f"there is no such file{hint}", path=path)
     return _load_scene(file, path)
 
 
@@ -127,9 +127,7 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
     try:
         import trimesh
     except ImportError:
-        raise InvalidOption(
-            f"meshes are read with trimesh, which is not installed: {describe_install('mesh')}"
-        ) from None
+        raise OptionError(f"meshes are read with trimesh, which is not installed: {describe_install('mesh')}") from None
     suffix = PurePath(source.name).suffix.lower().removeprefix(".")
     # Objects and groups of OBJ files are parts, regardless of material. Corners are unchanged.
     options |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
@@ -141,7 +139,7 @@ def _load_scene(source: Path | BinaryIO, path: str, **options: Any) -> Scene:
         reason = f"{message or type(error).__name__}; check that the file is complete and has the correct suffix"
         if suffix not in formats:
             reason = f"trimesh reads only the formats {', '.join(formats)}"
-        raise InvalidBlock(f"cannot be read: {escape_braces(reason)}", path=path) from None
+        raise BlockError(f"cannot be read: {escape_braces(reason)}", path=path) from None
 
 
 def _place_part(name: str, mesh: Any, transform: Any) -> MeshPart:
@@ -158,20 +156,20 @@ def _place_part(name: str, mesh: Any, transform: Any) -> MeshPart:
 def parse_length_unit(unit: object) -> float:
     """Return the length of the unit of a mesh, m, from its name or a number."""
     if isinstance(unit, str):
-        return LENGTH_UNITS[checks.choice(unit, "unit", InvalidBlock, [*LENGTH_UNITS])]
-    return checks.positive(unit, "unit", InvalidBlock, "m")
+        return LENGTH_UNITS[checks.choice(unit, "unit", BlockError, [*LENGTH_UNITS])]
+    return checks.positive(unit, "unit", BlockError, "m")
 
 
 def compute_upright_rotation(up: object) -> Floats:
     """Return the smallest rotation, shape (3, 3), of an axis of a mesh to z."""
     if isinstance(up, str):
-        axis = checks.choice(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
+        axis = checks.choice(up, "up", BlockError, ["x", "y", "z", "-x", "-y", "-z"])
         u = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
     else:
-        u = checks.numbers(up, "up", InvalidBlock)  # type: ignore[arg-type]
+        u = checks.numbers(up, "up", BlockError)  # type: ignore[arg-type]
         length = float(np.linalg.norm(u)) if u.shape == (3,) else 0.0
         if not 0.0 < length < np.inf:
-            raise InvalidBlock("{} must be x, y or z, or a vector of three numbers that points up", "up", value=up)
+            raise BlockError("{} must be x, y or z, or a vector of three numbers that points up", "up", value=up)
         u = u / length
     if u[2] < 0.0 and not u[0] * u[0] + u[1] * u[1] > 0.0:
         return np.diag([1.0, -1.0, -1.0])
@@ -217,15 +215,13 @@ def compute_properties(
 ) -> tuple[dict[str, Any], list[Surface]]:
     """Return the arguments of `Solid`, and closed surfaces of its parts with the lowest corner at height 0."""
     if support is not None and tolerance is not None:
-        raise InvalidBlock("{} is used only to find the support; omit it if {} is given", "tolerance", "support")
+        raise BlockError("{} is used only to find the support; omit it if {} is given", "tolerance", "support")
     scene = read_parts(mesh, max_faces)
     with np.errstate(over="ignore"):
         extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in scene.parts) * parse_length_unit(unit)
     if extent and not 1e-9 < extent < 1e9:
-        raise InvalidBlock(
-            f"is {extent:.3g} m large, outside the range of bodies; correct {{}}", "unit", path=scene.name
-        )
-    sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", InvalidBlock)))
+        raise BlockError(f"is {extent:.3g} m large, outside the range of bodies; correct {{}}", "unit", path=scene.name)
+    sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", BlockError)))
     clockwise = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])  # seen from above
     rotation = clockwise @ compute_upright_rotation(scene.up if up is None else up) * parse_length_unit(unit)
     parts = [part._replace(vertices=part.vertices @ rotation.T) for part in scene.parts]
@@ -239,14 +235,14 @@ def compute_properties(
     for name, surface, moments in zip(names, surfaces, part_moments, strict=True):
         if not moments.amount > 1e-9 * float(np.ptp(surface.vertices, axis=0).max()) ** 3:
             prefix = "" if name == scene.name else f"{name} "
-            raise InvalidBlock(
+            raise BlockError(
                 f"{prefix}encloses no volume: it is a surface without an inside; give it a thickness", path=scene.name
             )
     part_densities = [densities[name] for name in names]
     total = combine_moments(part_moments, [1.0 if value is None else value for value in part_densities])
-    max_height = 1e-3 * height if tolerance is None else checks.positive(tolerance, "tolerance", InvalidBlock, "m")
+    max_height = 1e-3 * height if tolerance is None else checks.positive(tolerance, "tolerance", BlockError, "m")
     if max_height >= height:
-        raise InvalidBlock(
+        raise BlockError(
             f"{{}} must be below the height of the mesh, {height:.4g} m, not {max_height:g}",
             "tolerance",
             value=tolerance,
@@ -280,17 +276,17 @@ def _resolve_densities(
     if density is None:
         return dict.fromkeys(names)
     if not isinstance(density, Mapping):
-        return dict.fromkeys(names, checks.positive(density, "density", InvalidBlock, "kg/m^3"))
+        return dict.fromkeys(names, checks.positive(density, "density", BlockError, "kg/m^3"))
     parts_text = f"its parts are {', '.join(known)}"
     unknown, missing = [name for name in density if name not in known], [name for name in names if name not in density]
     if unknown:
         hint = checks.suggest(str(unknown[0]), known, parts_text)
-        raise InvalidBlock(
+        raise BlockError(
             f"{{}} has a part {checks.short_repr(unknown[0])}, which the mesh does not have; {hint}", "density"
         )
     if missing:
-        raise InvalidBlock(f"{{}} is missing for {', '.join(missing)}; {parts_text}", "density")
-    return {name: checks.positive(density[name], "density", InvalidBlock, "kg/m^3") for name in names}
+        raise BlockError(f"{{}} is missing for {', '.join(missing)}; {parts_text}", "density")
+    return {name: checks.positive(density[name], "density", BlockError, "kg/m^3") for name in names}
 
 
 def _close_surfaces(
@@ -324,7 +320,7 @@ def _find_support(
             excess = float(np.max((polygon - outline[0]) @ polygons.compute_directions(azimuths).T - distances))
         if outline is None or excess > 1e-6 * float(np.ptp(corners, axis=0).max()):
             (west, south, _), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
-            raise InvalidBlock(
+            raise BlockError(
                 f"{{}} reaches {excess:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in the "
                 f"east and {south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, in the "
                 "mesh's own coordinates",
@@ -333,7 +329,7 @@ def _find_support(
         return polygon, ()
     base = polygons.compute_hull(corners[corners[:, 2] <= tolerance, :2])
     if base is None:
-        raise InvalidBlock(
+        raise BlockError(
             f"stands on a point or a line: the corners within {{}}, {tolerance:.3g} m, of the lowest one span no "
             "polygon; give a larger one, or {}",
             "tolerance",

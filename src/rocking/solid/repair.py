@@ -14,7 +14,7 @@ import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.tables import format_count
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -38,7 +38,7 @@ def merge_corners(name: str, vertices: Floats, faces: Integers) -> Surface:
     low = vertices.min(axis=0)
     size = float(np.max(vertices.max(axis=0) - low))
     if not size > 0.0:
-        raise InvalidBlock("all corners of the mesh coincide")
+        raise BlockError("all corners of the mesh coincide")
     grid_points = np.rint((vertices - low) / (1e-8 * size))
     _, first, merged_index = np.unique(grid_points, axis=0, return_index=True, return_inverse=True)
     merged = merged_index.reshape(-1)[faces]
@@ -48,7 +48,7 @@ def merge_corners(name: str, vertices: Floats, faces: Integers) -> Surface:
     valid = valid[np.sort(np.unique(rotated, axis=0, return_index=True)[1])]
     edges, _, _, pairs = _index_edges(valid)
     if np.any(edges[pairs[:, 0], 0] == edges[pairs[:, 1], 0]):
-        raise InvalidBlock(
+        raise BlockError(
             "normals of neighbouring triangles point to different sides of the surface: orient them alike, as MeshLab "
             "does by re-orienting all faces coherently",
             path=name,

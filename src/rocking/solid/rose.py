@@ -13,7 +13,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import escape_dollars, round_decimal
-from rocking.errors import InvalidOption
+from rocking.errors import OptionError
 from rocking.solid import support as polygons
 
 if TYPE_CHECKING:
@@ -121,12 +121,12 @@ class ResistanceRose(DatasetResult):
 
 
 def check_azimuths(azimuths: ArrayLike | None) -> Floats:
-    """Return unique, increasing azimuths in [0, 360), degrees, or raise `InvalidOption`."""
+    """Return unique, increasing azimuths in [0, 360), degrees, or raise `OptionError`."""
     if azimuths is None:
         return DEFAULT_AZIMUTHS
-    angles = np.atleast_1d(checks.numbers(azimuths, "azimuths", InvalidOption))
+    angles = np.atleast_1d(checks.numbers(azimuths, "azimuths", OptionError))
     if angles.ndim != 1 or not angles.size or not np.all(np.isfinite(angles)):
-        raise InvalidOption("{} must be one finite number or more, degrees clockwise from north", "azimuths")
+        raise OptionError("{} must be one finite number or more, degrees clockwise from north", "azimuths")
     return np.unique([round_decimal(value) % 360.0 for value in np.mod(angles, 360.0).tolist()])
 
 

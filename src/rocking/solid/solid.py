@@ -17,7 +17,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Result, Row, format_rows, rows_to_dict
 from rocking.core.tables import format_count
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 from rocking.solid import support as polygons
 from rocking.solid.mesh import Region, compute_properties
 from rocking.solid.rose import ResistanceRose, check_azimuths, compute_axis_moments, compute_rose
@@ -52,7 +52,7 @@ class Solid(Result):
 
     Raises
     ------
-    InvalidBlock
+    BlockError
         If the body does not stand, or the tensor of inertia is impossible.
 
     See Also
@@ -93,7 +93,7 @@ class Solid(Result):
             "inertia_over_mass": _check_inertia(self.inertia_over_mass),
             "mass": None if self.mass is None else check_mass(self.mass),
             "gravity": check_gravity(self.gravity),
-            "description": checks.text(self.description, "description", InvalidBlock),
+            "description": checks.text(self.description, "description", BlockError),
         }
         for name, value in checked_fields.items():
             if isinstance(value, np.ndarray):
@@ -101,11 +101,11 @@ class Solid(Result):
             object.__setattr__(self, name, value)
         for name in ("regions", "repairs", "notes"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        checks.positive(self.centre[2], "height of the centre of mass", InvalidBlock, "m")
+        checks.positive(self.centre[2], "height of the centre of mass", BlockError, "m")
         azimuths, distances = polygons.compute_edges(self._centred_support)
         weakest = int(np.argmin(distances))
         if not distances[weakest] > 0.0:
-            raise InvalidBlock(
+            raise BlockError(
                 f"this body does not stand: its centre of mass lies {-distances[weakest]:.3g} m outside its support, "
                 f"towards {azimuths[weakest]:.0f} deg; correct which axis points up, the densities, or {{}}",
                 "support",
@@ -159,9 +159,9 @@ class Solid(Result):
 
         Raises
         ------
-        InvalidBlock
+        BlockError
             If the mesh cannot be read, encloses no volume or does not stand, or an argument is invalid.
-        InvalidOption
+        OptionError
             If trimesh is required to read a file but not installed.
 
         See Also
@@ -217,7 +217,7 @@ class Solid(Result):
 
         Raises
         ------
-        InvalidBlock
+        BlockError
             If the body is too stocky to rock in this plane.
 
         See Also
@@ -311,7 +311,7 @@ class Plane(NamedTuple):
 
 def compute_plane(solid: Solid, azimuth: float) -> Plane:
     """Return the body in the vertical plane of an azimuth."""
-    direction = checks.finite(azimuth, "azimuth", InvalidBlock)
+    direction = checks.finite(azimuth, "azimuth", BlockError)
     pivots = polygons.compute_extents(solid.support - solid.centre[:2], [direction, direction + 180.0])
     mean, difference = pivots.distance.mean(), np.ptp(pivots.distance)
     if difference <= 1e-12 * mean:  # rounding only: a symmetric body has equal sides at any position
@@ -321,9 +321,9 @@ def compute_plane(solid: Solid, azimuth: float) -> Plane:
 
 
 def _check_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
-    array = np.array(checks.numbers(value, name, InvalidBlock))
+    array = np.array(checks.numbers(value, name, BlockError))
     if array.shape != shape or not np.all(np.isfinite(array)):
-        raise InvalidBlock(f"{{}} must be finite numbers of shape {shape}", name, value=value)
+        raise BlockError(f"{{}} must be finite numbers of shape {shape}", name, value=value)
     return array
 
 
@@ -334,7 +334,7 @@ def _check_inertia(value: ArrayLike) -> Floats:
     smallest, middle, largest = np.linalg.eigvalsh(0.5 * (tensor + tensor.T))
     is_symmetric = np.allclose(tensor, tensor.T, rtol=0.0, atol=rounding)
     if not (rounding > 0.0 and is_symmetric and smallest + middle >= largest - rounding and smallest > -rounding):
-        raise InvalidBlock(
+        raise BlockError(
             "{} must be symmetric, with each principal moment at most the sum of the other two",
             "inertia_over_mass",
             value=value,

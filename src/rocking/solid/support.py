@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidBlock
+from rocking.errors import BlockError
 from rocking.motion.processing import sine_cosine
 from rocking.solid.repair import Surface
 
@@ -64,13 +64,13 @@ def compute_area(polygon: Floats) -> float:
 
 
 def check_polygon(value: ArrayLike) -> Floats:
-    """Return the convex hull of the corners from a user, shape (n, 2), or raise `InvalidBlock`."""
-    points = checks.numbers(value, "support", InvalidBlock)
+    """Return the convex hull of the corners from a user, shape (n, 2), or raise `BlockError`."""
+    points = checks.numbers(value, "support", BlockError)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
-        raise InvalidBlock("{} must be corners of a polygon, each a finite (east, north) in m", "support", value=value)
+        raise BlockError("{} must be corners of a polygon, each a finite (east, north) in m", "support", value=value)
     polygon = compute_hull(points)
     if polygon is None:
-        raise InvalidBlock("{} must have at least three corners that are not on one line", "support")
+        raise BlockError("{} must have at least three corners that are not on one line", "support")
     return polygon
 
 

@@ -17,7 +17,7 @@ from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import format_count, read_csv_rows
 from rocking.engine.schemes import chattering_scheme
-from rocking.errors import InvalidMotion, InvalidOption, StudyError, UnreadableRecord
+from rocking.errors import MotionError, OptionError, RecordError, StudyError
 from rocking.inputs import quantities
 from rocking.inputs.bodies import (
     check_parameters,
@@ -122,7 +122,7 @@ def read_study(path: str | Path) -> StudyFile:
     ------
     StudyError
         If the file or one of its lines is invalid; `path`, `line` and `argument` (the key) locate the error.
-    UnreadableRecord
+    RecordError
         If a record cannot be read.
 
     See Also
@@ -292,7 +292,7 @@ def _read_scales(tables: Tables) -> Scales:
     (name,) = measures
     with tables.locating_errors("scales", key=name):
         values = quantities.read_axis(entries[name], name, _MEASURES[name])
-        checks.positive_numbers(values, name, InvalidOption)
+        checks.positive_numbers(values, name, OptionError)
         return Scales.from_levels(values, Measure(cast(MeasureName, name), **options))
 
 
@@ -313,7 +313,7 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
             with tables.locating_record_errors(name):
                 motion = _load_record(tables, path, several=len(names_by_path) > 1)
                 scales.factors(motion)  # raises if the motion cannot be scaled
-        except (UnreadableRecord, InvalidMotion) as error:
+        except (RecordError, MotionError) as error:
             if not entries.get("skip_unreadable", False):
                 raise
             skipped.append(str(error))

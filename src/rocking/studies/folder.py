@@ -23,7 +23,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.tables import format_count, write_bytes
 from rocking.engine.schemes import chattering_scheme
-from rocking.errors import DamagedStudy, OutputError, StudyError
+from rocking.errors import DamagedStudyError, OutputError, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -143,7 +143,7 @@ class Store:
             return None
         values = decode(data, self.grid.unit)
         if values is None:
-            raise DamagedStudy(f"unit {format_key(key)} is damaged")
+            raise DamagedStudyError(f"unit {format_key(key)} is damaged")
         return dict(zip(OUTCOMES, values, strict=True))
 
     def create_input(self, key: Key) -> UnitInput:

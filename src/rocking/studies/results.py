@@ -46,7 +46,7 @@ from rocking.core.tables import (
 )
 from rocking.engine.problem import compute_slenderness
 from rocking.engine.tasks import OUTCOME, describe_missing
-from rocking.errors import InvalidOption, StudyError, Unfitted, describe_install
+from rocking.errors import FitError, OptionError, StudyError, describe_install
 from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Product, body_coordinates, build_dataset, collect_verticals
 from rocking.studies.folder import Store
@@ -166,9 +166,7 @@ def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise InvalidOption(
-            f"Parquet requires pyarrow: {describe_install('parquet')}, or write CSV or NetCDF"
-        ) from None
+        raise OptionError(f"Parquet requires pyarrow: {describe_install('parquet')}, or write CSV or NetCDF") from None
     tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
     first = next(tables)
     with parquet.ParquetWriter(target, first.schema) as file:
@@ -180,10 +178,10 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     """Compute `Study.critical_scales` of a complete study."""
     import xarray as xr
 
-    checks.choice(outcome, "outcome", InvalidOption, get_args(StudyOutcome))
+    checks.choice(outcome, "outcome", OptionError, get_args(StudyOutcome))
     product, levels = store.product, store.product.scales.values
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
-        raise InvalidOption("critical scales require at least two scales, in increasing order")
+        raise OptionError("critical scales require at least two scales, in increasing order")
     store.require_complete()
     names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
     holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
@@ -357,19 +355,19 @@ def _parse_measure(attributes: Mapping[str, Any]) -> Measure:
 
 def check_fractiles(fractiles: Sequence[float]) -> Floats:
     """Check that fractiles are between 0 and 1, and return them as an array."""
-    shares = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
+    shares = np.atleast_1d(checks.numbers(fractiles, "fractiles", OptionError)).ravel()
     if not shares.size:
-        raise InvalidOption("{} must contain at least one number, as [0.16, 0.5, 0.84]", "fractiles")
+        raise OptionError("{} must contain at least one number, as [0.16, 0.5, 0.84]", "fractiles")
     for value in shares:
         if not 0.0 < value < 1.0:
             sentence = f"each of {{}} must be between 0 and 1; got {value:g}"
-            raise InvalidOption(sentence, "fractiles", value=value)
+            raise OptionError(sentence, "fractiles", value=value)
     return shares
 
 
 def _check_limit_states(limit_states: Mapping[str, float] | None, confidence: float) -> Mapping[str, float]:
     """Check the arguments of curves before outcomes are read, and return limits by limit state."""
-    checks.fraction(confidence, "confidence", InvalidOption)
+    checks.fraction(confidence, "confidence", OptionError)
     limits = check_limit_states(limit_states)
     for name, limit in limits.items():
         check_limit(limit, name)
@@ -515,10 +513,10 @@ def fit_block_fragilities(
                     numbers = [np.nan] * 6
                     try:
                         if not has_trials.any():
-                            raise Unfitted("every simulation was abandoned")
+                            raise FitError("every simulation was abandoned")
                         curve = fit(*data, trials=trials[has_trials], clusters=labels[has_trials]).curves[0]
                         numbers = [curve.median, *curve.median_interval, curve.dispersion, *curve.dispersion_interval]
-                    except Unfitted as error:  # identical or separated outcomes have no lognormal fit
+                    except FitError as error:  # identical or separated outcomes have no lognormal fit
                         faults[i, j] = str(error)
                     numbers += [exceeded.sum(), trials.sum()]
                     for values, number in zip(estimates.values(), numbers, strict=True):

@@ -33,7 +33,7 @@ from rocking.core.progress import Progress
 from rocking.core.tables import format_count, write_netcdf
 from rocking.core.threads import count_cores, thread_count
 from rocking.engine.schemes import ChatteringScheme
-from rocking.errors import InvalidOption, RockingError, StudyError
+from rocking.errors import OptionError, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions
 from rocking.simulation.ensemble import Polarity, Product, build_product
@@ -196,7 +196,7 @@ class Study:
 
         Raises
         ------
-        InvalidOption
+        OptionError
             If an argument is out of its range.
         StudyError
             If another process runs the study, another version created it, or the workers are gone.
@@ -240,7 +240,7 @@ class Study:
             If another version created the study whose units are to be computed again.
         """
         store, faults = self._store, dict[Key, str]()
-        if checks.integer(recompute, "recompute", InvalidOption, 0) or repair:
+        if checks.integer(recompute, "recompute", OptionError, 0) or repair:
             store.check_program()
         done = sorted(store.find_done())
         recomputed = {*np.random.default_rng(seed).permutation(len(done))[:recompute].tolist()}
@@ -280,7 +280,7 @@ class Study:
         ------
         StudyError
             If units are missing or damaged.
-        InvalidOption
+        OptionError
             If `outcome` is unknown, or the study has fewer than two scales in increasing order.
         """
         return find_critical_scales(self._store, outcome)
@@ -334,7 +334,7 @@ class Study:
         ------
         StudyError
             If units are missing or damaged.
-        InvalidOption
+        OptionError
             If a fractile is out of its range.
         """
         return compute_spectrum(self._store, fractiles)
@@ -413,7 +413,7 @@ def create_study(
     ------
     StudyError
         If the folder contains a study with other inputs, or a damaged one.
-    InvalidOption
+    OptionError
         If an argument is out of its range.
 
     See Also
@@ -448,7 +448,7 @@ def open_or_create(
     opened._store.check_inputs(product)
     width, count = opened._store.grid.unit[3], len(product.bodies)
     if unit_blocks is not None and min(choose_unit_shape(product, unit_blocks)[3], count) != min(width, count):
-        raise InvalidOption(f"the study already exists, in units of {width} blocks: omit {{}}", "unit_blocks")
+        raise OptionError(f"the study already exists, in units of {width} blocks: omit {{}}", "unit_blocks")
     return opened
 
 
@@ -456,7 +456,7 @@ def _parse_part(part: str) -> tuple[int, int]:
     """Return the number of a part and the number of parts."""
     number, slash, count = str(part).partition("/")
     if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
-        raise InvalidOption(
+        raise OptionError(
             f"{{}} must be the number of a part and the number of parts, as 3/10; got {part}",
             "part",
             value=part,
@@ -537,7 +537,7 @@ def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[
     pool = executor.get_executor(pure=False) if client is executor else executor
     if not isinstance(pool, Executor):
         kinds = "a concurrent.futures.Executor or a client of dask.distributed"
-        raise InvalidOption(f"{{}} must be {kinds}; got {checks.short_repr(executor)}", "executor", value=executor)
+        raise OptionError(f"{{}} must be {kinds}; got {checks.short_repr(executor)}", "executor", value=executor)
 
     def submit(unit_input: UnitInput) -> Future[bytes]:
         try:

@@ -20,7 +20,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import VERSION
 from rocking.engine.tasks import Setup, Task, simulate_task
-from rocking.errors import InvalidOption, StudyError
+from rocking.errors import OptionError, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
 from rocking.simulation.ensemble import VARIABLES, Product
@@ -91,9 +91,9 @@ def format_key(key: Key) -> str:
 def choose_unit_shape(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
     """Choose the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
     if unit_blocks is not None:
-        width = checks.integer(unit_blocks, "unit_blocks", InvalidOption, minimum=_GROUP_SIZE)
+        width = checks.integer(unit_blocks, "unit_blocks", OptionError, minimum=_GROUP_SIZE)
         if width % _GROUP_SIZE:
-            raise InvalidOption(
+            raise OptionError(
                 f"{{}} must be a multiple of {_GROUP_SIZE}, not {width}", "unit_blocks", value=unit_blocks
             )
         return 1, 1, 1, width

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from typing import BinaryIO, Final
 
-from rocking.errors import UnreadableRecord, describe_install
+from rocking.errors import RecordError, describe_install
 from rocking.motion.motion import Motion
 from rocking.records.formats import csmip, headed, table, through_obspy
 from rocking.records.formats.channel import Channel, Identification, Recognised
@@ -56,10 +56,10 @@ def read(
 
     Raises
     ------
-    UnreadableRecord
+    RecordError
         If the file is missing, unreadable or inconsistent, its format is unknown, a number is damaged, or the channel
         is unknown or not specified. The message contains file, line and correction.
-    InvalidMotion
+    MotionError
         If `dt` is not a positive number, or the samples do not form a motion.
 
     See Also
@@ -147,7 +147,7 @@ def identify(path: str | os.PathLike[str]) -> Identification:
 
     Raises
     ------
-    UnreadableRecord
+    RecordError
         If the file is missing or unreadable, or its format is unknown.
 
     See Also
@@ -174,7 +174,7 @@ def _recognise_format(source: Source) -> Recognised:
     return recognised
 
 
-def _unknown_format_error(source: Source) -> UnreadableRecord:
+def _unknown_format_error(source: Source) -> RecordError:
     if table_error := table.unreadable_table_error(source):
         return table_error
     text = f"the format of this text is unknown: none of its first {table.HEADING_LINES} lines contains only numbers"

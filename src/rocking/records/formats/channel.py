@@ -11,7 +11,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import UnreadableRecord
+from rocking.errors import RecordError
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
 from rocking.records.formats.source import Request, Source
@@ -210,7 +210,7 @@ class Channel:
 
         Raises
         ------
-        InvalidMotion
+        MotionError
             If there are fewer than two samples, or they are too large for a motion.
         """
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
@@ -272,7 +272,7 @@ def find_missing_value(values: Floats) -> int | None:
     return int(starts[is_isolated][0]) if is_isolated.any() else None
 
 
-def missing_value_error(source: Source, value: float, offset: int | None) -> UnreadableRecord:
+def missing_value_error(source: Source, value: float, offset: int | None) -> RecordError:
     """Return the error for a missing value."""
     text = f"{value:g} seems to represent a missing value; use a record without missing values"
     return source.error(text, offset)

@@ -13,7 +13,7 @@ import re
 from typing import Any, Final
 
 from rocking.core.arrays import Floats
-from rocking.errors import UnreadableRecord
+from rocking.errors import RecordError
 from rocking.records.formats.engine import (
     Count,
     Format,
@@ -85,7 +85,7 @@ def _parse_pairs_header(header: Header) -> HeaderData:
     return HeaderData(offset, units, None, Count(2 * int(points), offset), labels, layout, facts=facts)
 
 
-def _missing_count_error(header: Header) -> UnreadableRecord:
+def _missing_count_error(header: Header) -> RecordError:
     advice = "if the file is incomplete, download it again; if its layout differs, write it as a text table"
     offset = header.lines[0].start if header.lines else header.end
     return header.source.error(f"no line of points and units ends this channel's header; {advice}", offset)

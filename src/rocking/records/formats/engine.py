@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import UnreadableRecord, escape_braces
+from rocking.errors import RecordError, escape_braces
 from rocking.records.formats.channel import Channel, Recognised, create_channel, missing_value_error, resolve_timing
 from rocking.records.formats.source import Line, Request, Source
 from rocking.records.units import SECOND
@@ -285,7 +285,7 @@ def read_values(source: Source, start: int, end: int, layout: Layout | None, sta
     return values
 
 
-def invalid_number_error(source: Source, token: bytes, offset: int) -> UnreadableRecord:
+def invalid_number_error(source: Source, token: bytes, offset: int) -> RecordError:
     """Return the error for text that should be a finite number."""
     token_text, number = repr(token[:40].decode("latin-1")), parse_token(token)
     if b"," in token and parse_token(token.replace(b",", b".")) is not None:

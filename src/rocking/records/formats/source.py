@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import BinaryIO, NamedTuple
 
 from rocking.core import checks
-from rocking.errors import InvalidMotion, UnreadableRecord, escape_braces
+from rocking.errors import MotionError, RecordError, escape_braces
 from rocking.records import catalogue
 from rocking.records.units import UNIT_NAMES, Unit, choose_unit, find_unit
 
@@ -88,19 +88,19 @@ class Source:
         """Whether at least one byte in a hundred cannot occur in a text file."""
         return len(self.data.translate(None, _CONTROL)) < 0.99 * len(self.data)
 
-    def error(self, message: str, offset: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
+    def error(self, message: str, offset: int | None = None, *arguments: str, value: object = None) -> RecordError:
         """Return an error with this message about the file's line at an offset."""
         line = None if offset is None else self.find_line_number(offset)
-        return UnreadableRecord(message, *arguments, path=self.path, line=line, value=value)
+        return RecordError(message, *arguments, path=self.path, line=line, value=value)
 
 
-def unreadable_file_error(name: str, error: Exception) -> UnreadableRecord:
+def unreadable_file_error(name: str, error: Exception) -> RecordError:
     """Return an error for a file that could not be opened, with any similar shipped record."""
     text = f"this file could not be read ({getattr(error, 'strerror', None) or error}); check the name and the disk"
     if isinstance(error, FileNotFoundError):
         hint = catalogue.suggest_records(name, "check the name and the folder", "the shipped record ")
         text = f"there is no such file; {hint}"
-    return UnreadableRecord(text, path=name)
+    return RecordError(text, path=name)
 
 
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
@@ -110,7 +110,7 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
         name = str(getattr(path, "name", "<"))
         name = "standard input" if name.startswith("<") or name.isdecimal() else name
     elif not isinstance(path, (str, bytes, os.PathLike)):
-        raise UnreadableRecord(f"the path of a record must be a file name, not {path!r}")
+        raise RecordError(f"the path of a record must be a file name, not {path!r}")
     else:
         name = os.fsdecode(path)
     try:
@@ -119,10 +119,10 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
         raise unreadable_file_error(name, error) from error
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
-        raise UnreadableRecord(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
+        raise RecordError(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
     data = _normalise_text(raw)
     if not data.strip():
-        raise UnreadableRecord("this file is empty; download the record again", path=name)
+        raise RecordError("this file is empty; download the record again", path=name)
     return Source(name, raw, data)
 
 
@@ -130,7 +130,7 @@ def _read_bytes(name: str) -> bytes:
     status = os.stat(name)  # noqa: PTH116 - Path() would turn an empty name into the current folder
     if not stat.S_ISREG(status.st_mode):
         text = "this is a folder" if stat.S_ISDIR(status.st_mode) else "this is not a regular file"
-        raise UnreadableRecord(f"{text}; choose a record file", path=name)
+        raise RecordError(f"{text}; choose a record file", path=name)
     with open(name, "rb") as file:  # noqa: PTH123
         # A read allocates as much memory as requested.
         return file.read(min(status.st_size, SIZE_LIMIT) + 1)
@@ -170,7 +170,7 @@ class Request:
         several: bool = False,
     ) -> Request:
         """Create a request from checked arguments."""
-        step = None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s")
+        step = None if dt is None else checks.positive(dt, "dt", MotionError, "s")
         return cls(step, None if units is None else choose_unit(units), channel, several)
 
     def check_step(self, source: Source, stated: float, offset: int | None) -> float:

@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import UnreadableRecord, escape_braces
+from rocking.errors import RecordError, escape_braces
 from rocking.records.formats.channel import Channel, Recognised, create_channel, find_first_fault, resolve_timing
 from rocking.records.formats.engine import NUMBER, convert_tokens, invalid_number_error, parse_token
 from rocking.records.formats.heading import RULE, Heading, parse_heading
@@ -233,7 +233,7 @@ def recognise_table(source: Source) -> Recognised | None:
     return Recognised("text table", reason, table.read)
 
 
-def unreadable_table_error(source: Source) -> UnreadableRecord | None:
+def unreadable_table_error(source: Source) -> RecordError | None:
     """Return the reason why an apparent table cannot be read, or None for other content."""
     table = _find_table(source)
     if table is None:
