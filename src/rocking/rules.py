@@ -18,6 +18,7 @@ from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import compute_intensities
 from rocking.analysis.survey import RuleComparison
 from rocking.block import Block, Blocks
+from rocking.block.friction import Friction
 from rocking.block.single import require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -414,7 +415,12 @@ def _compute_min_ratio(
 
 
 def compare_rules(
-    block: Block, motions: Motions, *, rules: Iterable[str] | None = None, model: Model = "nonlinear"
+    block: Block,
+    motions: Motions,
+    *,
+    rules: Iterable[str] | None = None,
+    model: Model = "nonlinear",
+    friction: Friction | None = None,
 ) -> RuleComparison:
     """Apply rules of thumb to a block under motions, and compare with simulations.
 
@@ -428,6 +434,8 @@ def compare_rules(
         Names in `RULES`, by default all.
     model : {"nonlinear", "linear"}
         Equation of motion of the simulations.
+    friction : optional
+        Friction of the simulations, as for `simulate`; the rules assume that the block does not slide.
 
     Returns
     -------
@@ -469,15 +477,15 @@ def compare_rules(
     responses, margins = [], []
     with Progress("checking", total=len(named_motions)) as bar:
         for motion in named_motions.values():
-            responses.append(simulate(block, motion, model=model))
-            margins.append(_compute_margin(responses[-1], block, motion, model))
+            responses.append(simulate(block, motion, model=model, friction=friction))
+            margins.append(_compute_margin(responses[-1], block, motion, model, friction))
             bar.advance()
     return RuleComparison(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
 
 
-def _compute_margin(response: Response, block: Block, motion: Motion, model: Model) -> float:
+def _compute_margin(response: Response, block: Block, motion: Motion, model: Model, friction: Friction | None) -> float:
     """Compute the reciprocal of the lowest factor that overturns the block, consistent with the response."""
-    analysis = incremental_dynamic_analysis(block, motion, model=model, rtol=_TOLERANCE)
+    analysis = incremental_dynamic_analysis(block, motion, model=model, rtol=_TOLERANCE, friction=friction)
     margin = motion.pga / float(analysis.data.overturning_level[0, 0])
     if response.overturned:
         return float(np.fmax(margin, 1.0))  # the factor may be beyond all simulated levels

@@ -45,6 +45,7 @@ from rocking.analysis.levels import (
 )
 from rocking.analysis.risk import Risk, Survival, compute_mean_survival, compute_risk
 from rocking.block.body import Bodies, Body
+from rocking.block.friction import Friction, resolve_friction
 from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.progress import spell
@@ -336,6 +337,7 @@ def fragility(
     limit_states: Mapping[str, float] | None = None,
     model: Model = "nonlinear",
     chattering: str | ChatteringScheme = "certified",
+    friction: Friction | None = None,
     polarity: Polarity = "+",
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
@@ -357,7 +359,7 @@ def fragility(
     limit_states : mapping of str to float, optional
         Limit states: ratio of peak rotation to slenderness (the smaller one of two sides), ``math.inf`` for
         overturning.
-    model, chattering : optional
+    model, chattering, friction : optional
         As for `simulate`.
     polarity : {"+", "-", "both"}
         Original motions, reversed motions, or both. With both, each motion counts twice unless all blocks are
@@ -408,7 +410,8 @@ def fragility(
     motions = list_motions(motions)
     values, cluster_numbers = compute_intensities(motions, measure), assign_clusters(motions, clusters)
     units = compute_units(bodies, measure, model)
-    options: dict[str, Any] = {"chattering": chattering, "polarity": "+" if mirrored else polarity}
+    options: dict[str, Any] = {"chattering": chattering, "friction": friction}
+    options["polarity"] = "+" if mirrored else polarity
     if stripes is None:
         table = simulate_many(bodies, motions, model=model, **options).expand_dims("level")
         intensity = (values[:, None] / units)[None, :, :, None]
@@ -437,7 +440,7 @@ def fragility(
         raise
     scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
     factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
-    setup = Setup(bodies, model, chattering_scheme(chattering))
+    setup = Setup(bodies, model, chattering_scheme(chattering), friction=resolve_friction(friction))
     kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
     text = f"{describe_pool(blocks, weights)}, {describe_sample(cluster_numbers, clusters)}, {kind}, {model} model"
     return Fragility(

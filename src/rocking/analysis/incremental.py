@@ -23,6 +23,7 @@ from rocking.analysis.levels import (
     simulate_levels,
 )
 from rocking.block.body import Bodies, Body
+from rocking.block.friction import Friction, check_friction, resolve_friction
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import Model
@@ -53,6 +54,7 @@ def incremental_dynamic_analysis(
     levels: ArrayLike | None = None,
     model: Model = "nonlinear",
     rtol: float = 1e-6,
+    friction: Friction | None = None,
 ) -> IncrementalDynamicAnalysis:
     """Scale motions beyond overturning of every block, and find the bands of levels that overturn.
 
@@ -74,6 +76,8 @@ def incremental_dynamic_analysis(
         Equation of motion.
     rtol : float
         Width of refined ends of bands, relative to the level.
+    friction : optional
+        As for `simulate`.
 
     Returns
     -------
@@ -120,7 +124,9 @@ def incremental_dynamic_analysis(
         reason = "because otherwise the block never comes to rest"
         raise OptionError(f"{{}} must be below 1 for an incremental dynamic analysis, {reason}", "restitution")
     relative_width = checks.between(rtol, "rtol", OptionError, 1e-15, 0.5)
-    options: dict[str, Any] = {"model": model}
+    options: dict[str, Any] = {"model": model, "friction": friction}
+    coefficients = resolve_friction(friction)
+    check_friction(bodies, model, coefficients)
     lowest_uplift = _compute_lowest_uplift(bodies, motion_list, values, measure, model)
     if levels is None:
         table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
@@ -129,7 +135,7 @@ def incremental_dynamic_analysis(
         table = simulate_levels(bodies, motion_list, measure, level_values, **options)
     factors = compute_units(bodies, measure, model)[None, :] / values[:, None]
     # The scheme of the levels determines how often the restitution is drawn.
-    setup = Setup(bodies, model, Certified())
+    setup = Setup(bodies, model, Certified(), friction=coefficients)
 
     def simulate_overturned(column: Integers, level: Floats) -> Integers:
         is_overturned = np.empty(column.size, dtype=np.int64)

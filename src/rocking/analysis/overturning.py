@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.analysis.levels import Brackets, find_boundaries, list_missing_notes
 from rocking.block import Block, Blocks
+from rocking.block.friction import Friction, check_friction, resolve_friction
 from rocking.block.single import require_block
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
@@ -94,6 +95,7 @@ def overturning_map(
     frequencies: ArrayLike,
     model: Model = "nonlinear",
     rtol: float = 1e-6,
+    friction: Friction | None = None,
     **parameters: Any,
 ) -> OverturningMap:
     """Map the outcomes of a block under a pulse over amplitude and frequency, with their boundaries.
@@ -116,6 +118,8 @@ def overturning_map(
         Equation of motion.
     rtol : float
         Width of refined boundaries, relative to the amplitude.
+    friction : optional
+        As for `simulate`.
     **parameters : object
         Further parameters of a named pulse, as for the function of that name in `rocking.pulses`.
 
@@ -183,7 +187,10 @@ def overturning_map(
     p, alpha, restitution = np.array([(side.p, side.alpha, side.restitution) for side in block.sides]).T
     # Blocks of one shape with values of p that correspond to the ratios for a pulse of the block's frequency.
     blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
-    setup, threshold = Setup(blocks, model, Certified(relative_width * unit.end)), min(block.uplift_thresholds(model))
+    coefficients, scheme = resolve_friction(friction), Certified(relative_width * unit.end)
+    blocks.__dict__["radii"] = np.array(block._list_radii()) * ratios[:, None] ** 2
+    check_friction(blocks, model, coefficients)
+    setup, threshold = Setup(blocks, model, scheme, friction=coefficients), min(block.uplift_thresholds(model))
 
     def simulate_modes(
         column: Integers, level: Floats, advance: Callable[[int], None] = lambda count: None

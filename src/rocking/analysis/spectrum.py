@@ -22,6 +22,7 @@ from rocking.analysis.levels import (
 from rocking.block import Blocks
 from rocking.block.bodies import resolve_p
 from rocking.block.body import Bodies, Body
+from rocking.block.friction import Friction
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
@@ -58,6 +59,7 @@ def rocking_spectrum(
     fractiles: Sequence[float] = (0.16, 0.5, 0.84),
     model: Model = "nonlinear",
     chattering: str | ChatteringScheme = "certified",
+    friction: Friction | None = None,
 ) -> RockingSpectrum:
     """Compute peak rotation against the frequency parameter or the size, for a grid or an ensemble.
 
@@ -78,7 +80,7 @@ def rocking_spectrum(
         Weights of the blocks of an ensemble, equal by default.
     fractiles : sequence of float
         Shares, in (0, 1), of motions (and of the ensemble's weight) below the fractile curves.
-    model, chattering : optional
+    model, chattering, friction : optional
         As for `simulate_many`.
 
     Returns
@@ -120,7 +122,7 @@ def rocking_spectrum(
     """
     requested = np.atleast_1d(checks.numbers(fractiles, "fractiles", OptionError)).ravel()
     shares = np.array([checks.fraction(share, "each of fractiles", OptionError) for share in requested])
-    options: dict[str, Any] = {"model": model, "chattering": chattering}
+    options: dict[str, Any] = {"model": model, "chattering": chattering, "friction": friction}
     bodies, motions = gather_bodies(blocks), list_motions(motions)
     if not isinstance(bodies, Blocks):
         raise OptionError(f"a spectrum requires blocks, because only blocks have a size; got {bodies.kind}")

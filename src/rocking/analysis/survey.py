@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from rocking.analysis.levels import MIRROR_NOTE
 from rocking.block.body import Body
+from rocking.block.friction import Friction
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.progress import Progress
 from rocking.core.result import Result
@@ -241,7 +242,13 @@ def format_rule_name(rule: str) -> str:
 
 
 def survey(
-    block: Body, motions: Motions, *, friction: float | None = None, precision: float = MOTION_PRECISION, **options: Any
+    block: Body,
+    motions: Motions,
+    *,
+    friction: float | None = None,
+    precision: float = MOTION_PRECISION,
+    sliding: Friction | None = None,
+    **options: Any,
 ) -> Survey:
     """Simulate a block under many motions.
 
@@ -254,6 +261,8 @@ def survey(
         Coefficient of friction for the detection of sliding.
     precision : float
         Relative precision of the motions, from 1e-6 to 0.1. Outcomes are also counted within this precision.
+    sliding : float or pair, optional
+        Coefficients of friction with which slip is simulated, as `friction` of `rocking.simulate`.
     **options : object
         As for `rocking.simulate`: model, chattering, duration, ...
 
@@ -291,7 +300,7 @@ def survey(
     responses = []
     with Progress("simulating", total=len(named_motions)) as bar:
         for motion in named_motions.values():
-            responses.append(simulate(block, motion, **options))
+            responses.append(simulate(block, motion, friction=sliding, **options))
             # The response caches the expensive results while the progress bar is shown.
             _create_row(responses[-1], precision)
             bar.advance()

@@ -86,6 +86,7 @@ class Blocks:
     gravity: float
     terms: dict[str, Floats]
     axes: dict[str, Floats] | None
+    radii: Floats | None  # m, of the gathered single blocks, NaN for frames; None: of the only body with p and alpha
 
     def __init__(
         self,
@@ -117,12 +118,19 @@ class Blocks:
             arrays["restitution"] = _compute_restitutions(arrays["p"], arrays["alpha"])
         self._fill(g, {name: np.array(values) for name, values in arrays.items()})
 
-    def _fill(self, gravity: float, arrays: Mapping[str, Floats], axes: dict[str, Floats] | None = None) -> Blocks:
+    def _fill(
+        self,
+        gravity: float,
+        arrays: Mapping[str, Floats],
+        axes: dict[str, Floats] | None = None,
+        radii: Floats | None = None,
+    ) -> Blocks:
         """Set all attributes from valid arrays of shape (n, 2), which become read-only."""
         columns = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
         for values in columns.values():
             values.flags.writeable = False
         self.__dict__.update({name: columns.pop(name) for name in _FIELDS}, gravity=gravity, terms=columns, axes=axes)
+        self.__dict__["radii"] = radii
         return self
 
     @classmethod
@@ -203,7 +211,8 @@ class Blocks:
             rows = [[(*side, *[*_TERMS.values()][len(side) - len(_FIELDS) :]) for side in sides] for sides in rows]
         table = np.array(rows).transpose(2, 0, 1)
         names = (*_FIELDS, *_TERMS)[: len(table)]
-        return cls.__new__(cls)._fill(gravities.pop(), dict(zip(names, table, strict=True)))
+        radii = np.array([body._list_radii() for body in bodies])
+        return cls.__new__(cls)._fill(gravities.pop(), dict(zip(names, table, strict=True)), radii=radii)
 
     @property
     def kind(self) -> str:
@@ -331,7 +340,8 @@ class Blocks:
             hint = "use blocks[0] for a single block"
             raise BlockError(f"select requires {requirement}, not {checks.short_repr(index)}; {hint}")
         arrays = {name: values[rows] for name, values in self._arrays().items()}
-        return Blocks.__new__(Blocks)._fill(self.gravity, arrays)
+        radii = None if self.radii is None else self.radii[rows]
+        return Blocks.__new__(Blocks)._fill(self.gravity, arrays, radii=radii)
 
     def with_p_scaled(self, factors: Floats) -> Blocks:
         """Return blocks of the same shapes with p multiplied by these factors.
@@ -341,7 +351,9 @@ class Blocks:
         """
         scale = factors[:, None]
         terms = {name: values * scale ** _EXPONENTS.get(name, 0) for name, values in self.terms.items()}
-        return Blocks(self.p * scale, self.alpha, self.restitution, gravity=self.gravity, **terms)
+        blocks = Blocks(self.p * scale, self.alpha, self.restitution, gravity=self.gravity, **terms)
+        blocks.__dict__["radii"] = None if self.radii is None else self.radii / scale**2
+        return blocks
 
 
 def resolve_p(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:

@@ -148,6 +148,9 @@ class RestrainedBlock(Rocking):
         rows = [(*row, *terms, float(self.is_one_sided)) for row, terms in zip(rows, self._terms, strict=True)]
         return rows[:1] * 2 if self.is_one_sided else rows
 
+    def _list_radii(self) -> list[float]:
+        return self.block._list_radii()
+
     @property
     def gravity(self) -> float:
         """Acceleration of gravity, m/s^2."""

@@ -175,6 +175,10 @@ class Block(Rocking):
         """Collect the parameters of both sides as stored in `Blocks`."""
         return [(side.p, side.alpha, side.restitution) for side in self.sides]
 
+    def _list_radii(self) -> list[float]:
+        """Return the distance of the centre of mass from each pivot, m; NaN for a frame, whose columns differ."""
+        return [math.nan if side.arm is not None else side.radius for side in self.sides]
+
     def _with_sides(self, sides: tuple[Side, Side]) -> Block:
         """Return the block with other sides."""
         return Block.__new__(Block)._fill(sides, self.gravity, self.description, self.mass)

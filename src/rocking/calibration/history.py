@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.block import Block
+from rocking.block.friction import Friction
 from rocking.calibration.space import (
     MAX_VALUES,
     NO_UNKNOWNS,
@@ -191,6 +192,7 @@ def calibrate_history(
     two_sided: bool = False,
     initial_rotation: float | None = None,
     seed: int = 0,
+    friction: Friction | None = None,
 ) -> HistoryCalibration:
     """Fit a block to a measured rotation history, free or forced.
 
@@ -213,6 +215,8 @@ def calibrate_history(
         Rotation of the held block at time 0, rad. By default fitted in a release test, and 0 under a motion.
     seed : optional
         As for `calibrate`.
+    friction : float or pair, optional
+        Known coefficient of friction, as for `simulate`; then all blocks are rectangles.
 
     Returns
     -------
@@ -259,7 +263,7 @@ def calibrate_history(
     if len(sample_times) < 2 * len(unknowns):
         counts = format_count(len(sample_times), "sample"), format_count(len(unknowns), "parameter")
         raise OptionError(f"{counts[0]} cannot determine {counts[1]}: provide more")
-    problem = _Problem(sample_times, measured, motion, model, known, tuple(unknowns))
+    problem = _Problem(sample_times, measured, motion, model, known, tuple(unknowns), friction)
     rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
     return _create_calibration(problem, _fit(problem, rng))
 
@@ -300,6 +304,7 @@ class _Problem:
     model: Model
     known: Mapping[str, float]
     unknowns: tuple[_Unknown, ...]
+    friction: Friction | None = None
 
     def count_samples(self, share: float) -> int:
         """Count the samples up to this share of the integral of |rotation|."""
@@ -326,7 +331,8 @@ class _Problem:
 
     def response(self, logs: Floats, end: float) -> Response:
         start = self.values(logs)["initial_rotation"]
-        return simulate(self.block(logs), self.motion, model=self.model, duration=end, initial_rotation=start)
+        options: dict[str, Any] = {"model": self.model, "duration": end, "friction": self.friction}
+        return simulate(self.block(logs), self.motion, initial_rotation=start, **options)
 
     def residuals(self, logs: Floats, count: int) -> Floats:
         """Compute measured minus simulated rotation of the first samples, with overturned blocks at pi/2."""

@@ -29,7 +29,8 @@ from rocking.cli.options import (
     MotionOptions,
     Names,
     RestrainedOptions,
-    SchemeOptions,
+    SlipOptions,
+    SlipSchemeOptions,
     UnscaledOptions,
     parse_labels,
     read_ensemble_arguments,
@@ -58,7 +59,7 @@ def spectrum(
     fractiles: str = "0.16,0.5,0.84",
     against: Abscissa = "p",
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SchemeOptions, MODEL] = SchemeOptions(),
+    model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
@@ -119,7 +120,7 @@ def map(
     kind: str | None = None,
     rtol: float = 1e-6,
     block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Map the outcomes of a pulse over its amplitude and frequency, with refined boundaries.
@@ -153,8 +154,8 @@ def map(
     with output.folder() as folder:
         slender_block = _create_slender_block(block)
         texts = {"amplitudes": amplitudes, "frequencies": frequencies}
-        axes = {name: read_array(text, name) for name, text in texts.items()}
-        result = overturning_map(slender_block, pulse, **axes, model=model.model, rtol=rtol, **parameters)
+        axes: dict[str, Any] = {name: read_array(text, name) for name, text in texts.items()}
+        result = overturning_map(slender_block, pulse, **axes, **model.arguments(), rtol=rtol, **parameters)
         _write_and_print(result, "map", None, folder=folder, as_json=output.as_json)
 
 
@@ -164,7 +165,7 @@ def ida(
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[RestrainedOptions, BLOCK] = RestrainedOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
@@ -183,7 +184,7 @@ def ida(
     with output.folder() as folder:
         loaded = motion.read_all(names)
         motions = [*loaded.motions.values()]
-        result = incremental_dynamic_analysis(body, motions, **measure.arguments(), model=model.model, rtol=rtol)
+        result = incremental_dynamic_analysis(body, motions, **measure.arguments(), **model.arguments(), rtol=rtol)
         _write_and_print(result, "ida", loaded, folder=folder, as_json=output.as_json)
 
 

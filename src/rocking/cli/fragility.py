@@ -26,7 +26,7 @@ from rocking.cli.options import (
     MeasureOptions,
     MotionOptions,
     Names,
-    SchemeOptions,
+    SlipSchemeOptions,
     parse_labels,
     parse_limit_states,
 )
@@ -61,7 +61,7 @@ def fragility(
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SchemeOptions, MODEL] = SchemeOptions(),
+    model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Fit the probability that a block overturns, or exceeds a rotation, against the intensity of the motions.

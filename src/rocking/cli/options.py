@@ -387,6 +387,42 @@ class SchemeOptions(ModelOptions):
         return {"model": self.model, "chattering": chattering_scheme(self.chattering)}
 
 
+_FRICTION_HELP: Final = (
+    "Coefficient of friction with which the block slips, or the static and the kinetic one, as 0.3,0.25. By default it "
+    "never slips."
+)
+
+
+def read_friction(text: str | None) -> dict[str, Any]:
+    """Return coefficients of friction as an argument, if any."""
+    if text is None:
+        return {}
+    values = read_array(text, "friction").tolist()
+    return {"friction": values[0] if len(values) == 1 else values}
+
+
+@dataclass(frozen=True)
+class SlipOptions(ModelOptions):
+    """Equation of motion and friction."""
+
+    friction: Annotated[str | None, Parameter(help=_FRICTION_HELP)] = None
+
+    def arguments(self) -> dict[str, Any]:
+        """Return model and friction as arguments."""
+        return {"model": self.model, **read_friction(self.friction)}
+
+
+@dataclass(frozen=True)
+class SlipSchemeOptions(SchemeOptions):
+    """Equation of motion, chattering scheme and friction."""
+
+    friction: Annotated[str | None, Parameter(help=_FRICTION_HELP)] = None
+
+    def arguments(self) -> dict[str, Any]:
+        """Return model, scheme and friction as arguments."""
+        return super().arguments() | read_friction(self.friction)
+
+
 @_with_inputs("duration", "initial_rotation", "initial_velocity")
 class StartOptions(InputOptions):
     """Start and end of a simulation."""

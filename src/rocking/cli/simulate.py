@@ -17,12 +17,13 @@ from rocking.cli.options import (
     RECORDS,
     BlockOptions,
     FileOptions,
-    ModelOptions,
     MotionOptions,
     Names,
     RestrainedOptions,
     SchemeOptions,
+    SlipOptions,
     StartOptions,
+    read_friction,
     read_records,
 )
 from rocking.cli.output import (
@@ -62,6 +63,12 @@ class _ResponseOptions(StartOptions):
     friction: Annotated[
         float | None, Parameter(help="Coefficient of friction, to report whether and when the block would slide.")
     ] = None
+    sliding: Annotated[
+        str | None,
+        Parameter(
+            help="Coefficient of friction with which slip is simulated, or the static and the kinetic one, as 0.3,0.25."
+        ),
+    ] = None
     precision: Annotated[
         float, Parameter(help="Relative precision of the record; 11 motions within it are also simulated.")
     ] = MOTION_PRECISION
@@ -98,19 +105,23 @@ def simulate(
     summary_options: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
     body = block.body()
     options: dict[str, Any] = {**model.arguments(), **start.read_values()}
+    slip = read_friction(start.sliding)
     for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
         raise OptionError("{} writes files; set their folder with {}", name, "out")
     with output.folder() as folder:
         loaded = motion.read_all(names)
         if loaded.is_single:
             ((record, base_motion),) = loaded.motions.items()
-            response = run_simulation(body, base_motion, **options)
+            response = run_simulation(body, base_motion, **options, **slip)
             result = _write_response(response, record, summary_options, folder, energy)
             text = response.summary(**summary_options)
         else:
             if energy and not each:
                 raise OptionError("{} draws single responses; with several records also use {}", "energy", "each")
-            results = replace(survey(body, loaded.motions, **summary_options, **options), skipped=loaded.skipped)
+            sliding = slip.get("friction")
+            results = replace(
+                survey(body, loaded.motions, sliding=sliding, **summary_options, **options), skipped=loaded.skipped
+            )
             if folder is not None:
                 results.to_csv(folder / "summary.csv")
                 results.to_json(folder / "summary.json")
@@ -147,7 +158,7 @@ def check(
     rules: str | None = None,
     block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compare rules of thumb with the simulated response of a block under records.
@@ -164,7 +175,7 @@ def check(
     rule_names = None if rules is None else [name.strip() for name in rules.split(",")]
     with output.folder() as folder:
         loaded = motion.read_all(names)
-        comparison = compare_rules(body, loaded.motions, rules=rule_names, model=model.model)
+        comparison = compare_rules(body, loaded.motions, rules=rule_names, **model.arguments())
         comparison = replace(comparison, skipped=loaded.skipped)
         result = comparison.to_dict()
         if folder is not None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.block.body import Bodies
+from rocking.block.friction import add_friction
 from rocking.block.single import ROTATION
 from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import Model
@@ -30,16 +31,18 @@ from rocking.motion.motion import Motion
 
 #: Fields of an outcome. ``unfinished``: the step budget was exceeded. ``stopped``: the duration ended while the body
 #: moved or the motion continued. In both cases all other fields are incomplete. ``leans``: restraints hold the body in
-#: a leaning position for ever. ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
+#: a leaning position for ever. ``lost_contact``: the ground no longer presses on it, where the simulation ends.
+#: ``largest_slip``, ``residual_slip``: displacement of the base relative to the ground, m.
+#: ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
 #: rested after its first uplift before the motion exceeded a threshold again. ``rests_by_rounding``: number of rests
 #: because time no longer advanced. Times of events that did not occur are 0.
 OUTCOME = np.dtype(
     [
-        ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("peak_rotation", "f8"),
-        ("residual_rotation", "f8"), ("peak_time", "f8"),
+        ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("lost_contact", "?"),
+        ("peak_rotation", "f8"), ("residual_rotation", "f8"), ("peak_time", "f8"),
         ("impacts", "i8"), ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("first_uplift", "f8"),
         ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("rests_by_rounding", "i8"),
-        ("duration", "f8"),
+        ("duration", "f8"), ("largest_slip", "f8"), ("residual_slip", "f8"),
     ]
 )  # fmt: skip
 
@@ -72,6 +75,8 @@ class Setup:
     duration: float | None = None
     #: Coordinate of all bodies at time 0 and its rate; None means zero, or the stop if zero is behind the stop.
     start: tuple[float | None, float] = (None, 0.0)
+    #: Static and kinetic coefficient of friction; None for bodies that never slip.
+    friction: tuple[float, float] | None = None
 
     def prepare(
         self,
@@ -87,6 +92,8 @@ class Setup:
         check_components(bodies, motion)
         settings = build_settings(bodies, self.model, self.chattering, self.duration, record=record)
         records = bodies.kernel_records(self.model, self.chattering.thresholds(bodies, motion, self.model, factor))
+        if self.friction is not None:
+            add_friction(records, bodies, self.model, self.friction)
         if ground is None:
             ground = prepare_ground(motion, bodies.gravity)._replace(factor=float(factor))
         states = state.new_states(len(bodies), 0)
@@ -200,6 +207,8 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
     factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(bodies)).copy()
     settings = build_settings(bodies, setup.model, setup.chattering, setup.duration, record=False)
     records = bodies.kernel_records(setup.model, _compute_thresholds(setup, bodies, task.motions, motion, factors))
+    if setup.friction is not None:
+        add_friction(records, bodies, setup.model, setup.friction)
     states = state.new_states(len(bodies), 0)
     set_start(states, records, bodies, *setup.start)
     complete = np.empty(len(bodies), dtype=bool)
@@ -216,9 +225,12 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
         states[members], complete[members] = batch.states, detect_complete_chattering(*batch)
     outcomes = _collect_outcomes(states, np.array([motion.end for motion in task.motions])[motion])
     outcomes["peak_rotation"] = compute_peaks(states, records, bodies.stops)
-    is_known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
+    is_known = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"] | outcomes["lost_contact"])
+    side = states["side"]
     stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
     outcomes["residual_rotation"] = np.where(is_known, stop + (1.0 - 2.0 * side) * states["leaning_rotation"], np.nan)
+    outcomes["largest_slip"] = bodies.gravity * states["largest_slip"]
+    outcomes["residual_slip"] = np.where(outcomes["unfinished"], np.nan, bodies.gravity * states["slip"])
     outcomes["complete_chattering"] = complete
     return outcomes
 
@@ -263,6 +275,7 @@ def _split_batch(batch: _Batch, steps: Floats, model: Model) -> Iterator[tuple[I
     width = step * np.sqrt(stiffness * weight)
     with_vertical = batch.grounds.stretches.shape[1] > 1
     in_lanes = (step > 0.0) & (width <= lanes.MAX_STEP) & ~(batch.records["restrained"] | batch.records["two_stops"])
+    in_lanes &= ~(batch.records["friction"] & with_vertical)
     width = np.where(in_lanes, width, 0.0)
     if model == "nonlinear" or with_vertical:  # otherwise one formula covers a sample
         substeps = np.ceil(width / (lanes.MAX_SUBSTEP if model == "nonlinear" else lanes.MAX_WEIGHTED_SUBSTEP))
@@ -323,7 +336,8 @@ def _collect_outcomes(states: Records, motion_end: Floats) -> NDArray[np.void]:
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     outcomes["leans"] = states["ending"] == state.Ending.LEANS
-    is_early = (states["side"] >= 0) | (states["end_time"] < motion_end)
+    outcomes["lost_contact"] = states["ending"] == state.Ending.LOST
+    is_early = (states["side"] >= 0) | (states["direction"] != 0) | (states["end_time"] < motion_end)
     # A body that remains balanced also has no outcome.
     is_undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))
     outcomes["stopped"] = is_undecided & is_early

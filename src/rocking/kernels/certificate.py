@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.kernels.arc import restoring_acceleration, side_sign, write_weight_series
+from rocking.kernels.arc import restoring_acceleration, side_sign, weight_at, write_weight_series
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import mean_factor, min_factor
 from rocking.kernels.ground import (
@@ -33,6 +33,7 @@ from rocking.kernels.ground import (
 )
 from rocking.kernels.remaining import ImpactSide, Pair, bound_restoring_error, estimate_remaining_time, refine_bracket
 from rocking.kernels.restraints import may_law_change_below
+from rocking.kernels.sliding import least_sticking_friction, slip_factor, slip_restoring, slip_stiffness
 from rocking.kernels.state import Record
 
 #: Window of the proof divided by the first estimate of the remaining time.
@@ -159,8 +160,11 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
     # rotation.
     if has_vertical(ground) and not height <= 2.0 * min(block.slenderness[0], block.slenderness[1]):
         return no_proof()
-    if (block.two_stops and height >= block.overturn_angle) or (
-        block.yielding and may_law_change_below(block, settings, state.plastic, height)
+    max_square = v * v * (1.0 + 2.0 * change / min_restoring) * (1.0 + 2.0 * change / min_restoring)
+    if (
+        (block.two_stops and height >= block.overturn_angle)
+        or (block.yielding and may_law_change_below(block, settings, state.plastic, height))
+        or (block.friction and not sticks_until_rest(block, settings, motion_bounds, height, max_square))
     ):
         return no_proof()
     write_local_series(ground, state.piece, state.offset, 1.0, set_zero(scratch.ground))
@@ -187,6 +191,129 @@ class MotionBounds(NamedTuple):
 
 
 @inlined
+def sticks_until_rest(block: Record, settings: Record, motion: MotionBounds, height: float, square: float) -> bool:
+    """Return whether no arc and no impact of a proven sequence slips (Eqs 7 and 10 of "Sliding"); False for NaN.
+
+    ``height`` and ``square`` bound all rotations and all squared speeds.
+    """
+    horizontal, vertical = motion
+    strength = euclidean_norm(max_weight_magnitude(vertical), max_magnitude(horizontal)) * (1.0 + ROUNDING)
+    mu = block.static_friction * (1.0 - ROUNDING)
+    for side in range(2):
+        ratio = block.arm[side] * block.stiffness[side]
+        # Change of the forces by a finite size of the arcs.
+        change = block.arm[side] * (2.0 * block.stiffness[side] * strength * height + square)
+        if not least_sticking_friction(block, side) <= mu:
+            return False
+        s, c = block.slenderness[side], 1.0
+        if settings.nonlinear:
+            s, c = block.sine[side], block.cosine[side]
+        for corner in range(4):  # both sides of the inequality are convex
+            push = side_sign(side) * (horizontal.low if corner < 2 else horizontal.high)
+            weight = 1.0 + (vertical.low if corner % 2 == 0 else vertical.high)
+            force = abs(push * (1.0 - ratio * c * c) - ratio * weight * s * c) + change
+            normal = weight * (1.0 - ratio * s * s) - ratio * push * s * c if settings.nonlinear else weight
+            if not force <= mu * (normal - change):
+                return False
+    return True
+
+
+#: While sliding: bounds on every rotation and speed until rest, divided by their first estimates.
+_MAX_HEIGHT_RATIO = 2.0
+_MAX_SLIDING_SPEED_RATIO = 1.25
+
+
+@shared
+def prove_slide(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
+    """Compute a bracket on the time at which a block that slips ceases to rock and slides; all NaN: no proof.
+
+    The restoring acceleration does not depend on the horizontal motion (Eq. 11 of "Sliding"), and an impact multiplies
+    the speed by Eq. 12, as long as the slip keeps its direction.
+    """
+    v, i = state.v, state.side
+    j = 1 - i
+    mu, direction = block.kinetic_friction, side_sign(i) * state.direction
+    g_i, g_j = slip_restoring(block, settings, i, direction), slip_restoring(block, settings, j, -direction)
+    e_i = max(0.0, slip_factor(block, i, block.restitution[i], state.direction))
+    e_j = max(0.0, slip_factor(block, j, block.restitution[j], state.direction))
+    weight = weight_at(ground, state.piece, state.offset)
+    if not (g_i > 0.0 and g_j > 0.0 and weight > 0.0 and e_i * e_j < 1.0):
+        return no_proof()
+    time = 2.0 * v * (1.0 / g_i + e_i / g_j) / (weight * (1.0 - e_i * e_j))
+    window = _WINDOW_RATIO * time
+    rounding = ROUNDING * (piece_start(ground, state.piece) + state.offset)
+    motion = bound_motion(ground, block, state, window + rounding, scratch)
+    max_height = _MAX_HEIGHT_RATIO * v * v / (min(g_i, g_j) * weight)
+    max_speed = _MAX_SLIDING_SPEED_RATIO * v
+    first = bound_sliding_side(block, settings, i, (direction, g_i), motion.vertical, (max_height, max_speed))
+    second = bound_sliding_side(block, settings, j, (-direction, g_j), motion.vertical, (max_height, max_speed))
+    lower, upper = bracket_geometrically(v, first, second, (e_i, e_j), (e_i, e_j))
+    min_restoring, change = min(first.min_restoring, second.min_restoring), max(first.change, second.change)
+    height = v * v * (1.0 + 2.0 * change / min_restoring) / min_restoring
+    max_restoring = max(first.max_restoring, second.max_restoring)
+    if not (
+        upper <= window
+        and height <= max_height
+        and bound_impact_speed(v, first, second, e_i) <= max_speed
+        and max_speed * max_speed * max(first.stiffness, second.stiffness) <= max_restoring * max_restoring
+    ):
+        return no_proof()
+    # Change of the slip velocity by arcs and impacts. The sum of all speeds at the starts of arcs is at most
+    # max_restoring upper/(2 (1 - 1/3)), the sum of those before and after impacts at most 2.25 times as large.
+    divisor = 1.0
+    if settings.nonlinear:
+        divisor = min(
+            sliding_divisor(block, i, direction, max_height), sliding_divisor(block, j, -direction, max_height)
+        )
+    arm, base = max(block.arm[0], block.arm[1]), max(block.pivot_distance[0], block.pivot_distance[1])
+    normal = (1.0 + motion.vertical.high) / min(1.0, divisor)
+    along_arcs = mu * normal + max_magnitude(motion.horizontal) + arm * (3.0 * max_restoring + max_speed * max_speed)
+    at_impacts = 2.0 * (mu * base + block.height) * max_restoring
+    if not upper * (along_arcs + at_impacts) < abs(state.slip_rate):
+        return no_proof()
+    return Proof(lower, upper, min(max(time, lower), upper), height)
+
+
+@inlined
+def sliding_divisor(block: Record, side: int, direction: float, height: float) -> float:
+    """Return a lower bound on the divisor of the normal force on a side up to a height."""
+    lever = block.sine[side] - direction * block.kinetic_friction * block.cosine[side]
+    slope = block.inertia_ratio[side] * euclidean_norm(1.0, block.kinetic_friction)
+    return 1.0 + block.inertia_ratio[side] * block.sine[side] * lever - slope * height
+
+
+@inlined
+def bound_sliding_side(
+    block: Record, settings: Record, side: int, slip: tuple[float, float], vertical: Window, limits: tuple[float, float]
+) -> Bounds:
+    """Compute bounds on a side while slipping; NaN without a proof.
+
+    ``slip``: direction in the frame of the side and restoring acceleration; ``limits``: on rotations and speeds. The
+    acceleration is a function of u times W - R cos(psi) u'^2. The latter part returns the speed of an arc unchanged,
+    and enlarges the contribution of a varying weight by less than a fifth.
+    """
+    (direction, g), (height, speed) = slip, limits
+    low, high = 1.0 + vertical.low, 1.0 + vertical.high
+    stiffness, inertia = slip_stiffness(block, side), 0.0
+    if settings.nonlinear:
+        norm = euclidean_norm(1.0, block.kinetic_friction)
+        divisor = sliding_divisor(block, side, direction, height)
+        stiffness *= norm * (divisor + block.inertia_ratio[side] * norm) / (divisor * divisor)
+        inertia = block.arm[side] * speed * speed
+        if not (divisor > 0.0 and 2.0 * (g + stiffness * height) * block.arm[side] * height <= 0.1):
+            return Bounds(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
+    gain = 1.2 * (g + stiffness * height) * (1.0 + ROUNDING)
+    return Bounds(
+        stiffness * high * (1.0 + ROUNDING),
+        g * (low - inertia) * (1.0 - ROUNDING),
+        g * high * (1.0 + ROUNDING),
+        gain * (high - low),
+        gain * vertical.slope,
+        gain * vertical.jumps,
+    )
+
+
+@inlined
 def bound_motion(ground: Ground, block: Record, state: Record, window: float, scratch: Record) -> MotionBounds:
     """Bound the motion from a state on, including its error; NaN beyond a threshold."""
     vertical = Window(0.0, 0.0, 0.0, 0.0)
@@ -199,6 +326,8 @@ def bound_motion(ground: Ground, block: Record, state: Record, window: float, sc
         -block.threshold[0] * weight - block.restraint_threshold[0],
         block.threshold[1] * weight + block.restraint_threshold[1],
     )
+    if state.direction != 0:
+        limits = (-np.inf, np.inf)
     if block.two_stops:  # the other stop is out of reach
         limits = (limits[0], np.inf) if state.side == 0 else (-np.inf, limits[1])
     horizontal = bound_window(ground, state.piece, state.offset, window, limits, scratch.ground)

@@ -11,7 +11,7 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.kernels.arc import evaluate_series
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.ground import shift_polynomial
+from rocking.kernels.ground import ROUNDING, shift_polynomial
 from rocking.kernels.state import Record, StepOutcome
 
 _EPSILON = 2.0**-53
@@ -89,6 +89,53 @@ def evaluate_deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float
         slope = slope * t + f
         f = f * t + c[k]
     return f, slope
+
+
+@shared
+def find_first_passing(d: Floats, degree: int, h: float) -> float:
+    """Find the first time in [0, h) from which a polynomial is negative beyond rounding; inf if never.
+
+    It is not negative before. A root without a change of sign is divided out, and the search continues. Changes ``d``.
+    """
+    rounding = bound_rounding(d, degree, h)
+    start = 0.0
+    for _ in range(degree + 1):
+        lead = leading_power(d, degree, h - start, rounding)
+        if lead > degree:
+            return np.inf
+        if d[lead] < 0.0:
+            return start
+        time = find_first_root(d, lead, degree, h - start)
+        if not start + time < h:
+            return np.inf
+        shift_polynomial(d, degree, time)
+        start += time
+        if d[1] < 0.0 and d[1] * d[1] <= 2.0 * d[2] * rounding:  # a minimum below zero by less than rounding
+            step = -2.0 * d[1] / d[2]
+            shift_polynomial(d, degree, step)
+            start += step
+        d[0] = 0.0
+    return np.inf
+
+
+@inlined
+def bound_rounding(d: Floats, degree: int, h: float) -> float:
+    """Bound the rounding of a polynomial within h."""
+    rounding = 0.0
+    for k in range(degree, -1, -1):
+        rounding = rounding * h + ROUNDING * abs(d[k])
+    return rounding
+
+
+@inlined
+def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
+    """Return the lowest power of a polynomial that is not negligible within h; above ``degree`` if there is none."""
+    lead = 0
+    power = 1.0
+    while lead <= degree and abs(d[lead]) * power <= rounding:
+        lead += 1
+        power *= h
+    return lead
 
 
 #: Relative difference of maxima that rounding may cause.

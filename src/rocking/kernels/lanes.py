@@ -16,8 +16,16 @@ import numpy as np
 from rocking.core.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import raise_peak
-from rocking.kernels.ground import FIRST, LENGTH, START, Grounds, select_ground
-from rocking.kernels.lane_steps import GROUP, STEP_CONSTANTS, WIDTH, step_linear, step_nonlinear, step_weighted
+from rocking.kernels.ground import FIRST, LENGTH, ROUNDING, START, Grounds, select_ground
+from rocking.kernels.lane_steps import (
+    GROUP,
+    STEP_CONSTANTS,
+    WIDTH,
+    push_line,
+    step_linear,
+    step_nonlinear,
+    step_weighted,
+)
 from rocking.kernels.march import march
 from rocking.kernels.state import TO_THE_END, Ending, Record, Records, expose_fields, new_record, new_records, new_table
 
@@ -103,14 +111,14 @@ def stumpff(k: int, q: Any) -> Floats:
 def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
     """Write the state and constants of a simulation into a lane."""
     group, state, steps, motion = pool.groups[0], pool.states[index], pool.steps[index], pool.motions[index]
-    side, first = state.side, pool.grounds.first_pieces[motion]
+    side, first, block = state.side, pool.grounds.first_pieces[motion], pool.blocks[index]
     group.simulation[lane] = index
     group.row[lane] = first + state.piece
     group.end_row[lane] = first + pool.ends[motion]
     group.increment[lane] = 1
     group.h[lane] = pool.grounds.pieces[first, LENGTH]
     group.factor[lane] = pool.factors[index]
-    group.overturn_angle[lane] = pool.blocks[index].overturn_angle
+    group.overturn_angle[lane] = block.overturn_angle
     group.u[lane] = state.u
     group.v[lane] = state.v
     group.peak[lane] = state.peak
@@ -121,8 +129,12 @@ def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
     group.second[lane] = steps.second[side]
     group.third[lane] = steps.third[side]
     group.curve[lane] = steps.curve[side]
+    if block.friction:
+        group.sticking_push[lane] = block.sticking_push[side] if state.direction == 0 else -np.inf
+        group.sticking_slope[lane] = block.sticking_slope[side]
+        group.twice_slenderness[lane] = 2.0 * block.slenderness[side]
     if settings.nonlinear:
-        psi = pool.blocks[index].slenderness[side] - state.u
+        psi = block.slenderness[side] - state.u
         group.sine[lane] = math.sin(psi)
         group.cosine[lane] = math.cos(psi)
 
@@ -154,7 +166,7 @@ def clear_lane(pool: Pool, lane: int) -> None:
     group.end_row[lane] = 1
     group.u[lane] = EMPTY_ROTATION
     group.v[lane] = group.sine[lane] = group.cosine[lane] = group.factor[lane] = 0.0
-    group.peak[lane] = group.overturn_angle[lane] = np.inf
+    group.peak[lane] = group.overturn_angle[lane] = group.sticking_push[lane] = np.inf
     group.h[lane] = pool.grounds.pieces[0, LENGTH]
     group.stiffness[lane] = group.pull[lane] = group.push[lane] = group.curve[lane] = 0.0
     group.first[lane] = group.second[lane] = group.third[lane] = 0.0
@@ -175,6 +187,8 @@ def run_lanes(settings: Record, scratch: Record, pool: Pool, substeps: int) -> N
     group = pool.groups[0]
     while pool.counts.active > 0:
         load_samples(pool)
+        if pool.blocks[0].friction:
+            mark_slips(group, pool.grounds.unit, substeps)
         events = step_group(settings, pool, substeps)
         lane = 0
         while events > 0:
@@ -207,6 +221,27 @@ def load_samples(pool: Pool) -> None:
             row = group.row[lane]
             group.lift_start[lane] = pieces[row, FIRST + 2]
             group.lift_slope[lane] = pieces[row, FIRST + 3]
+
+
+@inlined
+def mark_slips(group: Record, unit: float, substeps: int) -> None:
+    """Cause an event in each lane whose block may slip during a sample: without overturning angle until its march.
+
+    See `sliding.may_slip`. The weight is constant; without substeps the model is linear.
+    """
+    for lane in range(WIDTH):
+        start, slope = push_line(group, lane, unit)
+        h = group.length[lane]
+        largest = max(abs(start), abs(start + slope * h)) * (1.0 + ROUNDING)
+        speed = abs(group.v[lane])
+        if substeps > 0:
+            speed += -2.0 * group.stiffness[lane] * (substeps * substeps) / h * (1.0 + largest)
+        else:
+            speed += group.stiffness[lane] * h * (group.twice_slenderness[lane] + largest)
+        sticks = largest <= group.sticking_push[lane] - group.sticking_slope[lane] * (speed * speed)
+        sticks &= max(group.peak[lane], group.u[lane] + speed * h) <= group.twice_slenderness[lane]
+        if not sticks and group.simulation[lane] >= 0:
+            group.overturn_angle[lane] = -np.inf
 
 
 @inlined

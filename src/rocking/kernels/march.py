@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration
+from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign, weight_at
 from rocking.kernels.certificate import no_proof
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import StepEnd, advance_to_event, apply_impact, find_first_root, raise_peak
@@ -17,6 +17,7 @@ from rocking.kernels.rest import (
     bound_rest,
     count_impact,
     decide_rest,
+    present_restoring,
     state_time,
     store_proof,
 )
@@ -28,6 +29,19 @@ from rocking.kernels.restraints import (
     find_leaning_rotation,
 )
 from rocking.kernels.short_arc import short_step, undecided_step
+from rocking.kernels.sliding import (
+    expand_slide,
+    expand_slip,
+    find_slide_end,
+    find_slip,
+    find_slip_end,
+    may_slip,
+    move_slip,
+    settle_slip,
+    slides_flat,
+    slip_after_sequence,
+    strike_with_friction,
+)
 from rocking.kernels.state import (
     AT_REST,
     Ending,
@@ -51,6 +65,9 @@ _TOUCH = 2.0**-46
 
 #: Distance, divided likewise, at which the rounding of the input may decide on an impact.
 _NEAR_TIE = 2.0**-36
+
+#: Fraction of a step for which a block sticks after its forces have only touched the cone of friction.
+_AFTER_TOUCH = 1e-3
 
 
 @kernel
@@ -87,10 +104,13 @@ def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Re
 def march_step(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> Any:
     """Advance a block to its next uplift or, along an arc, to its first event."""
     write_node(ground, settings, table, state)
+    if state.side < 0 and state.direction != 0:
+        return slide(ground, block, settings, table, scratch, state)
     if state.side < 0:
         return rest_until_uplift(ground, block, settings, table, scratch, state)
     simple = is_piecewise_linear(ground) and not (has_vertical(ground) or settings.nonlinear)
-    if state.proven_impacts > 0 and state.u == 0.0 and simple and not (block.restrained or block.variable_restitution):
+    is_proven = state.proven_impacts > 0 and state.u == 0.0 and state.direction == 0
+    if is_proven and simple and not (block.restrained or block.variable_restitution):
         apply_proven_impacts(ground, block, settings, table, state, time_to_boundary(ground, settings, state))
     outcome = step_along_arc(ground, block, settings, scratch, state)
     if outcome == StepOutcome.IMPACT or (outcome == StepOutcome.OVERTURN and block.two_stops):
@@ -109,6 +129,11 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
     if outcome == StepOutcome.LEANS:
         state.end_time = state_time(ground, state)
         return Ending.LEANS
+    if outcome == StepOutcome.LOST:
+        return lose_contact(ground, settings, table, state)
+    if outcome == StepOutcome.SLIPS or outcome == StepOutcome.STICKS:
+        write_slip_event(ground, settings, table, state)
+        return Ending.RUNNING
     return Ending.BALANCED if outcome == StepOutcome.BALANCED else Ending.RUNNING
 
 
@@ -126,8 +151,16 @@ def rest_until_uplift(
     state.piece = uplift.piece
     state.offset = uplift.offset
     state.side = uplift.side
-    state.continuous_uplift = not uplift.jump
     state.u = state.v = 0.0
+    if block.friction:
+        if weight_at(ground, state.piece, state.offset) <= 0.0:
+            return lose_contact(ground, settings, table, state)
+        if block.static_friction <= block.threshold[state.side]:
+            state.time_at_rest += state_time(ground, state) - state.last_rest_time
+            start_slip(block, state, 1 - 2 * state.side)
+            write_slip_event(ground, settings, table, state)
+            return Ending.RUNNING
+    state.continuous_uplift = not uplift.jump
     state.last_uplift_time = state.last_impact_time = state_time(ground, state)
     state.certificate_speed = np.inf
     state.time_at_rest += state.last_uplift_time - state.last_rest_time
@@ -151,11 +184,15 @@ def step_along_arc(ground: Ground, block: Record, settings: Record, scratch: Rec
     h_max = time_to_boundary(ground, settings, state)
     if h_max <= 0.0:
         return StepOutcome.STOPPED
+    if state.direction != 0:
+        return slip_along_arc(ground, block, settings, scratch, state, h_max)
     end = undecided_step()
     if not state.continuous_uplift:
         end = short_step(ground, block, settings, state, h_max)
     if end.outcome == StepOutcome.UNDECIDED:
         end = full_step(ground, block, settings, scratch, state, h_max)
+    if block.friction and may_slip(ground, block, settings, scratch, state, end):
+        return step_to_slip(ground, block, settings, scratch, state, end, h_max)
     if state.v < 0.0 <= end.v and end.outcome == StepOutcome.STEP:
         state.rounding_decisions += nearly_touches(ground, block, settings, scratch, state, end.time)
     return finish_step(ground, settings, state, end, h_max)
@@ -178,6 +215,114 @@ def full_step(ground: Ground, block: Record, settings: Record, scratch: Record, 
     if is_balanced and state.piece == last_piece(ground) and settings.no_end_time:
         return StepEnd(StepOutcome.BALANCED, 0.0, state.u, 0.0, 0.0, 0.0)
     return advance_to_event(state, scratch, order, h, block.overturn_angle)
+
+
+@shared
+def step_to_slip(
+    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, end: StepEnd, h_max: float
+) -> int:
+    """Take a step that may leave the cone of friction; without that it ends at ``end``, which ignores friction."""
+    order, h, time, direction = find_slip(ground, block, settings, scratch, state, end.time)
+    if direction == 0:
+        if h < end.time:
+            end = advance_to_event(state, scratch, order, h, block.overturn_angle)
+        return finish_step(ground, settings, state, end, h_max)
+    if time > 0.0:
+        end = advance_to_event(state, scratch, order, time, block.overturn_angle)
+        outcome = finish_step(ground, settings, state, end, h_max)
+        if outcome != StepOutcome.STEP:
+            return outcome
+    start_slip(block, state, direction)
+    return StepOutcome.SLIPS
+
+
+@inlined
+def start_slip(block: Record, state: Record, direction: int) -> None:
+    """Start a slip from zero velocity; a block on both pivots slides if it does not tip."""
+    state.direction = direction
+    state.slip_rate = 0.0
+    if state.u == 0.0 and state.v == 0.0 and slides_flat(block, state.side):
+        state.side = AT_REST
+
+
+@shared
+def slip_along_arc(
+    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
+) -> int:
+    """Take a step of slide-rock, at most to its first event, and return its `StepOutcome`."""
+    order, h = expand_slip(ground, block, settings, scratch, state, h_max)
+    sign = side_sign(state.side)
+    stick, lost = find_slip_end(scratch, order, h, sign * state.direction)
+    if lost == 0.0:
+        return StepOutcome.LOST
+    if stick == 0.0 and state.slip_rate == 0.0:  # the cone was only touched: a short step without slip
+        state.direction = 0
+        order, h, _ = expand_arc(ground, block, settings, scratch, state, _AFTER_TOUCH * h)
+        return finish_step(
+            ground, settings, state, advance_to_event(state, scratch, order, h, block.overturn_angle), h_max
+        )
+    if stick > 0.0:
+        end = advance_to_event(state, scratch, order, min(h, min(stick, lost)), block.overturn_angle)
+        move_slip(scratch, state, order - 1, sign, end.time)
+        outcome = finish_step(ground, settings, state, end, h_max)
+        if outcome != StepOutcome.STEP or end.time < min(stick, lost):
+            return outcome
+        if lost <= stick:
+            return StepOutcome.LOST
+    state.direction = 0
+    state.slip_rate = 0.0
+    return StepOutcome.STICKS
+
+
+@inlined
+def slide(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
+    """Take a step of a block that slides on both pivots."""
+    if weight_at(ground, state.piece, state.offset) <= 0.0:
+        return lose_contact(ground, settings, table, state)
+    h_max = time_to_boundary(ground, settings, state)
+    if h_max <= 0.0:
+        state.end_time = settings.stop
+        return Ending.DONE
+    degree = expand_slide(ground, block, scratch, state)
+    h, stick, lost = find_slide_end(ground, block, scratch, state, degree, h_max)
+    t = min(h, min(stick, lost))
+    move_slip(scratch, state, degree, 1.0, t)
+    outcome = finish_step(ground, settings, state, StepEnd(StepOutcome.STEP, t, 0.0, 0.0, 0.0, 0.0), h_max)
+    if outcome == StepOutcome.STOPPED:
+        state.end_time = settings.stop
+        write_node(ground, settings, table, state)
+        return Ending.DONE
+    if stick <= min(h, lost):
+        state.direction = 0
+        state.slip_rate = 0.0
+        count_rest(settings, table, state, state_time(ground, state))
+    return lose_contact(ground, settings, table, state) if lost < min(h, stick) else Ending.RUNNING
+
+
+@inlined
+def lose_contact(ground: Ground, settings: Record, table: Records, state: Record) -> int:
+    """End a march because the ground no longer presses on the block."""
+    state.end_time = state_time(ground, state)
+    write_node(ground, settings, table, state)
+    write_event(settings, table, state, state.end_time, EventKind.LOST)
+    return Ending.LOST
+
+
+@inlined
+def write_slip_event(ground: Ground, settings: Record, table: Records, state: Record) -> None:
+    """Write the start or end of a slip."""
+    kind = EventKind.STICK if state.direction == 0 else (EventKind.SLIDE if state.side < 0 else EventKind.SLIDE_ROCK)
+    write_event(settings, table, state, state_time(ground, state), kind)
+
+
+@inlined
+def count_rest(settings: Record, table: Records, state: Record, time: float) -> None:
+    """Count and write a rest."""
+    state.last_rest_time = time
+    if state.rests == 0:
+        state.first_rest = time
+    state.rests += 1
+    write_event(settings, table, state, time, EventKind.REST)
 
 
 @shared
@@ -232,6 +377,11 @@ def process_impact(
             return Ending.RUNNING
     time = state_time(ground, state)
     speed = apply_impact(block, state)
+    if block.friction:
+        slipped = state.direction
+        strike_with_friction(block, state, 1 - state.side, speed)
+        if (slipped == 0) != (state.direction == 0):
+            write_slip_event(ground, settings, table, state)
     write_impact(settings, table, state, time, speed)
     count_impact(state)
     proof = no_proof()
@@ -242,7 +392,7 @@ def process_impact(
     state.last_impact_time = time
     if math.isnan(rest.time):
         return Ending.RUNNING
-    return finish_sequence(ground, block, settings, table, state, rest)
+    return finish_sequence(ground, block, settings, table, scratch, state, rest)
 
 
 @inlined
@@ -270,7 +420,9 @@ def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Rec
 
 
 @inlined
-def finish_sequence(ground: Ground, block: Record, settings: Record, table: Records, state: Record, rest: Rest) -> int:
+def finish_sequence(
+    ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record, rest: Rest
+) -> int:
     """Finish a sequence of impacts; DONE if the march stops before the block is at rest."""
     time = state_time(ground, state)
     state.rests_by_rounding += rest.by_rounding
@@ -283,16 +435,45 @@ def finish_sequence(ground: Ground, block: Record, settings: Record, table: Reco
     if time + rest.time >= settings.stop:
         state.end_time = settings.stop
         return Ending.DONE
+    if state.direction != 0:
+        finish_while_sliding(ground, block, settings, table, scratch, state, rest.time)
+        return Ending.RUNNING
     state.side = resting_side(block, state.side)
     state.u = state.v = 0.0
-    state.last_rest_time = time + rest.time
-    if state.rests == 0:
-        state.first_rest = state.last_rest_time
-    state.rests += 1
-    write_event(settings, table, state, state.last_rest_time, EventKind.REST)
+    count_rest(settings, table, state, time + rest.time)
     state.offset += rest.time
     normalize_offset(ground, state)
     return Ending.RUNNING
+
+
+@shared
+def finish_while_sliding(
+    ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record, duration: float
+) -> None:
+    """Move a block to the end of a sequence of impacts after which it slides."""
+    i = state.side
+    g, other_g = (
+        present_restoring(ground, block, settings, state, i),
+        present_restoring(ground, block, settings, state, 1 - i),
+    )
+    drift, shift = slip_after_sequence(block, settings, state, g, other_g)
+    state.slip_rate += drift
+    state.u = state.v = 0.0
+    while duration > 0.0:
+        degree = expand_slide(ground, block, scratch, state)
+        t = min(duration, piece_length(ground, state.piece) - state.offset)
+        move_slip(scratch, state, degree, 1.0, t)
+        duration -= t
+        state.offset += t
+        if duration > 0.0:
+            state.piece += 1
+            state.offset = 0.0
+    normalize_offset(ground, state)
+    state.slip += shift
+    state.side = AT_REST
+    settle_slip(block, state)
+    if state.side < 0:
+        write_slip_event(ground, settings, table, state)
 
 
 @inlined

@@ -5,12 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.kernels.arc import restoring_acceleration, side_sign
-from rocking.kernels.certificate import Proof, prove_rest
+from rocking.kernels.arc import restoring_acceleration, side_sign, weight_at
+from rocking.kernels.certificate import Proof, prove_rest, prove_slide
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import is_factor_random, mean_factor
 from rocking.kernels.ground import Ground, coefficient, piece_length, piece_start
 from rocking.kernels.remaining import THIRD, Pair
+from rocking.kernels.sliding import slip_factor, slip_restoring
 from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRule, write_impact, write_node
 
 ULP = 2.0**-52
@@ -61,7 +62,7 @@ def store_proof(ground: Ground, block: Record, settings: Record, state: Record, 
         state.proven_impacts = 1
         state.sequence_start = state_time(ground, state)
     excess = (proof.upper - proof.lower) / settings.tolerance
-    if block.variable_restitution:
+    if block.variable_restitution or state.direction != 0:
         # The width is proportional to the square of the speed, or to the speed if the factor is drawn.
         ratio = 1.0 / excess if is_factor_random(block) else math.sqrt(1.0 / excess)
     else:
@@ -92,7 +93,10 @@ def time_to_last_piece(ground: Ground, state: Record, time: float) -> float:
 @shared
 def bound_rest(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
     """Compute proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
-    lower, upper, time, height = prove_rest(ground, block, settings, scratch, state)
+    if state.direction == 0:
+        lower, upper, time, height = prove_rest(ground, block, settings, scratch, state)
+    else:
+        lower, upper, time, height = prove_slide(ground, block, settings, scratch, state)
     rounding = rounding_allowance(state_time(ground, state), upper, state)
     return Proof(lower - rounding, upper + rounding, time, height)
 
@@ -117,7 +121,7 @@ def decide_rest(ground: Ground, block: Record, settings: Record, state: Record, 
         if proof.upper - proof.lower <= max_width and proof.height <= state.peak:
             return Rest(proof.lower, proof.upper, proof.time, False)
     elif settings.rest_rule == RestRule.BYPASS:
-        remaining = geometric_rest_time(ground, block, state)
+        remaining = geometric_rest_time(ground, block, settings, state)
         if state.v <= block.rest_limit[state.side] and remaining >= 0.0:
             return Rest(np.nan, np.nan, remaining, False)
     else:
@@ -127,32 +131,45 @@ def decide_rest(ground: Ground, block: Record, settings: Record, state: Record, 
         is_late = settings.rest_rule == RestRule.TIME and time - state.last_uplift_time >= limit
         if is_slow or is_frequent or is_late:
             return Rest(np.nan, np.nan, 0.0, False)
-    by_rounding = is_within_time_rounding(ground, block, state)
+    by_rounding = is_within_time_rounding(ground, block, settings, state)
     return Rest(np.nan, np.nan, 0.0 if by_rounding or state.v == 0.0 else np.nan, by_rounding)
 
 
 @inlined
-def geometric_rest_time(ground: Ground, block: Record, state: Record) -> float:
+def geometric_rest_time(ground: Ground, block: Record, settings: Record, state: Record) -> float:
     """Compute the time to rest after an impact under constant accelerations, or NaN if one does not press down.
 
     Sum of the paper's Eq. 75 without remainder: arcs of 2 v/g, with speeds reduced by a factor at each impact.
     """
     i, j = state.side, block.next_side[state.side]
-    g_i = restoring_acceleration(ground, block, i, state.piece, state.offset)
-    g_j = restoring_acceleration(ground, block, j, state.piece, state.offset)
+    g_i, g_j = (
+        present_restoring(ground, block, settings, state, i),
+        present_restoring(ground, block, settings, state, j),
+    )
     e_i, e_j = mean_factor(block, i, state.v), mean_factor(block, j, state.v)
+    if state.direction != 0:
+        e_i, e_j = slip_factor(block, i, e_i, state.direction), slip_factor(block, j, e_j, state.direction)
     if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0):
         return np.nan
     return 2.0 * state.v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
 
 
 @inlined
-def is_within_time_rounding(ground: Ground, block: Record, state: Record) -> bool:
+def present_restoring(ground: Ground, block: Record, settings: Record, state: Record, side: int) -> float:
+    """Compute the restoring acceleration of a side at zero rotation for the present slip, if any."""
+    if state.direction == 0:
+        return restoring_acceleration(ground, block, side, state.piece, state.offset)
+    weight = weight_at(ground, state.piece, state.offset)
+    return weight * slip_restoring(block, settings, side, side_sign(side) * state.direction)
+
+
+@inlined
+def is_within_time_rounding(ground: Ground, block: Record, settings: Record, state: Record) -> bool:
     """Return whether time hardly advanced since the last impact and will not until the next."""
     time = state_time(ground, state)
     max_stiffness = max(abs(block.stiffness[0]), abs(block.stiffness[1]))
     resolution = ULP * (time + (1.0 / math.sqrt(max_stiffness) if max_stiffness > 0.0 else 0.0))
-    acceleration = restoring_acceleration(ground, block, state.side, state.piece, state.offset)
+    acceleration = present_restoring(ground, block, settings, state, state.side)
     return bool(time - state.last_impact_time <= resolution and 2.0 * state.v <= resolution * acceleration)
 
 

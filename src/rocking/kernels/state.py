@@ -41,6 +41,10 @@ class StepOutcome(IntEnum):
     UNDECIDED = 5
     #: The body leans forever after the motion, held by restraints.
     LEANS = 6
+    #: The foot starts or ceases to slip; the ground no longer presses on it.
+    SLIPS = 7
+    STICKS = 8
+    LOST = 9
 
 
 class TendonLaw(IntEnum):
@@ -57,6 +61,12 @@ class EventKind(IntEnum):
     UPLIFT = 0
     REST = 1
     OVERTURN = 2
+    #: Slip on both pivots, end of a slip on one pivot, and slip on one pivot.
+    SLIDE = 3
+    STICK = 4
+    SLIDE_ROCK = 5
+    #: Contact lost.
+    LOST = 6
 
 
 class RestRule(IntEnum):
@@ -86,6 +96,8 @@ class Ending(IntEnum):
     UNFINISHED = 6
     #: The body leans forever, held by restraints.
     LEANS = 7
+    #: The body loses contact with the ground.
+    LOST = 8
 
 
 def _define_record(**fields: Any) -> np.dtype[np.void]:
@@ -134,6 +146,15 @@ BLOCK = _define_record(
     seed="i8",  # seed of the draws; -1 if the restitution decreases with the speed
     min_restitution=_SIDES,  # smallest restitution
     restitution_slope=_SIDES,  # decrease of the restitution per speed, s/rad
+    friction="?",  # whether the body may slip
+    static_friction="f8",  # coefficient of friction without slip
+    kinetic_friction="f8",  # coefficient of friction while slipping
+    arm=_SIDES,  # distance of the centre of mass from the pivot divided by g, s^2; in the linear model its height
+    inertia_ratio=_SIDES,  # square of that distance divided by the square of the radius of gyration
+    pivot_distance=_SIDES,  # horizontal distance of the centre of mass from the pivot divided by g, s^2
+    height="f8",  # height of the centre of mass divided by g, s^2
+    sticking_push=_SIDES,  # push below which a body sticks up to twice its slenderness, without speed
+    sticking_slope=_SIDES,  # decrease of that push per square of the speed, s^2
 )
 
 #: Settings of the computation.
@@ -180,10 +201,16 @@ STATE = _define_record(
     law="i8",  # `TendonLaw` of a tendon that yields
     plastic="f8",  # plastic elongation of the tendon, m
     leaning_rotation="f8",  # rotation about which the body leans at the end
+    direction="i8",  # sign of the velocity of the foot; 0 if it sticks
+    slip="f8",  # displacement of the foot relative to the ground divided by g, s^2
+    slip_rate="f8",  # its rate, s
+    largest_slip="f8",  # largest absolute displacement so far
 )
 
 #: Step of a response: state at its start (see `STATE`) and time, for `expand_arc`.
-NODE_ROW = _define_record(time="f8", piece="i8", offset="f8", side="i4", law="i4", u="f8", v="f8")
+NODE_ROW = _define_record(
+    time="f8", piece="i8", offset="f8", side="i4", law="i4", u="f8", v="f8", slip="f8", slip_rate="f8", direction="i8"
+)
 
 #: Impact: time, side entered (+1 or -1), speeds before and after.
 IMPACT_ROW = _define_record(time="f8", side="i8", speed_before="f8", speed_after="f8")
@@ -208,6 +235,12 @@ SCRATCH = _define_record(
     other=_SERIES,  # space for another series
     half_sine=_SERIES,  # sin(u/2)
     half_cosine=_SERIES,  # cos(u/2)
+    slip=_SERIES,  # velocity of the foot, or the horizontal force without slip, in the frame of the side
+    normal=_SERIES,  # normal force
+    lift=_SERIES,  # normal force times divisor
+    squares=_SERIES,  # square of u'
+    lever=_SERIES,  # b of `sliding`
+    divisor=_SERIES,  # 1 + (R^2/k^2) sin(alpha - u) b
 )
 
 #: Scratch space of a variation: series of the stiffness, the forcing and the variation itself.
@@ -245,7 +278,7 @@ def new_states(count: int, budget: int) -> Records:
 def state_at_node(node: Record, plastic: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
     """Return the state of a march that starts at a node, with the plastic elongation of a tendon there."""
     state = new_states(1, budget)[0]
-    for name in ("piece", "offset", "side", "u", "v", "law"):
+    for name in ("piece", "offset", "side", "u", "v", "law", "slip", "slip_rate", "direction"):
         state[name] = node[name]
     state["peak"], state["plastic"] = node["u"], plastic
     return state
@@ -311,6 +344,9 @@ def write_node(ground: Ground, settings: Record, table: Records, state: Record) 
     row.u = state.u
     row.v = state.v
     row.law = state.law
+    row.slip = state.slip
+    row.slip_rate = state.slip_rate
+    row.direction = state.direction
     state.nodes += 1
 
 

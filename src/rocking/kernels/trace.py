@@ -25,6 +25,7 @@ from rocking.kernels.ground import (
 )
 from rocking.kernels.restraints import apply_tendon_law, law_at_rest, plastic_at_node
 from rocking.kernels.series import INTEGRATED_TWICE, write_variation_coefficients
+from rocking.kernels.sliding import expand_slide, expand_slip, integrate_slip
 from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, new_records
 
 #: Nodes of a response before its march.
@@ -49,7 +50,7 @@ def copy_trail(trail: Trail) -> Trail:
 Three = tuple[float, float, float]
 
 #: Columns of the output of `trace`.
-_ROTATION, _VELOCITY, _ACCELERATION = 0, 1, 2
+_ROTATION, _VELOCITY, _ACCELERATION, _SLIP, _SLIP_VELOCITY = 0, 1, 2, 3, 4
 
 
 @kernel
@@ -57,6 +58,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
     """Write theta, theta', theta'' at times[k], in the step that starts at trail.nodes[rows[k]], into out[k].
 
     They are zero from the end of the last resolved arc to rest or the end of the response, and meaningless for NaN.
+    Two more columns, if any, are displacement and velocity of the foot divided by g.
     """
     ground, block, settings, nodes = trail
     expanded_row = -1
@@ -68,8 +70,11 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
         node = nodes[row]
         is_last = row + 1 == nodes.shape[0]
         is_before_rest = is_last or nodes[row + 1].side < 0  # the motion after its arc is not resolved
+        elapsed = max(0.0, times[k] - piece_start(ground, node.piece) - node.offset)
         if node.side < 0:
             out[k, _ROTATION] = out[k, _VELOCITY] = out[k, _ACCELERATION] = 0.0
+            write_slip(trail, scratch, row, 0, elapsed, np.inf, out[k])
+            expanded_row = -1
             continue
         if row != expanded_row:
             if block.yielding:
@@ -79,7 +84,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
                 plastic_row = row
                 apply_tendon_law(block, node.law, plastic)
             duration = np.inf if is_last else nodes[row + 1].time - node.time
-            order, h, _ = expand_arc(ground, block, settings, scratch, node, duration)
+            order, h = expand_step(trail, scratch, node, duration)
             landing = np.inf
             if is_before_rest:
                 lead = 0 if node.u > 0.0 else (1 if node.v > 0.0 else 2)
@@ -87,14 +92,51 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
                 if math.isnan(landing):
                     landing = h
             expanded_row = row
-        elapsed = max(0.0, times[k] - piece_start(ground, node.piece) - node.offset)
         u, v, w = evaluate_series(scratch.rotation, order, elapsed)
         if elapsed > landing or (is_before_rest and u < 0.0):
             u = v = w = 0.0
         sign = side_sign(node.side)
+        write_slip(trail, scratch, row, order, elapsed, landing, out[k])
         out[k, _ROTATION] = sign * u
         out[k, _VELOCITY] = sign * v
         out[k, _ACCELERATION] = sign * w
+
+
+@shared
+def expand_step(trail: Trail, scratch: Record, node: Record, duration: float) -> tuple[int, float]:
+    """Write the series of the step from a node, with or without slip, into scratch; return (order, step)."""
+    if node.direction != 0:
+        return expand_slip(trail.ground, trail.block, trail.settings, scratch, node, duration)
+    order, h, _ = expand_arc(trail.ground, trail.block, trail.settings, scratch, node, duration)
+    return order, h
+
+
+@shared
+def write_slip(
+    trail: Trail, scratch: Record, row: int, order: int, elapsed: float, landing: float, out: Floats
+) -> None:
+    """Write displacement and velocity of the foot in a step, whose series to ``order`` are in scratch if it rocks.
+
+    They are linear in time between ``landing``, after the last resolved arc of a sequence, and the next node.
+    """
+    if out.shape[0] <= _SLIP:
+        return
+    nodes = trail.nodes
+    node = nodes[row]
+    distance = velocity = 0.0
+    if node.side < 0 and node.direction != 0:
+        distance, velocity = integrate_slip(scratch, expand_slide(trail.ground, trail.block, scratch, node), elapsed)
+    elif node.direction != 0:
+        sign = side_sign(node.side)
+        distance, velocity = integrate_slip(scratch, order - 1, min(elapsed, landing))
+        distance, velocity = sign * distance, sign * velocity
+    out[_SLIP], out[_SLIP_VELOCITY] = node.slip + distance, velocity
+    if elapsed > landing and row + 1 < nodes.shape[0]:
+        next_node = nodes[row + 1]
+        rest = next_node.time - node.time - landing
+        share = min(1.0, (elapsed - landing) / rest) if rest > 0.0 else 1.0
+        out[_SLIP] += share * (next_node.slip - out[_SLIP])
+        out[_SLIP_VELOCITY] += share * (next_node.slip_rate - velocity)
 
 
 # ---- Derivatives of a response with respect to its input ----

@@ -1,6 +1,7 @@
 """Uplift: first time at which the ground acceleration passes the threshold of a side. A NaN never does.
 
-The arguments ``A`` and ``d`` are scratch space.
+The arguments ``A`` and ``d`` are scratch space. Accelerations that differ from a threshold by less than the fraction
+`ROUNDING` are at the threshold.
 """
 
 from typing import NamedTuple
@@ -9,8 +10,9 @@ import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.events import find_first_root
+from rocking.kernels.events import bound_rounding, find_first_passing, leading_power
 from rocking.kernels.ground import (
+    ROUNDING,
     Ground,
     Grounds,
     bound_piece,
@@ -20,16 +22,12 @@ from rocking.kernels.ground import (
     piece_length,
     piece_start,
     select_ground,
-    shift_polynomial,
     vertical_component,
     write_local_series,
 )
 from rocking.kernels.restraints import apply_tendon_law, plastic_at_node
 from rocking.kernels.state import AT_REST, Record, Records, stop_at_rest
 from rocking.kernels.trace import Trail
-
-#: Accelerations that differ from a threshold by less than this fraction are at the threshold.
-_ROUNDING = 2.0**-48
 
 
 class Uplift(NamedTuple):
@@ -41,6 +39,12 @@ class Uplift(NamedTuple):
     jump: bool  # whether the motion jumps past the threshold
 
 
+@inlined
+def rest_threshold(block: Record, side: int) -> float:
+    """Return the threshold of a side, of an uplift or of a slip."""
+    return min(block.threshold[side], block.static_friction) if block.friction else block.threshold[side]
+
+
 @shared
 def find_next_uplift(
     ground: Ground, block: Record, scratch: Record, resting: int, piece: int, offset: float, stop: float
@@ -50,7 +54,7 @@ def find_next_uplift(
     Without an uplift before ``stop``, the side is AT_REST and the piece the last one examined.
     """
     A, d = scratch.ground, scratch.other
-    plus, minus = block.threshold[0], block.threshold[1]
+    plus, minus = rest_threshold(block, 0), rest_threshold(block, 1)
     restraint_plus, restraint_minus = block.restraint_threshold[0], block.restraint_threshold[1]
     if block.two_stops:  # only the stop at which the body rests
         plus, minus = (plus, np.inf) if stop_at_rest(resting) == 0 else (np.inf, minus)
@@ -158,64 +162,17 @@ def write_push(ground: Ground, piece: int, offset: float, threshold: float, sign
 def find_first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float, d: Floats) -> tuple[float, bool]:
     """Find the first time in [0, h) from which sign * A(t) > threshold (else inf), and whether that is a jump."""
     gap = threshold - sign * A[0]
-    if gap < -_ROUNDING * abs(threshold):
+    if gap < -ROUNDING * abs(threshold):
         return 0.0, True
     if degree <= 1:
         rate = sign * A[1] if degree == 1 else 0.0
-        if rate > 0.0 and gap < rate * h - _ROUNDING * abs(threshold):
+        if rate > 0.0 and gap < rate * h - ROUNDING * abs(threshold):
             return max(0.0, gap) / rate, False
         return np.inf, False
     d[0] = gap
     for k in range(1, degree + 1):
         d[k] = -sign * A[k]
     return find_first_passing(d, degree, h), False
-
-
-@shared
-def find_first_passing(d: Floats, degree: int, h: float) -> float:
-    """Find the first time in [0, h) from which a polynomial is negative beyond rounding; inf if never.
-
-    It is not negative before. A root without a change of sign is divided out, and the search continues. Changes ``d``.
-    """
-    rounding = bound_rounding(d, degree, h)
-    start = 0.0
-    for _ in range(degree + 1):
-        lead = leading_power(d, degree, h - start, rounding)
-        if lead > degree:
-            return np.inf
-        if d[lead] < 0.0:
-            return start
-        time = find_first_root(d, lead, degree, h - start)
-        if not start + time < h:
-            return np.inf
-        shift_polynomial(d, degree, time)
-        start += time
-        if d[1] < 0.0 and d[1] * d[1] <= 2.0 * d[2] * rounding:  # a minimum below zero by less than rounding
-            step = -2.0 * d[1] / d[2]
-            shift_polynomial(d, degree, step)
-            start += step
-        d[0] = 0.0
-    return np.inf
-
-
-@inlined
-def bound_rounding(d: Floats, degree: int, h: float) -> float:
-    """Bound the rounding of a polynomial within h."""
-    rounding = 0.0
-    for k in range(degree, -1, -1):
-        rounding = rounding * h + _ROUNDING * abs(d[k])
-    return rounding
-
-
-@inlined
-def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
-    """Return the lowest power of a polynomial that is not negligible within h; above ``degree`` if there is none."""
-    lead = 0
-    power = 1.0
-    while lead <= degree and abs(d[lead]) * power <= rounding:
-        lead += 1
-        power *= h
-    return lead
 
 
 #: A motion is back within a threshold once below by this fraction, so that rounding causes no second passing.
@@ -288,7 +245,7 @@ def find_return(ground: Ground, block: Record, scratch: Record, uplift: Uplift) 
 @inlined
 def time_above_threshold(ground: Ground, block: Record, scratch: Record, piece: int, offset: float, side: int) -> float:
     """Return the time for which the motion exceeds a threshold within a piece; inf if to its end."""
-    sign, threshold = 1.0 if side == 1 else -1.0, block.threshold[side]
+    sign, threshold = 1.0 if side == 1 else -1.0, rest_threshold(block, side)
     if threshold == np.inf:
         return 0.0
     A, d = scratch.ground, scratch.other

@@ -117,10 +117,11 @@ def draw_histories(
     rotation = response.states(time)[:, 0]
     scaled_rotation = rotation * normalise(rotation)
     sequence = _find_longest_sequence(response, *span) if longest_sequence and options.get("ax") is None else None
-    traces = _compute_ground_traces(response, *span)
+    traces = _compute_traces(response, *span)
     with open_page((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **options) as page:
         main, *grounds = _create_panels(page, 1 + len(traces), zoomed=sequence is not None)
         _shade_rest(main, np.clip(response.rest_intervals, *span))
+        _shade_slip(main, np.clip(response._history.find_slips(), *span))
         _draw_rotation(main, time, scaled_rotation, np.array([-minus, plus]) * factors[::-1], coordinate.limit)
         if units != "deg" and is_rotation:
             to_degrees = (lambda y: np.degrees(y / normalise(y)), lambda y: np.radians(y) * normalise(y))
@@ -133,7 +134,7 @@ def draw_histories(
         main.set_xlim(*span)
         for axes, (trace_time, trace) in zip(grounds, traces.values(), strict=False):
             draw_ground(axes, trace_time, trace, 0.6)
-        for axes in grounds[:1]:
+        for axes in grounds[: response.motion is not None]:
             _draw_thresholds(axes, response, *traces["ground acceleration (g)"])
         panels = [main, *grounds]
         label = names[units] if is_rotation else f"{coordinate.name} ({coordinate.unit})"
@@ -151,16 +152,19 @@ def _choose_balances(response: ResponseData) -> tuple[float, float]:
     return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
 
 
-def _compute_ground_traces(response: ResponseData, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
-    """Return times and ground accelerations, g, by label."""
-    motion = response.motion
+def _compute_traces(response: ResponseData, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
+    """Return times and values of ground accelerations, g, and slip, mm, by label."""
+    motion, slips = response.motion, {}
+    if response.friction is not None:
+        times = choose_times(response, start, end)
+        slips["slip (mm)"] = times, 1e3 * response.slip(times)
     if motion is None:
-        return {}
+        return slips
     times = motion.drawing_times(start, end)
     traces = {"ground acceleration (g)": (times, motion.acceleration(times) / STANDARD_GRAVITY)}
     if motion.vertical is not None:
         traces["vertical (g)"] = (times, motion.vertical.acceleration(times) / STANDARD_GRAVITY)
-    return traces
+    return traces | slips
 
 
 def _find_longest_sequence(response: ResponseData, start: float, end: float) -> np.void | None:
@@ -174,8 +178,8 @@ def _find_longest_sequence(response: ResponseData, start: float, end: float) -> 
 
 def _create_panels(page: Page, count: int, *, zoomed: bool) -> list[Axes]:
     """Return the panels of rotation and motion, above the panel of the chattering sequence."""
-    heights = [*(1.3, 1.0, 0.7)[:count]] + [1.0] * zoomed
-    panels = page.create_panels(";".join("RGV"[:count] + "Z" * zoomed), height_ratios=heights)
+    heights = [*(1.3, 1.0, 0.7, 0.7)[:count]] + [1.0] * zoomed
+    panels = page.create_panels(";".join("RGVS"[:count] + "Z" * zoomed), height_ratios=heights)
     for axes in panels[1:count]:
         axes.sharex(panels[0])
     return panels[:count]
@@ -184,6 +188,11 @@ def _create_panels(page: Page, count: int, *, zoomed: bool) -> list[Axes]:
 def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
     for start, end in rest_intervals[rest_intervals[:, 0] < rest_intervals[:, 1]]:
         axes.axvspan(start, end, color=REST, linewidth=0.0, label="at rest")
+
+
+def _shade_slip(axes: Axes, intervals: Floats) -> None:
+    for start, end in intervals[intervals[:, 0] < intervals[:, 1]]:
+        axes.axvspan(start, end, color=ABOVE, alpha=0.15, linewidth=0.0, label="slips")
 
 
 def _draw_rotation(axes: Axes, time: Floats, rotation: Floats, tipping_angles: Floats, limit: str) -> None:

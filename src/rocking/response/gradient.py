@@ -20,6 +20,7 @@ from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.response.history import find_event_steps, find_impact_steps
 from rocking.response.response import Response
+from rocking.response.sensitivity import require_sticking
 
 #: Quantities that can be differentiated.
 Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
@@ -163,6 +164,7 @@ def gradient(response: Response, quantity: Quantity = "peak", time_or_index: flo
     """
     if not isinstance(response, Response):
         raise OptionError("{} must be a Response, as rocking.simulate returns", "response", value=response)
+    require_sticking(response.slips)
     checks.choice(quantity, "quantity", OptionError, get_args(Quantity))
     if quantity == "peak":
         target = _target_peak(response, time_or_index)

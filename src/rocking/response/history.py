@@ -71,9 +71,20 @@ class TimeHistory:
         sides = self.trail.nodes["side"][rows].astype(np.int64)
         return states.reshape((*times.shape, 3)), sides.reshape(times.shape)
 
-    def states_in(self, times: Floats, rows: Integers) -> Floats:
-        """Return coordinate and rates, shape (n, 3), at times in the steps that start at these rows."""
-        states = np.empty((len(times), 3))
+    def slips(self, time: ArrayLike, gravity: float) -> Floats:
+        """Return displacement, m, and velocity, m/s, of the foot at times of any shape; NaN outside [0, end]."""
+        times = checks.numbers(time, "time", OptionError)
+        flat = times.ravel()
+        slips = gravity * self.states_in(flat, self.find_rows(flat), columns=5)[:, 3:]
+        slips[self.is_outside(flat)] = np.nan
+        return slips.reshape((*times.shape, 2))
+
+    def states_in(self, times: Floats, rows: Integers, columns: int = 3) -> Floats:
+        """Return coordinate and rates, shape (n, 3), at times in the steps that start at these rows.
+
+        With five columns, the last two are displacement and velocity of the foot divided by g.
+        """
+        states = np.empty((len(times), columns))
         sample_times = times.view()
         sample_times.flags.writeable = False  # one type for any caller: `trace` is compiled once
         trace(copy_trail(self.trail), state.new_scratch(), sample_times, rows, states)
@@ -94,9 +105,17 @@ class TimeHistory:
     def find_rests(self) -> Floats:
         """Return start and end of each interval at rest, shape (n, 2), s."""
         nodes = self.trail.nodes
-        rows = np.flatnonzero(nodes["side"] < 0)
+        rows = np.flatnonzero((nodes["side"] < 0) & (nodes["direction"] == 0))
         ends = np.append(nodes["time"][1:], self.end)
         return np.column_stack([nodes["time"][rows], ends[rows]])
+
+    def find_slips(self) -> Floats:
+        """Return start and end of each interval of slip, shape (n, 2), s."""
+        nodes = self.trail.nodes
+        slips = np.concatenate([[False], nodes["direction"] != 0, [False]])
+        rows = np.flatnonzero(slips[1:] != slips[:-1])
+        times = np.append(nodes["time"], self.end)[rows]
+        return times.reshape(-1, 2)
 
     def compute_tipping_time(self, balances: tuple[float, float]) -> float:
         """Return the last time, s, at which a body passes its unstable balance outwards; NaN if it ends within it.

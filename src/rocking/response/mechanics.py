@@ -153,7 +153,9 @@ class Contact:
         side = self.history.trail.nodes["side"][rows]
         ground = self._evaluate_ground(times, rows, side < 0)
         elongation = compute_elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
-        return self.law((theta, rate, acceleration), ground, side, elongation)
+        horizontal, vertical = self.law((theta, rate, acceleration), ground, side, elongation)
+        direction, mu = self.history.trail.nodes["direction"][rows], self.history.trail.block["kinetic_friction"]
+        return np.where(direction != 0, -direction * mu * vertical, horizontal), vertical
 
     def _evaluate_ground(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
         """Return both ground accelerations in g, from the piece at the start of a step or, at rest, any piece."""

@@ -50,6 +50,12 @@ class Response(ResponseData):
     leans : bool
         Whether restraints permanently hold the block leaning about `residual_rotation`, as proven at the end,
         `duration`. It may still oscillate, but neither returns to zero rotation nor exceeds the peak.
+    friction : pair or None
+        Static and kinetic coefficient of friction; None for a block that never slips.
+    lost_contact : bool
+        Whether the ground ceased to press on a block with friction. The response ends there.
+    largest_slip : float
+        Largest displacement of the base relative to the ground in size, m.
     overturn_time : float
         Time at which the rotation first reached pi/2, s; NaN otherwise.
     peak_rotation, peak_time : float
@@ -57,7 +63,9 @@ class Response(ResponseData):
     duration : float
         End of the response, s. For a leaning block, the time of the proof.
     events : structured array
-        time (s), kind ("uplift", "rest", "overturn"), side (+1, -1; 0 at rest).
+        time (s), kind ("uplift", "rest", "overturn"), side (+1, -1; 0 at rest). With friction also "slide" (slip on
+        both pivots), "slide-rock" (slip on one pivot), "stick" (end of a slip on one pivot) and "lost contact". A slip
+        on both pivots ends with "rest".
     impacts : structured array
         time (s), side entered, speed_before and speed_after (rad/s), in order of time. For a chattering sequence only
         the impacts that were resolved before its end was proven.
@@ -124,6 +132,9 @@ class Response(ResponseData):
             rows.append(Row("required_friction", self.required_friction))
             rows.append(Row("minimum_normal_force_over_weight", self.minimum_normal_force))
             rows.append(Row("lift_off_time", self.lift_off_time, "s"))
+        if self.friction is not None:
+            rows += [Row("friction_static", self.friction[0]), Row("friction_kinetic", self.friction[1])]
+            rows += [Row("largest_slip", self.largest_slip, "m"), Row("residual_slip", self.residual_slip, "m")]
         if friction is not None:
             rows += [Row("friction", friction), Row("sliding_time", self.sliding_time(friction), "s")]
         rows += [Row("impacts_resolved", len(self.impacts)), Row("duration", self.duration, "s")]
@@ -140,7 +151,14 @@ class Response(ResponseData):
     def _create_outcome_rows(self) -> list[Row]:
         name, unit = self.block.coordinate.name, self.block.coordinate.unit
         rows = [Row("model", self.model), Row("chattering", repr(self.chattering))]
-        rows += [Row(flag, getattr(self, flag)) for flag in ("overturned", "unfinished", "stopped", "leans")]
+        flags = [
+            "overturned",
+            "unfinished",
+            "stopped",
+            "leans",
+            *(["lost_contact"] if self.friction is not None else []),
+        ]
+        rows += [Row(flag, getattr(self, flag)) for flag in flags]
         rows += [Row(time, getattr(self, time), "s") for time in ("overturn_time", "tipping_time")]
         rows.append(Row(f"peak_{name}", self.peak_rotation, unit))
         return [*rows, Row(f"residual_{name}", self.residual_rotation, unit)]
@@ -188,6 +206,9 @@ class Response(ResponseData):
         motion = self.motion
         rows = [row for row in self._create_outcome_rows() if row.name != "tipping_time"]
         rows += [Row("peak_time", self.peak_time, "s"), Row("ambiguous", self.ambiguous)]
+        if self.friction is not None:
+            rows += [Row("friction", list(self.friction)), Row("largest_slip", self.largest_slip, "m")]
+            rows += [Row("residual_slip", self.residual_slip, "m")]
         attributes = {
             "block": self.block.description,
             **self._list_parameters(),
@@ -235,6 +256,9 @@ class Response(ResponseData):
         rotation, velocity, _ = self.states(times).T
         ground = np.zeros_like(times) if motion is None else motion.acceleration(times)
         columns = [Column("time", times, "s"), Column(name, rotation, unit), Column(rate, velocity, f"{unit}/s")]
+        if self.friction is not None:
+            slips = self._history.slips(times, self.block.gravity)
+            columns += [Column("slip", slips[:, 0], "m"), Column("slip_velocity", slips[:, 1], "m/s")]
         columns.append(Column("ground_acceleration", ground, "m/s^2"))
         if motion is not None and motion.vertical is not None:
             columns.append(Column("vertical_ground_acceleration", motion.vertical.acceleration(times), "m/s^2"))

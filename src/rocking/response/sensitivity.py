@@ -225,3 +225,11 @@ def compute_changes(history: TimeHistory, time: ArrayLike, inputs: Iterable[str]
         values[order] = signs * _vary_input(history.trail, _INPUTS.index(name), ascending, len(nodes), events)[0]
         changes[name] = values.reshape(times.shape)
     return changes
+
+
+def require_sticking(slips: bool) -> None:
+    """Raise `OptionError` if the base slips, because derivatives through slip are not available."""
+    if slips:
+        raise OptionError(
+            "derivatives are not available for a response that slips; use response.perturbed() or omit {}", "friction"
+        )

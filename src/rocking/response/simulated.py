@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,7 +39,11 @@ from rocking.response.perturbed import (
     Repeat,
     check_factors,
 )
-from rocking.response.sensitivity import Sensitivity, bound_rest_errors, find_ambiguities
+from rocking.response.sensitivity import AMBIGUITY, Sensitivity, bound_rest_errors, find_ambiguities, require_sticking
+
+#: Relative change of the motion by which the sensitivity of a response that slips is estimated, and rounding error.
+_SMALL: Final = 1e-10
+_ULP: Final = 2.0**-52
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,9 +54,12 @@ class ResponseData(Result):
     motion: Motion | None
     model: Model
     chattering: ChatteringScheme
+    friction: tuple[float, float] | None
     overturned: bool
     unfinished: bool
     leans: bool
+    lost_contact: bool
+    largest_slip: float
     overturn_time: float
     peak_rotation: float
     peak_time: float
@@ -88,10 +95,17 @@ class ResponseData(Result):
             raise OptionError(f"the ground forces of this body are unknown: {self.block.description}")
         return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
 
+    @property
+    def slips(self) -> bool:
+        """Whether the base slips at any time."""
+        return bool(np.any(self.solution.trail.nodes["direction"] != 0))
+
     @cached_property
     def sequences(self) -> NDArray[np.void]:
         """Sequences of impacts that ended at rest: see `Response`."""
         sequences = self.solution.sequences.copy()
+        if self.slips:  # without the effect of rounding before the proof
+            return sequences
         largest_stop = max(map(abs, self.block.stops))
         errors = bound_rest_errors(self.solution.trail, np.isfinite(sequences["lower"]), largest_stop)
         sequences["lower"] -= errors
@@ -146,12 +160,14 @@ class ResponseData(Result):
     @property
     def moves_at_end(self) -> bool:
         """Whether the block is not at rest at the end of the response."""
-        return bool(self.solution.trail.nodes["side"][-1] >= 0)
+        last = self.solution.trail.nodes[-1]
+        return bool(last["side"] >= 0 or last["direction"] != 0)
 
     @property
     def moved(self) -> bool:
         """Whether the body moves at any time."""
-        return bool(np.any(self.solution.trail.nodes["side"] >= 0))
+        nodes = self.solution.trail.nodes
+        return bool(np.any((nodes["side"] >= 0) | (nodes["direction"] != 0)))
 
     @property
     def outcome(self) -> str:
@@ -164,6 +180,8 @@ class ResponseData(Result):
             return OVERTURNS
         if self.unfinished:
             return "is given up"
+        if self.lost_contact:
+            return "loses contact"
         if self.stopped:
             return "has not overturned"
         if self.leans:
@@ -178,13 +196,15 @@ class ResponseData(Result):
 
         NaN if the block overturns or its final state is unknown. For other bodies the coordinate.
         """
-        return math.nan if self.overturned or self.unfinished or self.stopped else self.solution.residual
+        is_unknown = self.overturned or self.unfinished or self.stopped or self.lost_contact
+        return math.nan if is_unknown else self.solution.residual
 
     @property
     def stopped(self) -> bool:
         """Whether `duration` ended the simulation while the block or the ground still moved."""
         motion_ended = self.motion is None or self.duration >= self.motion.end
-        return not (self.overturned or self.unfinished or self.leans) and (self.moves_at_end or not motion_ended)
+        is_decided = self.overturned or self.unfinished or self.leans or self.lost_contact
+        return not is_decided and (self.moves_at_end or not motion_ended)
 
     @cached_property
     def tipping_time(self) -> float:
@@ -207,7 +227,11 @@ class ResponseData(Result):
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
-        """Derivatives of the peak and of event and impact times by the motion, the initial state and the block."""
+        """Derivatives of the peak and of event and impact times by the motion, the initial state and the block.
+
+        Raises `OptionError` for a response that slips.
+        """
+        require_sticking(self.slips)
         trail, history = self.solution.trail, self._history
         if int(trail.block["seed"]) >= 0 and trail.block["variable_restitution"]:
             # Random restitutions depend on the number of the impact, which excludes the impacts after a proof.
@@ -227,6 +251,13 @@ class ResponseData(Result):
         "touch" means that rounding determines whether the motion exceeds an uplift threshold, whether the body touches
         the ground, or whether it falls from its balance. `perturbed` returns the spread of such results.
         """
+        if self.slips:
+            close = self.perturbed(_SMALL, 3)
+            low, high = close.peak_range
+            changes = ((high - low) / _SMALL, np.nanmax(close.event_spreads, initial=0.0) / _SMALL)
+            named = zip(("peak", "events"), changes, strict=True)
+            names = [name for name, change in named if change * _ULP > AMBIGUITY]
+            return (*names, *(("touch",) if self.rounding_decisions or not close.is_decided else ()))
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
         height = abs(self.peak_rotation - self.block.stops[0])
@@ -294,6 +325,22 @@ class ResponseData(Result):
     def angular_acceleration(self, time: ArrayLike) -> Floats:
         """Return the angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
         return unwrap_scalar(self.states(time)[..., 2])
+
+    def slip(self, time: ArrayLike) -> Floats:
+        """Return the displacement of the base relative to the ground, m, at any time; NaN outside [0, duration].
+
+        It is the displacement of the pivot in contact, positive to side + and zero at the start.
+        """
+        return unwrap_scalar(self._history.slips(time, self.block.gravity)[..., 0])
+
+    def slip_velocity(self, time: ArrayLike) -> Floats:
+        """Return the rate of `slip`, m/s, at any time (at an impact, just after it); NaN outside [0, duration]."""
+        return unwrap_scalar(self._history.slips(time, self.block.gravity)[..., 1])
+
+    @property
+    def residual_slip(self) -> float:
+        """Displacement of the base relative to the ground at the end of the response, m."""
+        return float(self.slip(self.duration))
 
     def kinetic_energy(self, time: ArrayLike) -> Floats:
         """Return the kinetic energy divided by the overturning energy, at any time (at an impact, just after it).

@@ -67,6 +67,13 @@ def create_rows(response: ResponseData, friction: float | None, precision: float
             Row("least normal force", f"{response.minimum_normal_force:.4f}", "of the weight", until),
         ]
         end_of_validity = "what follows is not this response"
+        if response.friction is not None:
+            static, kinetic = response.friction
+            text = f"{static:g}" if static == kinetic else f"{static:g} (static), {kinetic:g} (kinetic)"
+            rows.append(Row("friction", text))
+            slip = f"{1e3 * response.largest_slip:.4g} mm at most" if response.slips else "none"
+            residual = f", {1e3 * response.residual_slip:.4g} mm at the end" if response.slips else ""
+            rows.append(Row("slip", slip, note=residual))
         if friction is not None:
             text = f"is not enough: the block slides, first at {sliding:.4f} s; {end_of_validity}"
             text = "is enough: the block does not slide" if math.isnan(sliding) else text
@@ -103,6 +110,8 @@ def format_outcome(response: ResponseData, overturn_time: str) -> str:
         return f"overturns at {overturn_time}"
     if response.unfinished:
         return f"UNFINISHED: given up at {response.duration:.4f} s, after too many steps"
+    if response.lost_contact:
+        return f"loses contact with the ground at {response.duration:.4f} s, where the simulation ends"
     if response.stopped:
         motion_end = 0.0 if response.motion is None else response.motion.end
         to_come = f"; the motion goes on to {motion_end:.6g} s" if response.duration < motion_end else ""
@@ -111,6 +120,8 @@ def format_outcome(response: ResponseData, overturn_time: str) -> str:
         return f"does not overturn: it stays leaning, at {_format_residual(response)}"
     if not response.moved:
         return "does not move"
+    if response.slips and response.peak_rotation == 0.0:
+        return "slides and does not rock"
     return "rocks and does not overturn" if response.block.coordinate.limit else "moves, and comes to rest"
 
 
@@ -258,7 +269,7 @@ def _describe_outcome(response: ResponseData) -> str:
     text = response.perturbed().describe_outcome()
     if response.overturned:
         text += f", at {format_time(response.overturn_time, *response.perturbed().overturn_range)}"
-    elif response.unfinished or response.stopped:
+    elif response.unfinished or response.stopped or response.lost_contact:
         text += f"; {format_outcome(response, '')}"
     if response.rests_by_rounding:
         text += f"; {format_count(response.rests_by_rounding, 'rest')} not proven"

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.block import Blocks
 from rocking.block.body import Bodies, Body
+from rocking.block.friction import Friction, check_friction, resolve_friction
 from rocking.block.single import ROTATION
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -58,6 +59,13 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = {
     "first_uplift": ("s", "time of the first uplift; 0 without one"),
     "first_rest": ("s", "time at which the block first came to rest; 0 if it never did"),
     "last_rest": ("s", "time at which the block last came to rest; 0 if it never did"),
+}
+
+#: Further outcomes with friction, likewise.
+SLIPS: Final[Mapping[str, tuple[str, str]]] = {
+    "lost_contact": ("1", "whether the ground ceased to press on the block, where the simulation ends"),
+    "largest_slip": ("m", "largest displacement of the base relative to the ground in size"),
+    "residual_slip": ("m", "displacement of the base relative to the ground at the end"),
 }
 _SHARE_MEANING: Final = "share of the simulation and its repeats within 3e-6 of the motion that overturn"
 
@@ -135,7 +143,7 @@ class Product:
         Scales of the motions.
     polarity : {"+", "-", "both"}
         Original motions, reversed motions, or both.
-    model, chattering, duration
+    model, chattering, duration, friction
         As for `rocking.simulate`.
 
     Raises
@@ -164,10 +172,12 @@ class Product:
     model: Model
     chattering: ChatteringScheme
     duration: float | None
+    friction: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         checks.choice(self.polarity, "polarity", OptionError, list(SIGNS))
         build_settings(self.bodies, self.model, self.chattering, self.duration, record=False)  # raises before the work
+        check_friction(self.bodies, self.model, self.friction)
         for motion in self.motions:
             check_components(self.bodies, motion)
 
@@ -204,17 +214,19 @@ def create_product(
     model: Model,
     chattering: str | ChatteringScheme,
     duration: float | None,
+    friction: Friction | None = None,
 ) -> Product:
     """Create a product from the arguments of `simulate_many`."""
     bodies, ground_motions = gather_bodies(blocks), tuple(list_motions(motions))
     scales, scheme = Scales.from_levels(levels, measure), chattering_scheme(chattering)
-    return Product(bodies, ground_motions, scales, polarity, model, scheme, duration)
+    coefficients = resolve_friction(friction)
+    return Product(bodies, ground_motions, scales, polarity, model, scheme, duration, coefficients)
 
 
 def create_setup(product: Product, bodies: slice | None = None) -> Setup:
     """Return the setup for all or some bodies of a product."""
     selected = product.bodies if bodies is None else product.bodies.select(bodies)
-    return Setup(selected, product.model, product.chattering, product.duration)
+    return Setup(selected, product.model, product.chattering, product.duration, friction=product.friction)
 
 
 def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
@@ -234,7 +246,7 @@ def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
 
     dimensions = ("motion", "scale", "polarity", "block")
     is_dropped = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
-    meanings = {**VARIABLES, **TIMES, "overturned_share": ("1", _SHARE_MEANING)}
+    meanings = {**VARIABLES, **TIMES, **SLIPS, "overturned_share": ("1", _SHARE_MEANING)}
     variable_attributes = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in meanings.items()}
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
@@ -292,6 +304,7 @@ def simulate_many(
     polarity: Polarity = "+",
     duration: float | None = None,
     times: bool = False,
+    friction: Friction | None = None,
     robust: bool = False,
 ) -> xr.Dataset:
     """Simulate every block under every motion.
@@ -315,6 +328,8 @@ def simulate_many(
         As for `simulate`.
     times : bool
         Whether to include the times of the first uplift and of the first and the last rest.
+    friction : float or pair, optional
+        As for `simulate`. Adds the variables lost_contact, largest_slip and residual_slip (m).
     robust : bool
         Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6 (`Response.perturbed`), in
         five times the computing time.
@@ -351,8 +366,9 @@ def simulate_many(
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
-    names = (*VARIABLES, *(TIMES if checks.boolean(times, "times", OptionError) else ()))
+    product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration, friction)
+    names = [*VARIABLES, *(TIMES if checks.boolean(times, "times", OptionError) else ())]
+    names += SLIPS if product.friction is not None else ()
     setup = create_setup(product)
     outcomes = simulate_product(product, setup, names)
     if checks.boolean(robust, "robust", OptionError):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.block.body import Body
+from rocking.block.friction import Friction, resolve_friction
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.engine.problem import compute_peaks, require_body, set_start
@@ -23,12 +24,12 @@ from rocking.records.named import check_motion
 from rocking.response import Response
 from rocking.response.history import Solution
 
-_EVENT_DTYPE = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
+_EVENT_DTYPE = np.dtype([("time", "f8"), ("kind", "U12"), ("side", "i1")])
 _IMPACT_DTYPE = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
 _SEQUENCE_DTYPE = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
 
 #: Event kinds by code (`rocking.kernels.state`).
-_EVENT_KINDS = np.array(["uplift", "rest", "overturn"])
+_EVENT_KINDS = np.array(["uplift", "rest", "overturn", "slide", "stick", "slide-rock", "lost contact"])
 
 #: Rows of the first table per piece of the motion.
 _ROWS_PER_PIECE = 1.25
@@ -43,6 +44,7 @@ def simulate(
     duration: float | None = None,
     initial_rotation: float = 0.0,
     initial_velocity: float = 0.0,
+    friction: Friction | None = None,
 ) -> Response:
     """Simulate a block under a ground motion.
 
@@ -66,6 +68,9 @@ def simulate(
         `stopped`, with undetermined outcome.
     initial_rotation, initial_velocity : float
         Initial rotation (rad, positive to side +) and angular velocity (rad/s), or coordinate and rate of another body.
+    friction : float or pair, optional
+        Coefficient of friction of the base, or the pair (static, kinetic). By default the block never slips. Available
+        for free blocks, and for kinetic coefficients up to 1.33 for a rectangle.
 
     Returns
     -------
@@ -76,6 +81,8 @@ def simulate(
     ------
     BlockError, MotionError
         If `block` is not a body, `motion` is not a `Motion`, or a body on a line has vertical motion.
+    OptionError
+        If an option is out of range, or `friction` is not available for the block.
 
     See Also
     --------
@@ -85,8 +92,9 @@ def simulate(
 
     Notes
     -----
-    The block does not slide. `Response.sliding_time` and ``summary(friction)`` report sliding for a given coefficient
-    of friction.
+    Without `friction` the block does not slide, and `Response.sliding_time` and ``summary(friction)`` report when it
+    would. With `friction` it sticks, slides on both pivots or slips on one while it rocks, and every transition is
+    located (see "Sliding" in the documentation).
 
     Examples
     --------
@@ -96,7 +104,8 @@ def simulate(
     >>> response.overturned, len(response.impacts) > 50, f"{response.events['time'][-1]:.6f}"
     (False, True, '4.235818')
     """
-    return compute_response(block, motion, model, chattering, duration, (initial_rotation, initial_velocity))
+    initial = initial_rotation, initial_velocity
+    return compute_response(block, motion, model, chattering, duration, initial, friction=resolve_friction(friction))
 
 
 def compute_response(
@@ -108,10 +117,12 @@ def compute_response(
     initial: tuple[float, float],
     name: str | None = None,
     factor: float = 1.0,
+    *,
+    friction: tuple[float, float] | None = None,
 ) -> Response:
     """Compute a response like `simulate`, with `name` for the initial coordinate in errors."""
     scheme, bodies, motion = chattering_scheme(chattering), require_body(block).as_bodies(), check_motion(motion)
-    setup = Setup(bodies, model, scheme, duration, initial)
+    setup = Setup(bodies, model, scheme, duration, initial, friction)
     run = setup.prepare(motion, factor, record=True, name=name)
     if factor != 1.0:
         set_start(run.states, run.records, bodies, *_scale_start(initial, factor, run.records, bodies.stops[0]), name)
@@ -120,15 +131,18 @@ def compute_response(
     if ending == state.Ending.BALANCED:
         raise OptionError("the block remains balanced on its corner; give {} or another initial state", "duration")
     events = table["event"][: start["events"]]
-    overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
+    overturned = ending == state.Ending.OVERTURNED
     return Response(
         block=block,
         motion=motion,
         model=model,
         chattering=scheme,
+        friction=friction,
         overturned=overturned,
         unfinished=ending == state.Ending.UNFINISHED,
         leans=ending == state.Ending.LEANS,
+        lost_contact=ending == state.Ending.LOST,
+        largest_slip=bodies.gravity * float(start["largest_slip"]),
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
         peak_rotation=float(compute_peaks(start, trail.block, np.array(block.stops))),
         peak_time=float(start["peak_time"]),
@@ -143,7 +157,9 @@ def compute_response(
             residual=float(
                 block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning_rotation"]
             ),
-            repeat=functools.partial(compute_response, block, motion, model, scheme, duration, initial, name),
+            repeat=functools.partial(
+                compute_response, block, motion, model, scheme, duration, initial, name, friction=friction
+            ),
         ),
     )
 

@@ -12,6 +12,7 @@ from typing import Any, Final, cast
 from rocking import records
 from rocking.block import Blocks, Restraint
 from rocking.block.body import Bodies
+from rocking.block.friction import resolve_friction
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import format_count, read_csv_rows
@@ -54,7 +55,7 @@ SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
     "blocks": ("csv", *BLOCK, *_RESTRAINT_KEYS),
     "motions": ("records", "channel", "vertical", "units", "dt", "baseline", "highpass", "skip_unreadable", "pulses"),
     "scales": (*_MEASURES, "period", "damping", "polarity"),
-    "simulation": ("model", "chattering", "duration"),
+    "simulation": ("model", "chattering", "duration", "friction"),
 }
 
 #: Keys whose values are not numbers, and the required type (also of the items of a list).
@@ -146,7 +147,8 @@ def read_study(path: str | Path) -> StudyFile:
         chattering = chattering_scheme(rules.get("chattering", "certified"))
     with tables.locating_errors("simulation", "scales", "blocks"):
         model, duration = rules.get("model", "nonlinear"), rules.get("duration")
-        product = Product(blocks, tuple(motions), scales, polarity, model, chattering, duration)
+        friction = resolve_friction(rules.get("friction"))
+        product = Product(blocks, tuple(motions), scales, polarity, model, chattering, duration, friction)
     return StudyFile(product, tuple(skipped), tuple(names))
 
 

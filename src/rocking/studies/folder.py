@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rocking.dynamics.bodies  # noqa: F401 -- registers its kinds
+from rocking.block import Blocks
 from rocking.block.body import BODIES_TYPES
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -237,6 +238,10 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
     measure = None if scales.measure is None else {"name": scales.measure.name, **scales.measure.options()}
     rules = {name: getattr(product, name) for name in ("polarity", "model", "chattering", "duration")}
     rules["chattering"] = str(product.chattering)
+    if product.friction is not None:
+        rules["friction"] = [*product.friction]
+        if isinstance(bodies, Blocks) and bodies.radii is not None:
+            arrays["sizes/radii"] = bodies.radii
     values = {"scales/measure": measure} | {f"rules/{name}": value for name, value in rules.items()}
     texts = {name: np.array(json.dumps(value)) for name, value in values.items()}
     return arrays | {"scales/values": scales.values} | texts
@@ -251,11 +256,18 @@ def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
     motions = dict.fromkeys(name.split("/")[1] for name in arrays if name.startswith("motions/"))
     texts = {name: json.loads(str(array)) for name, array in arrays.items() if array.dtype.kind == "U"}
     measure, chattering = texts["scales/measure"], chattering_scheme(texts["rules/chattering"])
-    return Product(
+    bodies, friction = (
         BODIES_TYPES[kind](**{**values, "gravity": float(values["gravity"])}),
+        texts.get("rules/friction"),
+    )
+    if "sizes/radii" in arrays:
+        bodies.__dict__["radii"] = arrays["sizes/radii"]
+    return Product(
+        bodies,
         tuple(_motion_from_arrays(arrays, f"motions/{k}") for k in motions),
         Scales(None if measure is None else Measure(**measure), arrays["scales/values"]),
         *(texts["rules/polarity"], texts["rules/model"], chattering, texts["rules/duration"]),
+        friction and (friction[0], friction[1]),
     )
 
 

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 
 from rocking.analysis.fragility import Fragility
 from rocking.block.body import Bodies, Body
+from rocking.block.friction import Friction
 from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
@@ -386,6 +387,7 @@ def create_study(
     measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
     duration: float | None = None,
+    friction: Friction | None = None,
     unit_blocks: int | None = None,
 ) -> Study:
     """Create a study, or open an existing one with the same inputs.
@@ -396,8 +398,8 @@ def create_study(
         Folder of the study.
     blocks, motions : Blocks and Motion, or sequences of blocks and motions
         As for `simulate_many`.
-    model, chattering, levels, measure, polarity, duration : optional
-        As for `simulate_many`.
+    model, chattering, levels, measure, polarity, duration, friction : optional
+        As for `simulate_many`; the study stores no slips.
     unit_blocks : int, optional
         Number of blocks in a unit (one motion, scale and polarity), a multiple of 512. By default a unit contains as
         many blocks, motions, scales and polarities as run for about five seconds, estimated by a pilot run.
@@ -428,7 +430,7 @@ def create_study(
     >>> rocking.Study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration, friction)
     return open_or_create(folder, product, unit_blocks)
 
 

@@ -99,7 +99,7 @@ def choose_unit_shape(product: Product, unit_blocks: int | None) -> tuple[int, .
     motions, scales, polarities, count = product.shape
     sample = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP_SIZE)).astype(np.int64))
     motion = max(product.motions, key=lambda candidate: len(candidate.coefficients))
-    setup = Setup(sample, product.model, product.chattering, product.duration)
+    setup = Setup(sample, product.model, product.chattering, product.duration, friction=product.friction)
     task = Task(slice(None), (motion,), float(product.scales.factors(motion).max()))
     simulate_task(setup, task)  # loads the kernels
     start = time.perf_counter()

@@ -1,0 +1,142 @@
+"""Friction of free blocks: coefficients, and the sizes that determine slip."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from rocking.block.bodies import Blocks
+from rocking.block.body import Bodies
+from rocking.block.sides import compute_rigid_bodies
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats
+from rocking.core.constants import Model
+from rocking.errors import OptionError
+from rocking.kernels.state import Records
+
+#: Coefficient of friction, or the pair (static, kinetic).
+Friction = float | Sequence[float]
+
+#: Largest relative difference between sizes of a body that follow from its two sides.
+_ROUNDING: Final = 1e-6
+
+
+def resolve_friction(friction: Friction | None) -> tuple[float, float] | None:
+    """Return the static and the kinetic coefficient of friction; None if the body never slips.
+
+    Raises
+    ------
+    OptionError
+        If a coefficient is not positive, or the static one is below the kinetic one.
+    """
+    if friction is None:
+        return None
+    values = checks.numbers(friction, "friction", OptionError)
+    if values.shape not in ((), (2,)) or np.any(np.isnan(values)) or np.any(values <= 0.0):
+        raise OptionError(
+            "{} must be a positive number or a pair (static, kinetic) of positive numbers, or None for a block that "
+            f"never slips, not {checks.short_repr(friction)}",
+            "friction",
+            value=friction,
+        )
+    static, kinetic = np.broadcast_to(values, 2).tolist()
+    if static < kinetic:
+        raise OptionError(
+            f"the static {{}} must not be below the kinetic one; got {static:g} and {kinetic:g}: swap them",
+            "friction",
+            value=friction,
+        )
+    return None if math.isinf(static) and math.isinf(kinetic) else (static, kinetic)
+
+
+def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple[float, float]) -> None:
+    """Add friction and sizes to records for kernels.
+
+    Raises
+    ------
+    OptionError
+        If the bodies are not free rigid blocks of known size, the kinetic friction admits a paradox at a pivot, or a
+        restitution would gain energy in a slip.
+    """
+    if not isinstance(bodies, Blocks):
+        raise OptionError("{} applies to blocks, not to " + f"{bodies.kind}; omit it", "friction")
+    if bodies.terms:
+        raise OptionError(
+            "{} is not available for blocks with restraints, a lean, one side or a law of restitution; simulate the "
+            "free block, or omit it",
+            "friction",
+        )
+    radii, g = _find_radii(bodies), bodies.gravity
+    height = (radii * np.cos(bodies.alpha)).mean(axis=1, keepdims=True)
+    is_linear = model == "linear"
+    arm = np.broadcast_to(height, radii.shape) if is_linear else radii
+    base = height * bodies.alpha if is_linear else radii * np.sin(bodies.alpha)
+    ratio = arm * bodies.p**2 / g
+    inertia = g * arm / bodies.p**2
+    square = inertia[:, ::-1] - height**2 - base[:, ::-1] ** 2  # of the radius of gyration, by the side entered
+    static, kinetic = friction
+    _refuse(~((ratio < 1.0) & (square > 0.0)), _MISSING)
+    gyration = (1.0 - ratio) / ratio
+    limit = square + base[:, ::-1] ** 2
+    largest = np.minimum(2.0 * np.sqrt(gyration * (1.0 + gyration)), limit / (height * base[:, ::-1]))
+    if np.any(~(kinetic < largest)):
+        index = int(np.argmin(largest.min(axis=1)))
+        raise OptionError(
+            f"the kinetic {{}} must be below {largest[index].min():.4g}, beyond which forces at a pivot have no unique "
+            f"solution; got {kinetic:g}; use a smaller one, or None for a block that never slips",
+            "friction",
+            value=kinetic,
+        )
+    gain = (inertia[:, ::-1] * bodies.restitution - height**2) ** 2 - (square + base**2) * limit
+    _refuse(
+        gain > _ROUNDING * limit**2,
+        "this restitution would gain energy in a slip, so that {} requires another one; omit the restitution",
+    )
+    records["friction"], records["static_friction"], records["kinetic_friction"] = True, static, kinetic
+    records["arm"], records["pivot_distance"], records["height"] = arm / g, base / g, height[:, 0] / g
+    records["inertia_ratio"] = ratio / (1.0 - ratio)
+    s, c = (bodies.alpha, 1.0) if is_linear else (records["sine"], records["cosine"])
+    lost = 0.0 if is_linear else ratio * s
+    per_push = 1.0 - ratio * c * c + static * lost
+    records["sticking_push"] = (1.0 - _ROUNDING) * (static * (1.0 - lost * s) - ratio * s) / per_push
+    records["sticking_slope"] = 0.0 if is_linear else arm / g * (s + static) / per_push
+
+
+def check_friction(bodies: Bodies, model: Model, friction: tuple[float, float] | None) -> None:
+    """Raise `OptionError` if bodies cannot be simulated with friction; see `add_friction`."""
+    if friction is not None:
+        add_friction(bodies.kernel_records(model, np.zeros((len(bodies), 2))), bodies, model, friction)
+
+
+def _refuse(is_invalid: Flags, text: str) -> None:
+    if np.any(is_invalid):
+        index = int(np.argwhere(is_invalid)[0][0])
+        raise OptionError(text + (f" of block {index}" if len(is_invalid) > 1 else ""), "friction")
+
+
+def _find_radii(blocks: Blocks) -> Floats:
+    """Return the distance of the centre of mass from each pivot, m, shape (n, 2)."""
+    if blocks.radii is not None:
+        _refuse(np.isnan(blocks.radii), "the columns of a frame slip one by one, so that {} is not available; omit it")
+        radii: Floats = blocks.radii
+    else:
+        radii = 0.75 * blocks.gravity / blocks.p**2
+        _, depth = compute_rigid_bodies(blocks.p, blocks.alpha)
+        unequal = ~np.isnan(depth)
+        radii[unequal] = blocks.gravity * depth[unequal, None] / np.cos(blocks.alpha[unequal])
+        differs = np.any((blocks.p[:, :1] != blocks.p[:, 1:]) | (blocks.alpha[:, :1] != blocks.alpha[:, 1:]), axis=1)
+        _refuse((differs & ~unequal)[:, None], _MISSING)
+    heights = radii * np.cos(blocks.alpha)
+    squares = blocks.gravity * radii / blocks.p**2 - radii**2
+    for sizes in (heights, squares):
+        _refuse(np.abs(sizes[:, 0] - sizes[:, 1]) > _ROUNDING * np.abs(sizes[:, 0]), _MISSING)
+    return radii
+
+
+_MISSING: Final = (
+    "{} requires the sizes of a rigid body, and none has the p and alpha of both sides; create the block with "
+    "Block.from_pivots"
+)
