@@ -158,7 +158,7 @@ class Format:
         return None if line is None else line.start
 
 
-@dataclass
+@dataclass(eq=False)
 class Header:
     """Header of one channel: read part by part, with a method for each kind of part, and its statements."""
 
