@@ -26,7 +26,7 @@ from rocking.kernels.lanes import (
     stumpff,
     write_lane,
 )
-from rocking.kernels.series import Line
+from rocking.kernels.series import ValueAndSlope
 from rocking.kernels.state import Record, Records, new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -61,10 +61,10 @@ class Way(NamedTuple):
 
     nonlinear: bool = False
     substeps: int = 0
-    weight: Line | None = None
+    weight: ValueAndSlope | None = None
 
 
-def ground_under(way: Way, row: Line, *corners: float) -> Ground:
+def ground_under(way: Way, row: ValueAndSlope, *corners: float) -> Ground:
     """Ground that pushes by a row on each piece, and lifts so that the weight is that of the way."""
     pieces = len(corners) - 1
     lifts = None if way.weight is None else [(way.weight[0] - 1.0, way.weight[1])] * pieces
@@ -83,7 +83,7 @@ class Step(NamedTuple):
 def stepped(
     blocks: Records,
     states: Records,
-    row: Line,
+    row: ValueAndSlope,
     h: float,
     way: Way = Way(),  # noqa: B008
     *,
@@ -220,7 +220,7 @@ WEIGHTS = {
 
 def weighted_cases(
     random: np.random.Generator, nonlinear: bool, kind: str, substeps: int
-) -> tuple[Records, Records, Line, Line]:
+) -> tuple[Records, Records, ValueAndSlope, ValueAndSlope]:
     """A group of blocks in motion, the push and the weight over a step of one second."""
     low, high, swing = WEIGHTS[kind]
     weight = (random.uniform(low, high), random.normal() * swing)

@@ -15,7 +15,7 @@ from oracles.taylor import System, after
 
 from rocking.kernels.arc import evaluate_series, expand_arc
 from rocking.kernels.events import StepEnd, advance_to_event
-from rocking.kernels.series import Line
+from rocking.kernels.series import ValueAndSlope
 from rocking.kernels.short_arc import short_step
 from rocking.kernels.state import Record, StepOutcome, new_scratch
 
@@ -30,7 +30,13 @@ class Case:
     """An arc under an even change of the ground acceleration, and of the weight."""
 
     def __init__(
-        self, nonlinear: bool, side: int, p: float, alpha: float, row: Line, weight: Line | None = None
+        self,
+        nonlinear: bool,
+        side: int,
+        p: float,
+        alpha: float,
+        row: ValueAndSlope,
+        weight: ValueAndSlope | None = None,
     ) -> None:
         self.nonlinear, self.side, self.p, self.alpha, self.row = nonlinear, side, p, alpha, row
         self.weight = weight
@@ -323,7 +329,7 @@ NEAR_LIFT_OFF = [(0.0, 1.0), (1e-9, 5.0), (-0.01, 20.0), (0.0, 300.0)]
 @models
 @pytest.mark.parametrize("weight", NEAR_LIFT_OFF)
 @pytest.mark.parametrize("u, v", [(0.3, 0.1), (0.2, 0.3), (0.05, -0.5), (0.0, 0.2)])
-def test_a_short_step_near_lift_off_is_exact(nonlinear: bool, weight: Line, u: float, v: float) -> None:
+def test_a_short_step_near_lift_off_is_exact(nonlinear: bool, weight: ValueAndSlope, u: float, v: float) -> None:
     """Beside 60 digits, to a few units in the last place of the way."""
     judged = 0
     alpha, push = 0.2, (0.0, 0.01)

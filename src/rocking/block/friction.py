@@ -95,7 +95,7 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
         gain > _ROUNDING * limit**2,
         "this restitution would gain energy in a slip, so that {} requires another one; omit the restitution",
     )
-    records["friction"], records["static_friction"], records["kinetic_friction"] = True, static, kinetic
+    records["has_friction"], records["static_friction"], records["kinetic_friction"] = True, static, kinetic
     records["arm"], records["pivot_distance"], records["height"] = arm / g, base / g, height[:, 0] / g
     records["inertia_ratio"] = ratio / (1.0 - ratio)
     s, c = (bodies.alpha, 1.0) if is_linear else (records["sine"], records["cosine"])

@@ -17,7 +17,7 @@ from rocking.core.tables import format_count
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import compute_moduli, compute_multipliers
 from rocking.errors import OptionError
-from rocking.kernels.periodic import TRAP
+from rocking.kernels.periodic import TRAP_COLUMNS
 from rocking.kernels.state import Records
 
 #: Longest period of an attractor, in periods of the motion.
@@ -185,7 +185,7 @@ class KnownAttractors:
     def __init__(self, strobe: StroboscopicMap, size: Floats) -> None:
         self.strobe, self.size = strobe, size
         self.attractors: list[Attractor] = []
-        self.traps, self.attractor_of_trap = np.empty((0, TRAP)), np.empty(0, dtype=np.int64)
+        self.traps, self.attractor_of_trap = np.empty((0, TRAP_COLUMNS)), np.empty(0, dtype=np.int64)
 
     def classify_or_search(self, states: Floats) -> Integers:
         """Return the attractor of each state, -1 for a state outside all traps, and search for new attractors."""

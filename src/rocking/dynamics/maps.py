@@ -22,7 +22,7 @@ from rocking.engine.tasks import Setup
 from rocking.errors import BlockError, MotionError, OptionError
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, build_ground
-from rocking.kernels.periodic import TRAP, PeriodicProblem, build_step_rows, differentiate, iterate
+from rocking.kernels.periodic import TRAP_COLUMNS, PeriodicProblem, build_step_rows, differentiate, iterate
 from rocking.kernels.periodic import PeriodOutcome as PeriodOutcome
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
@@ -35,7 +35,7 @@ _LIFTING_ACCELERATION: Final = 1e12
 STATES_PER_CALL: Final = 256
 
 #: Traps of a map of single states.
-_NO_TRAPS: Final = np.empty((0, TRAP))
+_NO_TRAPS: Final = np.empty((0, TRAP_COLUMNS))
 
 #: Factor that equals one within rounding error.
 _BELOW_ONE: Final = 1.0 - 2.0**-40

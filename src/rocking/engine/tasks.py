@@ -275,7 +275,7 @@ def _split_batch(batch: _Batch, steps: Floats, model: Model) -> Iterator[tuple[I
     width = step * np.sqrt(stiffness * weight)
     with_vertical = batch.grounds.stretches.shape[1] > 1
     in_lanes = (step > 0.0) & (width <= lanes.MAX_STEP) & ~(batch.records["restrained"] | batch.records["two_stops"])
-    in_lanes &= ~(batch.records["friction"] & with_vertical)
+    in_lanes &= ~(batch.records["has_friction"] & with_vertical)
     width = np.where(in_lanes, width, 0.0)
     if model == "nonlinear" or with_vertical:  # otherwise one formula covers a sample
         substeps = np.ceil(width / (lanes.MAX_SUBSTEP if model == "nonlinear" else lanes.MAX_WEIGHTED_SUBSTEP))

@@ -289,16 +289,16 @@ def propagate_through_arc(
             m[k] = 0.0
             for j in range(k + 1):
                 m[k] -= lam * x[j] * scratch.cosine[k - j]
-    add_moments(scratch.other, m, order, node.offset, t, side_sign(node.side), out[node.piece, : ground.columns])
+    add_moments(scratch.auxiliary, m, order, node.offset, t, side_sign(node.side), out[node.piece, : ground.columns])
     if has_vertical(ground):
         for k in range(order - 1):  # times d u'' / d W
             m[k] = 0.0 if trail.settings.nonlinear else -gain * threshold * x[k]
             for j in range(k + 1):
                 m[k] += lam * x[j] * (-scratch.sine[k - j] if trail.settings.nonlinear else scratch.rotation[k - j])
-        add_moments(scratch.other, m, order, node.offset, t, 1.0, out[node.piece, ground.columns :])
+        add_moments(scratch.auxiliary, m, order, node.offset, t, 1.0, out[node.piece, ground.columns :])
     if block.yielding and node.law == TendonLaw.ELASTIC:
         write_plastic_series(trail, scratch, node.side, x, order, m)
-        add_moments(scratch.other, m, order, 0.0, t, 1.0, change[2:_STATE_DERIVATIVES])
+        add_moments(scratch.auxiliary, m, order, 0.0, t, 1.0, change[2:_STATE_DERIVATIVES])
 
 
 @inlined

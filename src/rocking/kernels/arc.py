@@ -246,7 +246,7 @@ def bound_linear_truncation(
     With u_k = |c_k| h^k and w_j = |W_j| h^j, u'' h^2 omits the products w_j u_k with j + k >= order - 1 and all terms
     that follow from them.
     """
-    c, W, d = scratch.rotation, scratch.weight, scratch.other
+    c, W, d = scratch.rotation, scratch.weight, scratch.auxiliary
     power = 1.0
     largest = 0.0
     for k in range(order + 1):
@@ -276,7 +276,7 @@ def bound_nonlinear_truncation(
     from order - 2 on, u'' the products b z from order - 1 on, and both all terms that follow from them.
     """
     c, A, W = scratch.rotation, scratch.ground, scratch.weight
-    S, C, d = scratch.sine, scratch.cosine, scratch.other
+    S, C, d = scratch.sine, scratch.cosine, scratch.auxiliary
     largest = 0.0
     power = h
     for k in range(order):
@@ -319,7 +319,7 @@ def bound_restrained_truncation(
 
     where Z, in the linear model U, bounds the omitted terms of the sine and cosine of both angles.
     """
-    c, d = scratch.rotation, scratch.other
+    c, d = scratch.rotation, scratch.auxiliary
     largest = last_term = 0.0
     power = 1.0
     for k in range(order + 1):
@@ -352,11 +352,11 @@ def bound_restrained_truncation(
 def bound_restrained_angles(
     scratch: Record, degrees: tuple[int, int], order: int, h: float, forces: tuple[float, float, float, float]
 ) -> float:
-    """Bound V of `bound_restrained_truncation` in the nonlinear model; scratch.other contains terms of the rotation.
+    """Bound V of `bound_restrained_truncation` in the nonlinear model from terms of the rotation in ``auxiliary``.
 
     ``forces``: stiffness and prestress times h^2, contribution of known terms, and feedback of V.
     """
-    A, W, d = scratch.ground, scratch.weight, scratch.other
+    A, W, d = scratch.ground, scratch.weight, scratch.auxiliary
     power, strength, known_terms, feedback = forces
     if not feedback < 0.5:
         return np.inf

@@ -164,7 +164,7 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
     if (
         (block.two_stops and height >= block.overturn_angle)
         or (block.yielding and may_law_change_below(block, settings, state.plastic, height))
-        or (block.friction and not sticks_until_rest(block, settings, motion_bounds, height, max_square))
+        or (block.has_friction and not sticks_until_rest(block, settings, motion_bounds, height, max_square))
     ):
         return no_proof()
     write_local_series(ground, state.piece, state.offset, 1.0, set_zero(scratch.ground))

@@ -156,7 +156,7 @@ class StepEnd(NamedTuple):
 @shared
 def advance_to_event(state: Record, scratch: Record, order: int, h: float, overturn_angle: float) -> StepEnd:
     """Follow the series of an arc to its first event within h; the outcome is STEP, IMPACT or OVERTURN."""
-    c, d = scratch.rotation, scratch.other
+    c, d = scratch.rotation, scratch.auxiliary
     lead = 0 if state.u > 0.0 else (1 if state.v > 0.0 else 2)
     time = find_first_root(c, lead, order, h)
     outcome = StepOutcome.IMPACT
@@ -250,15 +250,15 @@ def find_first_passage(c: Floats, order: int, level: float, h: float, d: Floats)
 @inlined
 def apply_impact(block: Record, state: Record) -> float:
     """Reduce the angular speed and change the side at an impact; return the earlier speed."""
-    left_side = state.side
+    departed_side = state.side
     speed = max(0.0, -state.v)
-    state.side = block.next_side[left_side]
+    state.side = block.next_side[departed_side]
     if block.two_stops and state.u > 0.0:  # at the stop on the other side
-        left_side = state.side = 1 - left_side
+        departed_side = state.side = 1 - departed_side
         speed = max(0.0, state.v)
         state.certificate_speed = np.inf
     state.u = 0.0
-    state.v = restitution_factor(block, left_side, speed, state.impacts) * speed
+    state.v = restitution_factor(block, departed_side, speed, state.impacts) * speed
     state.impacts += 1
     return speed
 

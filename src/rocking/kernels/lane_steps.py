@@ -8,7 +8,7 @@ import numpy as np
 
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.series import (
-    Line,
+    ValueAndSlope,
     has_negligible_truncation,
     nonlinear_velocity_terms,
     sum_forcing,
@@ -58,21 +58,21 @@ _NEXT_TERMS = 2.0**-46
 
 
 @inlined
-def push_line(group: Record, lane: int, unit: float) -> Line:
+def push_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
     """Return the ground acceleration at the start of a sample and its slope, g, rounded as `ground.coefficient`."""
     factor = group.factor[lane]
     return (group.push_start[lane] * factor) * unit, (group.push_slope[lane] * factor) * unit
 
 
 @inlined
-def weight_line(group: Record, lane: int, unit: float) -> Line:
+def weight_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
     """Return the weight at the start of a sample, divided by the weight at rest, and its slope."""
     factor = abs(group.factor[lane])
     return 1.0 + (group.lift_start[lane] * factor) * unit, (group.lift_slope[lane] * factor) * unit
 
 
 @inlined
-def is_event_free(group: Record, lane: int, ends: Line, rate: float, change: Line) -> bool:
+def is_event_free(group: Record, lane: int, ends: ValueAndSlope, rate: float, change: ValueAndSlope) -> bool:
     """Return whether a step certainly contains no impact, new peak or overturning; False for NaN.
 
     During a step from u to u1 (``ends``), the rate of the rotation per step, initially ``rate``, changes by between
@@ -208,14 +208,16 @@ def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> 
 
 
 @inlined
-def line_during(line: Line, k: int, h: float) -> Line:
+def line_during(line: ValueAndSlope, k: int, h: float) -> ValueAndSlope:
     """Return the value of a line at the start of the k-th substep of length h, and its change."""
     change = line[1] * h
     return line[0] + k * change, change
 
 
 @inlined
-def weight_during(group: Record, lane: int, at_rest: Line | None, unit: float, k: int, h: float) -> Line | None:
+def weight_during(
+    group: Record, lane: int, at_rest: ValueAndSlope | None, unit: float, k: int, h: float
+) -> ValueAndSlope | None:
     """Return the weight at the start of the k-th substep of length h, and its change; None if it is constant."""
     if at_rest is None:
         return at_rest
@@ -223,7 +225,7 @@ def weight_during(group: Record, lane: int, at_rest: Line | None, unit: float, k
 
 
 @shared
-def step_nonlinear(group: Record, at_rest: Line | None, unit: float, substeps: int) -> int:
+def step_nonlinear(group: Record, at_rest: ValueAndSlope | None, unit: float, substeps: int) -> int:
     """Step a group of the nonlinear model through one sample and return the number of events.
 
     ``at_rest`` is (1, 0), the weight without vertical motion and its slope, or None if it is constant. A lane whose
@@ -243,7 +245,7 @@ def step_nonlinear(group: Record, at_rest: Line | None, unit: float, substeps: i
 
 @shared
 def take_nonlinear_substep(
-    group: Record, at_rest: Line | None, unit: float, k: int, count: int, fraction: float
+    group: Record, at_rest: ValueAndSlope | None, unit: float, k: int, count: int, fraction: float
 ) -> None:
     """Move the copies through the k-th of ``count`` substeps, and mark lanes with possible events or truncation.
 

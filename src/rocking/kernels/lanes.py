@@ -129,7 +129,7 @@ def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
     group.second[lane] = steps.second[side]
     group.third[lane] = steps.third[side]
     group.curve[lane] = steps.curve[side]
-    if block.friction:
+    if block.has_friction:
         group.sticking_push[lane] = block.sticking_push[side] if state.direction == 0 else -np.inf
         group.sticking_slope[lane] = block.sticking_slope[side]
         group.twice_slenderness[lane] = 2.0 * block.slenderness[side]
@@ -187,7 +187,7 @@ def run_lanes(settings: Record, scratch: Record, pool: Pool, substeps: int) -> N
     group = pool.groups[0]
     while pool.counts.active > 0:
         load_samples(pool)
-        if pool.blocks[0].friction:
+        if pool.blocks[0].has_friction:
             mark_slips(group, pool.grounds.unit, substeps)
         events = step_group(settings, pool, substeps)
         lane = 0

@@ -61,10 +61,10 @@ from rocking.kernels.state import (
 from rocking.kernels.uplift import find_next_uplift, is_side_uncertain
 
 #: Distance from zero rotation within rounding, divided by the largest rotation so far.
-_TOUCH = 2.0**-46
+_CONTACT_ROUNDING = 2.0**-46
 
 #: Distance, divided likewise, at which the rounding of the input may decide on an impact.
-_NEAR_TIE = 2.0**-36
+_AMBIGUOUS_DISTANCE = 2.0**-36
 
 #: Fraction of a step for which a block sticks after its forces have only touched the cone of friction.
 _AFTER_TOUCH = 1e-3
@@ -152,7 +152,7 @@ def rest_until_uplift(
     state.offset = uplift.offset
     state.side = uplift.side
     state.u = state.v = 0.0
-    if block.friction:
+    if block.has_friction:
         if weight_at(ground, state.piece, state.offset) <= 0.0:
             return lose_contact(ground, settings, table, state)
         if block.static_friction <= block.threshold[state.side]:
@@ -169,10 +169,13 @@ def rest_until_uplift(
     state.uplifts += 1
     if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
         h = piece_length(ground, state.piece) - state.offset
-        A, d = scratch.ground, scratch.other
+        A, d = scratch.ground, scratch.auxiliary
         if block.next_side[0] != 0 and is_side_uncertain(ground, block, state.piece, state.offset, h, A, d):
             state.rounding_decisions += 1
-        elif state.rests > 0 and state.last_uplift_time - state.last_rest_time <= _NEAR_TIE * state.last_uplift_time:
+        elif (
+            state.rests > 0
+            and state.last_uplift_time - state.last_rest_time <= _AMBIGUOUS_DISTANCE * state.last_uplift_time
+        ):
             state.rounding_decisions += 1  # the last of its impacts may have been too late
     write_event(settings, table, state, state.last_uplift_time, EventKind.UPLIFT)
     return Ending.RUNNING
@@ -191,7 +194,7 @@ def step_along_arc(ground: Ground, block: Record, settings: Record, scratch: Rec
         end = short_step(ground, block, settings, state, h_max)
     if end.outcome == StepOutcome.UNDECIDED:
         end = full_step(ground, block, settings, scratch, state, h_max)
-    if block.friction and may_slip(ground, block, settings, scratch, state, end):
+    if block.has_friction and may_slip(ground, block, settings, scratch, state, end):
         return step_to_slip(ground, block, settings, scratch, state, end, h_max)
     if state.v < 0.0 <= end.v and end.outcome == StepOutcome.STEP:
         state.rounding_decisions += nearly_touches(ground, block, settings, scratch, state, end.time)
@@ -371,13 +374,13 @@ def process_impact(
     if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
         acceleration = abs(restoring_acceleration(ground, block, state.side, state.piece, state.offset))
         depth = 0.5 * state.v * state.v / acceleration  # distance below zero rotation without ground
-        state.rounding_decisions += depth <= _NEAR_TIE * state.peak
-        if depth <= _TOUCH * state.peak:  # no impact, because it would put the block on the other side
+        state.rounding_decisions += depth <= _AMBIGUOUS_DISTANCE * state.peak
+        if depth <= _CONTACT_ROUNDING * state.peak:  # no impact, because it would put the block on the other side
             state.v = 0.0
             return Ending.RUNNING
     time = state_time(ground, state)
     speed = apply_impact(block, state)
-    if block.friction:
+    if block.has_friction:
         slipped = state.direction
         strike_with_friction(block, state, 1 - state.side, speed)
         if (slipped == 0) != (state.direction == 0):
@@ -410,13 +413,15 @@ def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Rec
     With positive weight, the impact would change the number of impacts, but not the motion.
     """
     order, _, _ = expand_arc(ground, block, settings, scratch, state, h)
-    c, d = scratch.rotation, scratch.other
+    c, d = scratch.rotation, scratch.auxiliary
     for k in range(order):
         d[k] = -(k + 1) * c[k + 1]
     lowest_time = find_first_root(d, 0, order - 1, h)
     lowest, _, _ = evaluate_series(c, order, lowest_time)
-    is_near = lowest <= _NEAR_TIE * state.peak and is_weightless(ground, block, state, state.offset + lowest_time)
-    return bool(is_near or lowest <= _TOUCH * state.peak)
+    is_near = lowest <= _AMBIGUOUS_DISTANCE * state.peak and is_weightless(
+        ground, block, state, state.offset + lowest_time
+    )
+    return bool(is_near or lowest <= _CONTACT_ROUNDING * state.peak)
 
 
 @inlined

@@ -64,7 +64,7 @@ class PeriodicProblem(NamedTuple):
 
 
 #: Columns of a trap: side (negative at rest), middle (u, v), and a, b, c of a du^2 + 2 b du dv + c dv^2 <= 1.
-TRAP = 6
+TRAP_COLUMNS = 6
 
 
 @kernel
@@ -80,9 +80,9 @@ def iterate(
 ) -> None:
     """Take each state through at most ``periods`` periods, until it enters a trap, overturns or rests forever.
 
-    ``ending`` is then its `PeriodOutcome`, ``trap_rows[k]`` the row of its trap in ``traps``, shape (n, `TRAP`), or -1,
-    and ``period_counts[k]`` the number of periods. Row n of ``orbit[k]``, if any, is (u, v, side) after n + 1 periods,
-    unchanged after the last known state.
+    ``ending`` is then its `PeriodOutcome`, ``trap_rows[k]`` the row of its trap in ``traps``, shape
+    (n, `TRAP_COLUMNS`), or -1, and ``period_counts[k]`` the number of periods. Row n of ``orbit[k]``, if any, is
+    (u, v, side) after n + 1 periods, unchanged after the last known state.
     """
     for k in range(states.shape[0]):
         state = states[k]
@@ -387,13 +387,14 @@ def apply_rest_derivative(ground: Ground, block: Record, node: Record, next_node
 
 
 @inlined
-def apply_saltation(ground: Ground, block: Record, left_side: int, next_node: Record, v: float, M: Floats) -> float:
+def apply_saltation(ground: Ground, block: Record, departed_side: int, next_node: Record, v: float, M: Floats) -> float:
     """Multiply a derivative by the saltation of an impact, before which the velocity was v.
 
     Returns the logarithm of its |determinant|.
     """
-    changes_stop = block.two_stops and next_node.side != left_side  # at the other stop, in whose frame all signs change
-    hit, sign = (next_node.side, -1.0) if changes_stop else (left_side, 1.0)
+    # At the other stop, all signs change in its frame.
+    changes_stop = block.two_stops and next_node.side != departed_side
+    hit, sign = (next_node.side, -1.0) if changes_stop else (departed_side, 1.0)
     speed = -sign * v
     e = restitution_factor(block, hit, speed, 0)  # not drawn
     rate = e * relative_speed_slope(block, hit, speed, e)

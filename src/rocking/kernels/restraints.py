@@ -79,7 +79,7 @@ def find_law_change(
     block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float
 ) -> tuple[float, int]:
     """Find the time of the first change of the law along an arc, inf if none within h, and the law after it."""
-    c, d, side = scratch.rotation, scratch.other, state.side
+    c, d, side = scratch.rotation, scratch.auxiliary, state.side
     if state.law == TendonLaw.PLASTIC:
         for k in range(order):
             d[k] = (k + 1) * c[k + 1]

@@ -29,12 +29,12 @@ from rocking.kernels.compiled import inlined
 from rocking.kernels.state import ORDER, Record
 
 #: Value of a quantity that is linear in time, and its slope or change during a step.
-Line = tuple[float, float]
+ValueAndSlope = tuple[float, float]
 
 #: Coefficients c[0] to c[9] of a rotation; nine terms of a velocity; seven sums of |terms| of sin and cos(alpha - u).
-Ten = tuple[float, float, float, float, float, float, float, float, float, float]
-Nine = tuple[float, float, float, float, float, float, float, float, float]
-Seven = tuple[float, float, float, float, float, float, float]
+RotationCoefficients = tuple[float, float, float, float, float, float, float, float, float, float]
+VelocityTerms = tuple[float, float, float, float, float, float, float, float, float]
+AngleSums = tuple[float, float, float, float, float, float, float]
 
 #: Factors that integrate the term of power k twice, 1/((k + 1) (k + 2)), and of power k - 1 once, 1/k.
 INTEGRATED_TWICE = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
@@ -42,7 +42,7 @@ _INTEGRATED = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 
 @inlined
-def weighted_term(weight: Line | None, current: float, previous: float) -> float:
+def weighted_term(weight: ValueAndSlope | None, current: float, previous: float) -> float:
     """Compute a coefficient of weight times series from two neighbouring ones of the series; None: weight 1."""
     return current if weight is None else weight[0] * current + weight[1] * previous
 
@@ -175,7 +175,7 @@ def write_variation_coefficients(work: Record, damping: float, order: int) -> No
 
 
 @inlined
-def expand_linear(u: float, v: float, lam: float, pull: float, rate: float) -> Ten:
+def expand_linear(u: float, v: float, lam: float, pull: float, rate: float) -> RotationCoefficients:
     """Compute the coefficients of u'' = lam u - pull - rate t."""
     c2, c3 = 0.5 * (lam * u - pull), (lam * v - rate) * (1.0 / 6.0)
     c4, c5 = lam * c2 * (1.0 / 12.0), lam * c3 * (1.0 / 20.0)
@@ -185,7 +185,9 @@ def expand_linear(u: float, v: float, lam: float, pull: float, rate: float) -> T
 
 
 @inlined
-def expand_weighted(u: float, v: float, lam: float, pull: float, push: Line, weight: Line) -> Ten:
+def expand_weighted(
+    u: float, v: float, lam: float, pull: float, push: ValueAndSlope, weight: ValueAndSlope
+) -> RotationCoefficients:
     """Compute the coefficients of u'' = weight (lam u - at_rest) - push, with weight and push linear in time."""
     z = lam * u - pull
     c2 = 0.5 * (weighted_term(weight, z, 0.0) - push[0])
@@ -197,7 +199,9 @@ def expand_weighted(u: float, v: float, lam: float, pull: float, push: Line, wei
 
 
 @inlined
-def expand_nonlinear(start: Line, angle: Line, lam: float, push: Line, weight: Line | None) -> tuple[Ten, Seven]:
+def expand_nonlinear(
+    start: ValueAndSlope, angle: ValueAndSlope, lam: float, push: ValueAndSlope, weight: ValueAndSlope | None
+) -> tuple[RotationCoefficients, AngleSums]:
     """Compute the coefficients of u'' = -lam (weight sin(alpha - u) + push cos(alpha - u)).
 
     Weight (None: 1) and push are linear in time. ``start`` is (u, v) and ``angle`` the sine and cosine of alpha - u
@@ -245,7 +249,9 @@ def expand_nonlinear(start: Line, angle: Line, lam: float, push: Line, weight: L
 
 
 @inlined
-def weighted_velocity_terms(r1: float, z0: float, q: float, push: Line, weight: Line) -> tuple[Nine, float, float]:
+def weighted_velocity_terms(
+    r1: float, z0: float, q: float, push: ValueAndSlope, weight: ValueAndSlope
+) -> tuple[VelocityTerms, float, float]:
     """Compute the terms r1 to r9, r10 and r11 of the velocity of a linear arc under varying weight.
 
     u'' = weight z - push, where z is q u minus a constant and z0 is its initial value.
@@ -265,7 +271,9 @@ def weighted_velocity_terms(r1: float, z0: float, q: float, push: Line, weight: 
 
 
 @inlined
-def nonlinear_velocity_terms(r1: float, angle: Line, l2: float, push: Line, weight: Line | None) -> tuple[Nine, Seven]:
+def nonlinear_velocity_terms(
+    r1: float, angle: ValueAndSlope, l2: float, push: ValueAndSlope, weight: ValueAndSlope | None
+) -> tuple[VelocityTerms, AngleSums]:
     """Compute the terms r1 to r9 of the velocity of a nonlinear arc.
 
     ``l2`` is -lam/2, ``angle`` the initial sine and cosine of alpha - u; a weight of None is 1. The second tuple is as
@@ -302,11 +310,11 @@ def nonlinear_velocity_terms(r1: float, angle: Line, l2: float, push: Line, weig
 #: Nine times the largest bound on the truncation of a nonlinear velocity after nine terms, divided by the sum of their
 #: absolute values. The bound, a few times the truncation, is valid if two sums are below a quarter.
 _MAX_TRUNCATION = 9.0 * 2.0**-52
-_QUARTER = 0.25
+_MAX_SUM = 0.25
 
 
 @inlined
-def sum_forcing(weight: Line | None, push: Line, t: float) -> Line:
+def sum_forcing(weight: ValueAndSlope | None, push: ValueAndSlope, t: float) -> ValueAndSlope:
     """Compute the sum of |weight| and |push| within t, and of their changes; lines are values and slopes."""
     if weight is None:
         return 1.0 + abs(push[0]) + abs(push[1]) * t, abs(push[1]) * t
@@ -315,7 +323,9 @@ def sum_forcing(weight: Line | None, push: Line, t: float) -> Line:
 
 
 @inlined
-def has_negligible_truncation(r: Nine, z: Seven, stiffness: float, strength: Line) -> tuple[bool, float]:
+def has_negligible_truncation(
+    r: VelocityTerms, z: AngleSums, stiffness: float, strength: ValueAndSlope
+) -> tuple[bool, float]:
     """Return whether the truncation after nine terms is below 2^-52, and a bound on all terms of u'' after the first.
 
     Special case of `bound_nonlinear_truncation` for motion and weight linear in time, with the step h as the unit of
@@ -333,5 +343,5 @@ def has_negligible_truncation(r: Nine, z: Seven, stiffness: float, strength: Lin
     max_forcing, change = stiffness * strength[0], stiffness * strength[1]
     # The factors include the feedback if velocity and max_forcing are below a quarter.
     truncation = 1.01 * change * z[6] + 0.131 * (max_forcing * products)
-    is_negligible = (truncation <= _MAX_TRUNCATION * velocity) & (velocity <= _QUARTER) & (max_forcing <= _QUARTER)
+    is_negligible = (truncation <= _MAX_TRUNCATION * velocity) & (velocity <= _MAX_SUM) & (max_forcing <= _MAX_SUM)
     return is_negligible, (t3 + t3) + ((t4 + t5) + (t6 + t7) + (t8 + r[8]))

@@ -20,9 +20,9 @@ from rocking.kernels.ground import (
     vertical_component,
 )
 from rocking.kernels.series import (
-    Line,
-    Seven,
-    Ten,
+    AngleSums,
+    RotationCoefficients,
+    ValueAndSlope,
     expand_linear,
     expand_nonlinear,
     expand_weighted,
@@ -88,7 +88,9 @@ def short_weighted_step(ground: Ground, block: Record, settings: Record, state: 
 
 
 @inlined
-def short_nonlinear_step(ground: Ground, block: Record, state: Record, h_max: float, weight: Line | None) -> StepEnd:
+def short_nonlinear_step(
+    ground: Ground, block: Record, state: Record, h_max: float, weight: ValueAndSlope | None
+) -> StepEnd:
     """Compute a short step in the nonlinear model."""
     c, angles = nonlinear_series(ground, block, state, weight)
     lam, slope = block.stiffness[state.side], coefficient(ground, state.piece, 1)
@@ -101,7 +103,7 @@ def short_nonlinear_step(ground: Ground, block: Record, state: Record, h_max: fl
 
 
 @inlined
-def is_sufficient_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
+def is_sufficient_weighted(c: RotationCoefficients, lam: float, weight: ValueAndSlope, t: float) -> bool:
     """Return whether nine terms of a linear series are sufficient at t under varying weight.
 
     Each coefficient follows from those two and, by the change of weight, three before. Therefore the last three bound
@@ -115,7 +117,9 @@ def is_sufficient_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
 
 
 @inlined
-def is_sufficient_nonlinear(c: Ten, z: Seven, lam: float, push: Line, weight: Line | None, t: float) -> bool:
+def is_sufficient_nonlinear(
+    c: RotationCoefficients, z: AngleSums, lam: float, push: ValueAndSlope, weight: ValueAndSlope | None, t: float
+) -> bool:
     """Return whether nine terms of a nonlinear series are sufficient at t."""
     t2 = t * t
     t3, t4 = t2 * t, t2 * t2
@@ -140,13 +144,13 @@ def reach(size: float, limit: float, max_time: float) -> float:
 
 
 @inlined
-def largest_weight(weight: Line | None, duration: float) -> float:
+def largest_weight(weight: ValueAndSlope | None, duration: float) -> float:
     """Return the largest absolute weight during a time; 1 if constant."""
     return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * duration))
 
 
 @inlined
-def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
+def linear_series(ground: Ground, block: Record, state: Record) -> RotationCoefficients:
     """Compute the series of a linear arc under a ground acceleration that is linear in time."""
     side = state.side
     gain = block.threshold_slope[side]
@@ -157,7 +161,7 @@ def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
 
 
 @inlined
-def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) -> Ten:
+def weighted_series(ground: Ground, block: Record, state: Record, weight: ValueAndSlope) -> RotationCoefficients:
     """Compute the series of a linear arc under two ground accelerations that are linear in time."""
     side, gain = state.side, block.threshold_slope[state.side]
     push = push_line(ground, state)
@@ -166,7 +170,9 @@ def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) 
 
 
 @inlined
-def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> tuple[Ten, Seven]:
+def nonlinear_series(
+    ground: Ground, block: Record, state: Record, weight: ValueAndSlope | None
+) -> tuple[RotationCoefficients, AngleSums]:
     """Compute the series of a nonlinear arc under ground accelerations that are linear in time."""
     side, u = state.side, state.u
     angle = (block.sine[side], block.cosine[side])
@@ -177,14 +183,14 @@ def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line 
 
 
 @inlined
-def push_line(ground: Ground, state: Record) -> Line:
+def push_line(ground: Ground, state: Record) -> ValueAndSlope:
     """Return the ground acceleration (linear in time) in the frame of the state's side, and its slope."""
     sign = side_sign(state.side)
     return sign * acceleration(ground, state.piece, state.offset), sign * coefficient(ground, state.piece, 1)
 
 
 @inlined
-def resolve_step(c: Ten, t: float, state: Record, overturn_angle: float) -> StepEnd:
+def resolve_step(c: RotationCoefficients, t: float, state: Record, overturn_angle: float) -> StepEnd:
     """Return the end of a step of duration t, or its first impact; UNDECIDED if the bounds are inconclusive."""
     if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps forever
         return undecided_step()
@@ -218,7 +224,7 @@ def resolve_step(c: Ten, t: float, state: Record, overturn_angle: float) -> Step
 
 
 @inlined
-def bound_higher_curvature(c: Ten, t: float) -> float:
+def bound_higher_curvature(c: RotationCoefficients, t: float) -> float:
     """Bound the contribution of the terms from the fourth power on to |u''| within t."""
     high = 56.0 * abs(c[8]) + 72.0 * abs(c[9]) * t
     middle = 30.0 * abs(c[6]) + 42.0 * abs(c[7]) * t
@@ -228,7 +234,7 @@ def bound_higher_curvature(c: Ten, t: float) -> float:
 
 
 @inlined
-def is_sufficient_linear(c: Ten, t: float) -> bool:
+def is_sufficient_linear(c: RotationCoefficients, t: float) -> bool:
     """Return whether nine terms of a linear series are sufficient at t for the velocity to its last place."""
     t2 = t * t
     t4 = t2 * t2
@@ -236,7 +242,7 @@ def is_sufficient_linear(c: Ten, t: float) -> bool:
 
 
 @inlined
-def evaluate_rotation(c: Ten, t: float) -> float:
+def evaluate_rotation(c: RotationCoefficients, t: float) -> float:
     """Evaluate a series in pairs, a shorter chain of operations than Horner's rule."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
@@ -245,7 +251,7 @@ def evaluate_rotation(c: Ten, t: float) -> float:
 
 
 @inlined
-def evaluate_velocity(c: Ten, t: float) -> float:
+def evaluate_velocity(c: RotationCoefficients, t: float) -> float:
     """Evaluate the derivative of a series."""
     t2 = t * t
     low = (2.0 * c[2] + 3.0 * c[3] * t) + (4.0 * c[4] + 5.0 * c[5] * t) * t2
@@ -254,7 +260,7 @@ def evaluate_velocity(c: Ten, t: float) -> float:
 
 
 @inlined
-def evaluate_divided_by_time(c: Ten, t: float) -> tuple[float, float]:
+def evaluate_divided_by_time(c: RotationCoefficients, t: float) -> tuple[float, float]:
     """Compute value and slope of a series without constant term, divided by t."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
@@ -265,7 +271,7 @@ def evaluate_divided_by_time(c: Ten, t: float) -> tuple[float, float]:
 
 
 @inlined
-def find_peak_time(c: Ten, duration: float) -> float:
+def find_peak_time(c: RotationCoefficients, duration: float) -> float:
     """Find the time of the peak of a concave arc that rises first and falls after ``duration``; NaN if not found."""
     t = min(duration, -0.5 * c[1] / c[2])
     for _ in range(_NEWTON_STEPS):
@@ -280,7 +286,7 @@ def find_peak_time(c: Ten, duration: float) -> float:
 
 
 @inlined
-def find_impact_from_ground(c: Ten, duration: float) -> float:
+def find_impact_from_ground(c: RotationCoefficients, duration: float) -> float:
     """Find the time of the next impact within a duration if u/t decreases until then; else NaN."""
     discriminant = c[2] * c[2] - 4.0 * c[3] * c[1]
     if not (c[2] < 0.0 and discriminant > 0.0):
@@ -299,7 +305,7 @@ def find_impact_from_ground(c: Ten, duration: float) -> float:
 
 
 @inlined
-def find_impact_from_above(c: Ten, duration: float) -> float:
+def find_impact_from_above(c: RotationCoefficients, duration: float) -> float:
     """Find the only root of an arc that is above ground now and below after ``duration``; NaN if not found."""
     discriminant = c[1] * c[1] - 4.0 * c[2] * c[0]
     if not discriminant > 0.0:

@@ -7,7 +7,7 @@ import numpy as np
 
 from rocking.kernels import ground, state
 from rocking.kernels.lanes import build_pool
-from rocking.kernels.periodic import TRAP, PeriodicProblem
+from rocking.kernels.periodic import TRAP_COLUMNS, PeriodicProblem
 from rocking.kernels.sine import sequence
 from rocking.kernels.trace import Trail
 
@@ -48,7 +48,7 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
         "trace.vary": (trail, scratch, state.new_record(state.VARIATION), 0, fixed(), array(), array(), array()),
         "adjoint.adjoint": (trail, scratch, state.new_record(state.VARIATION), 0, 0.0, array(3), array(2, 2)),
         "adjoint.adjoint_of_final_state": (trail, scratch, 0, array(3), array(2, 2)),
-        "periodic.iterate": (problem, scratch, states, 1, array(1, 1, 3), array(1, TRAP), count, count),
+        "periodic.iterate": (problem, scratch, states, 1, array(1, 1, 3), array(1, TRAP_COLUMNS), count, count),
         "periodic.differentiate": (trail, scratch, state.new_record(state.VARIATION), table, states, array(1, 2, 2)),
         "periodic.measure_stretches": (
             trail,

@@ -132,7 +132,7 @@ def find_slip(
     time, direction = np.inf, 0
     sign = 1 - 2 * state.side
     for towards in (1, -1):
-        d = scratch.other
+        d = scratch.auxiliary
         for k in range(order - 1):
             d[k] = block.static_friction * scratch.normal[k] - towards * scratch.slip[k]
         passage = find_first_passing(d, order - 2, min(h, time))
@@ -279,7 +279,7 @@ def shorten_slip(block: Record, scratch: Record, h: float) -> float:
 @shared
 def find_slip_end(scratch: Record, order: int, h: float, direction: float) -> tuple[float, float]:
     """Find the first times in [0, h) at which slide-rock sticks, and at which contact is lost; inf if never."""
-    d = scratch.other
+    d = scratch.auxiliary
     for k in range(order):
         d[k] = direction * scratch.slip[k]
     if d[0] == 0.0 and abs(d[1]) <= _ROUNDING:  # the forces are on the cone except for rounding
@@ -327,7 +327,7 @@ def find_slide_end(
     ground: Ground, block: Record, scratch: Record, state: Record, degree: int, h: float
 ) -> tuple[float, float, float]:
     """Find the length of a step of slide, and the times in it at which it ends and contact is lost; inf if never."""
-    d = scratch.other
+    d = scratch.auxiliary
     if state.piece == last_piece(ground):
         h = min(h, 2.0 * abs(state.slip_rate) / block.kinetic_friction)
     for k in range(degree + 1):

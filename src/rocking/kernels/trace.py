@@ -161,7 +161,7 @@ class Quantity(IntEnum):
 
 
 #: An uplift is a jump if the motion exceeds the threshold by more than this fraction of it.
-_JUMP = 1e-9
+_MIN_JUMP_EXCESS = 1e-9
 
 
 @kernel
@@ -447,7 +447,7 @@ def is_jump(trail: Trail, node: Record) -> bool:
     """Return whether the motion jumps past the threshold at the uplift of a node."""
     threshold, restraint = trail.block.threshold[node.side], trail.block.restraint_threshold[node.side]
     push = -push_towards_side(trail.ground, trail.block, node.side, node.piece, node.offset)
-    return bool(abs(push - threshold - restraint) > _JUMP * (abs(threshold) + abs(restraint)))
+    return bool(abs(push - threshold - restraint) > _MIN_JUMP_EXCESS * (abs(threshold) + abs(restraint)))
 
 
 @inlined

@@ -42,7 +42,7 @@ class Uplift(NamedTuple):
 @inlined
 def rest_threshold(block: Record, side: int) -> float:
     """Return the threshold of a side, of an uplift or of a slip."""
-    return min(block.threshold[side], block.static_friction) if block.friction else block.threshold[side]
+    return min(block.threshold[side], block.static_friction) if block.has_friction else block.threshold[side]
 
 
 @shared
@@ -53,7 +53,7 @@ def find_next_uplift(
 
     Without an uplift before ``stop``, the side is AT_REST and the piece the last one examined.
     """
-    A, d = scratch.ground, scratch.other
+    A, d = scratch.ground, scratch.auxiliary
     plus, minus = rest_threshold(block, 0), rest_threshold(block, 1)
     restraint_plus, restraint_minus = block.restraint_threshold[0], block.restraint_threshold[1]
     if block.two_stops:  # only the stop at which the body rests
@@ -176,7 +176,7 @@ def find_first_excess(A: Floats, degree: int, h: float, threshold: float, sign: 
 
 
 #: A motion is back within a threshold once below by this fraction, so that rounding causes no second passing.
-_RETURN = 2.0**-40
+_RETURN_MARGIN = 2.0**-40
 
 
 @kernel
@@ -248,10 +248,10 @@ def time_above_threshold(ground: Ground, block: Record, scratch: Record, piece: 
     sign, threshold = 1.0 if side == 1 else -1.0, rest_threshold(block, side)
     if threshold == np.inf:
         return 0.0
-    A, d = scratch.ground, scratch.other
+    A, d = scratch.ground, scratch.auxiliary
     degree = write_push(ground, piece, offset, threshold, sign, A, d)
     threshold += block.restraint_threshold[side]
-    d[0] = sign * A[0] - (threshold - _RETURN * abs(threshold))
+    d[0] = sign * A[0] - (threshold - _RETURN_MARGIN * abs(threshold))
     for k in range(1, degree + 1):
         d[k] = sign * A[k]
     return find_first_passing(d, degree, piece_length(ground, piece) - offset)
