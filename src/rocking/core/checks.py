@@ -203,7 +203,7 @@ def hint_at_percent(factor: float) -> str:
 
 
 def _check_number(value: object, name: str, error: Error, requirement: str, is_valid: Callable[[float], bool]) -> float:
-    """Return one real number (infinite if too large for a float), or raise `error` with what it must be."""
+    """Return one real number (infinite if too large for a float), or raise `error` with the requirement."""
     item = _unwrap(value)
     if isinstance(item, Real) and not isinstance(item, bool):
         try:

@@ -54,7 +54,7 @@ def read(
     Returns
     -------
     Motion
-        Motion in m/s^2, linear between the samples, from time 0. Its `history` states what was removed.
+        Motion in m/s^2, linear between the samples, from time 0. Its `history` contains the corrections.
 
     Raises
     ------
