@@ -236,7 +236,7 @@ def test_the_examples_of_layouts_are_read_as_they_state(shared: Path) -> None:
         assert {(each.dt, len(each.acceleration)) for each in found[name]} == {(dt, 60)}, name
     assert [each.name for each in found["mexico_long_header.txt"]] == ["V", "N00E", "N90E"]
     (smc,) = found["smc_padded.smc"]
-    assert smc.times is not None and len(smc.times) == 28
+    assert (smc.dt, len(smc.acceleration)) == (0.0015, 28)
     assert found["csmnc.dat"][0].acceleration.min() == pytest.approx(-0.9523526)
 
 
