@@ -34,6 +34,12 @@ class MotionMeasures:
 
     breakpoints: Floats
     coefficients: Floats
+    name: str
+
+    @property
+    def other_horizontal(self) -> MotionMeasures | None:
+        """Orthogonal horizontal component, if any."""
+        return getattr(self, "orthogonal", None)
 
     @property
     def duration(self) -> float:

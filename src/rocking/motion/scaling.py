@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,9 +17,6 @@ from rocking.core.tables import add_unit
 from rocking.errors import MotionError, OptionError, escape_braces
 from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
 from rocking.motion.pairs import iterate_directions, rotate_peaks, rotate_spectral_acceleration
-
-if TYPE_CHECKING:
-    from rocking.motion.motion import Motion
 
 #: Intensity measures of the analyses.
 IntensityName = Literal[
@@ -224,7 +221,7 @@ class Measure:
         name = self.motion_measure_name
         return self if name == self.name else replace(self, name=name)  # type: ignore[arg-type]
 
-    def value(self, motion: Motion) -> float:
+    def value(self, motion: MotionMeasures) -> float:
         """Return the measure of a motion (of its pair, unless the component is "own"), in SI units, or 1 for factors.
 
         Raises `MotionError` if the component requires a pair and the motion has no orthogonal component.
@@ -236,16 +233,17 @@ class Measure:
             values[self] = self._compute_pair(motion)
         return float(values[self])
 
-    def _compute_pair(self, motion: Motion) -> float:
+    def _compute_pair(self, motion: MotionMeasures) -> float:
         """Compute the measure of a pair, which takes longer."""
-        if motion.orthogonal is None:
+        orthogonal = motion.other_horizontal
+        if orthogonal is None:
             message = (
                 f"the {self.quantity} requires two horizontal components, and {escape_braces(motion.name)} has one; "
             )
             raise MotionError(message + "use records.load_pairs, or with_orthogonal")
         if self.component.startswith("rotd"):
-            return self._compute_rotated(motion, motion.orthogonal)
-        both = [self._compute(part) for part in (motion, motion.orthogonal)]
+            return self._compute_rotated(motion, orthogonal)
+        both = [self._compute(part) for part in (motion, orthogonal)]
         return max(both) if self.component == "larger" else math.sqrt(both[0] * both[1])
 
     def _compute(self, motion: MotionMeasures) -> float:
@@ -260,7 +258,7 @@ class Measure:
         name = self.motion_measure_name
         return 1.0 if name == "factor" else float(getattr(motion, names.get(name, name)))
 
-    def _compute_rotated(self, motion: Motion, orthogonal: Motion) -> float:
+    def _compute_rotated(self, motion: MotionMeasures, orthogonal: MotionMeasures) -> float:
         """Compute the median or the largest value of the measure over all directions."""
         reduce, name = (np.median if self.component == "rotd50" else np.max), self.motion_measure_name
         if self.period is not None:
@@ -281,7 +279,7 @@ class Measure:
         """Power of the factor on a motion by which the measure changes: 2 for "arias", 0 for "duration", else 1."""
         return _QUANTITIES[self.name].exponent
 
-    def require_positive_value(self, motion: Motion, name: str) -> float:
+    def require_positive_value(self, motion: MotionMeasures, name: str) -> float:
         """Return `value`, or raise an error for a motion `name` that is zero throughout."""
         value = self.value(motion)
         if not value > 0.0:
