@@ -9,7 +9,7 @@ from oracles.problem import Problem
 import rocking
 from rocking import Blocks, Motion, simulate, simulate_many
 from rocking.engine.problem import prepare_ground
-from rocking.kernels.ground import component_coefficients, ground_error, bound_stretch
+from rocking.kernels.ground import bound_stretch, component_coefficients, ground_error
 from rocking.simulation import ensemble
 from rocking.simulation.ensemble import Scales
 
