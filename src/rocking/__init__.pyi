@@ -55,6 +55,7 @@ from .errors import RockingError
 from .explorer.launch import explore
 from .motion import Motion
 from .motion.scaling import Measure
+from .motion.stochastic import synthesize_motions
 from .records.formats import read
 from .response import Response, gradient
 from .simulation.ensemble import simulate_many
@@ -128,6 +129,7 @@ __all__ = [
     "solid",
     "studies",
     "survey",
+    "synthesize_motions",
     "uniform",
     "validate",
 ]

@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, make_dataclass, replace
 from pathlib import Path
@@ -211,9 +211,19 @@ def _add_option_to_errors(option: str) -> Iterator[None]:
 
 def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
     """Create an object from an option with NAME=VALUE pairs."""
-    values: dict[str, Any] = {}
     parameters = inspect.signature(kind).parameters.values()
     flags = {parameter.name for parameter in parameters if isinstance(parameter.default, bool)}
+    values = _read_pairs(text, option, bodies.find_reader, flags)
+    bodies.check_parameters(kind, values, "{}", option)
+    with _add_option_to_errors(option):
+        return kind(**values)
+
+
+def _read_pairs(
+    text: str, option: str, find_reader: Callable[[str], Quantity], flags: Collection[str] = ()
+) -> dict[str, Any]:
+    """Return the values of NAME=VALUE pairs."""
+    values: dict[str, Any] = {}
     for part in text.split(","):
         name, equals, value = (parameter.strip() for parameter in part.partition("="))
         name = name.replace("-", "_")
@@ -222,10 +232,8 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
             raise OptionError(message + escape_braces(repr(text)), option, value=text)
         if name in flags and value not in ("yes", "no"):
             raise OptionError(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
-        values[name] = value == "yes" if name in flags else bodies.find_reader(name)(value, option)
-    bodies.check_parameters(kind, values, "{}", option)
-    with _add_option_to_errors(option):
-        return kind(**values)
+        values[name] = value == "yes" if name in flags else find_reader(name)(value, option)
+    return values
 
 
 #: Options of `FileOptions`, by the names of arguments.
@@ -246,10 +254,8 @@ class FileOptions(InputOptions):
 
     def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
         """Return the scaled motion of a record or pulse, with notes."""
-        texts, vertical = self.supplied(), self.supplied().get("vertical")
-        # Mistakes in the options are reported before a long file is read.
-        scalings = {name: text for name, text in texts.items() if name in declared.SCALINGS}
-        target = read_scaling(scalings, read_positive_acceleration)
+        vertical = self.supplied().get("vertical")
+        target = self._target()  # mistakes in the options are reported before a long file is read
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
@@ -258,6 +264,11 @@ class FileOptions(InputOptions):
             options = self.metadata() | self.corrections()
             motion = load_motion(name, **options, vertical=vertical, several=several)
         return self._scale(name, motion, target)
+
+    def _target(self) -> tuple[float, Measure] | None:
+        """Return the level and the measure to which motions are scaled, if any."""
+        texts = {name: text for name, text in self.supplied().items() if name in declared.SCALINGS}
+        return read_scaling(texts, read_positive_acceleration)
 
     def _scale(self, name: str, motion: Motion, target: tuple[float, Measure] | None) -> Motion:
         """Return the scaled motion, with notes."""
@@ -275,6 +286,16 @@ class FileOptions(InputOptions):
     def pulses(self) -> dict[str, Motion]:
         """Return the pulses by their texts."""
         return {text: self.motion(text, is_pulse=True) for text in self.supplied().get("pulse", ())}
+
+    def stochastic_motions(self) -> dict[str, Motion]:
+        """Return the stochastic motions by distinct names."""
+        motions: list[Motion] = []
+        for text in self.supplied().get("stochastic", ()):
+            values = _read_pairs(text, "stochastic", lambda name: bodies.STOCHASTIC.get(name, read_number))
+            with _add_option_to_errors("stochastic"):
+                motions += bodies.create_stochastic(values, "{}", "stochastic")
+        named = zip(list_motion_names(motions), motions, strict=True)
+        return {name: self._scale(name, motion, self._target()) for name, motion in named}
 
 
 @_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse")
@@ -345,11 +366,12 @@ class _RecordOptions(FileOptions):
     def read_all(self, names: Sequence[str]) -> LoadedRecords:
         """Return the motions by name."""
         records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
-        if not records and not pulses:
-            message = "at least one record is required: file, folder, or name of a shipped record, or {}"
-            raise OptionError(message, "pulse")
+        stochastic = self.stochastic_motions()
+        if not (records or pulses or stochastic):
+            message = "at least one record is required: file, folder, or name of a shipped record, or {} or {}"
+            raise OptionError(message, "pulse", "stochastic")
         if self.component != "own":
-            return self._read_pairs(records, pulses)
+            return self._load_pairs(records, [*pulses, *stochastic])
         pulse_motions = self.pulses()
         read = functools.partial(self.motion, several=len(records) > 1)
         motions, skipped = read_records(records, read, keep_going=self.keep_going)
@@ -358,17 +380,17 @@ class _RecordOptions(FileOptions):
             raise RecordError(f"none of {len(records)} records could be read; the first: {messages[0]}")
         for message in messages:
             note(f"skipped: {message}")
-        motions |= pulse_motions
+        motions |= pulse_motions | stochastic
         is_single = [*motions] == [*names, *pulses] and len(motions) == 1 and not self.reversed
         return LoadedRecords(self._add_reversed(motions), skipped, is_single)
 
-    def _read_pairs(self, records: Sequence[str], pulses: Sequence[str]) -> LoadedRecords:
+    def _load_pairs(self, records: Sequence[str], pulses: Sequence[str]) -> LoadedRecords:
         """Return both horizontal components of each station, scaled by one factor."""
         supplied = self.supplied()
         if pulses or "channel" in supplied or supplied.get("vertical", OWN) != OWN:
-            message = f"{{}} {self.component} requires records: omit {{}} and {{}}, and use {{}} {OWN} or omit it"
-            raise OptionError(message, "component", "pulse", "channel", "vertical")
-        target = read_scaling({k: v for k, v in supplied.items() if k in declared.SCALINGS}, read_positive_acceleration)
+            message = f"{{}} {self.component} requires records: omit {{}}, {{}} and {{}}, and use {{}} {OWN} or omit it"
+            raise OptionError(message, "component", "pulse", "stochastic", "channel", "vertical")
+        target = self._target()
         if target is not None and target[1].name != "factor":
             target = target[0], replace(target[1], component=self.component)
         options = self.read_values("dt", "units") | self.corrections()
@@ -381,12 +403,12 @@ class _RecordOptions(FileOptions):
         return motions | {f"{name} x -1": -motion for name, motion in motions.items()} if self.reversed else motions
 
 
-@_with_inputs("vertical", "pulse")
+@_with_inputs("vertical", "pulse", "stochastic")
 class UnscaledOptions(_RecordOptions):
     """Several records and pulses with vertical motions, scaled by the analysis itself."""
 
 
-@_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse")
+@_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse", "stochastic")
 class MotionOptions(_RecordOptions):
     """Several records and pulses, scaled."""
 

@@ -17,6 +17,8 @@ from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, INPUTS, READERS, BlockDescription
 from rocking.inputs.notes import block_notes, restraint_notes
 from rocking.inputs.quantities import Quantity
+from rocking.motion.motion import Motion
+from rocking.motion.stochastic import synthesize_motions
 
 #: Number of bodies that are checked for likely mistakes.
 _MAX_CHECKED: Final = 100
@@ -115,6 +117,22 @@ def find_reader(parameter: str) -> Quantity:
     """Return the reader of a parameter of a restraint or of another body."""
     kind = INPUTS[parameter].kind if parameter in INPUTS else "number"
     return READERS.get(kind, READERS["number"])[0]
+
+
+#: Readers of parameters of stochastic motions.
+STOCHASTIC: Final[Mapping[str, Quantity]] = {
+    "arias_intensity": READERS["velocity"][0],
+    **dict.fromkeys(("duration", "middle_time", "dt"), READERS["duration"][0]),
+    **dict.fromkeys(("frequency", "highpass"), READERS["frequency"][0]),
+    **dict.fromkeys(("frequency_rate", "damping", "count", "seed"), READERS["number"][0]),
+}
+
+
+def create_stochastic(values: Mapping[str, Any], owner: str, *names: str) -> tuple[Motion, ...]:
+    """Create stochastic motions from values by name, which ``names`` are parameters in ``owner``."""
+    check_parameters(synthesize_motions, values, owner, *names)
+    whole = {k: int(v) for k, v in values.items() if k in ("count", "seed") and float(v).is_integer()}
+    return synthesize_motions(**{**values, **whole})
 
 
 def check_parameters(factory: Callable[..., object], provided: Iterable[str], owner: str, *names: str) -> None:
