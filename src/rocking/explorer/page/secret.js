@@ -5,9 +5,10 @@ const KEPT = "rocking-secret";
 
 /** @returns {Promise<string>} */
 async function found() {
-  const token = new URLSearchParams(location.hash.slice(1)).get("token");
+  const given = new URLSearchParams(location.hash.slice(1)), token = given.get("token");
   if (token) {
-    history.replaceState(null, "", location.pathname + location.search);
+    given.delete("token");
+    history.replaceState(null, "", location.pathname + location.search + (given.size ? `#${given}` : ""));
     const response = await fetch("/api/secret", {method: "POST", headers: bearing(token)}).catch(() => null);
     if (response?.ok) return keep(await response.text());
   }

@@ -7,16 +7,16 @@ import {Numbers} from "./fields.js";
 import {Phase} from "./phase.js";
 import {Tours} from "./tours.js";
 import {Workers} from "./workers.js";
-import {openKernels} from "./kernels.js";
-import {limited, readCase, writeCase} from "./case.js";
+import {DATA, openKernels} from "./kernels.js";
+import {limited, readAddress, writeCase} from "./case.js";
 import {respond, upliftOf} from "./response.js";
 import {groundAt} from "./motions.js";
 import {described, headline, margin, reasons} from "./sentences.js";
 import {one, put} from "./dom.js";
 import {fixed} from "../numbers.js";
 
-/** An address that asks for the outcome first. */
-const ASKED = /[#&]ask=1\b/;
+/** An address that asks for the outcome first, or that the explorer has printed. */
+const ASKED = /[#&](ask=1\b|token=)/;
 /** Pause before the address changes and slow parts are computed again, ms. */
 const SETTLED = 200;
 /** What is said before the first answer. */
@@ -27,10 +27,9 @@ class Page {
   /** @param {import("./kernels.js").Kernels} kernels */
   constructor(kernels) {
     this.kernels = kernels;
-    this.given = readCase(location.hash.slice(1));
+    this.read();
     this.time = 0;
     this.playing = false;
-    this.answered = location.hash.length > 1 && !ASKED.test(location.hash);
     /** @type {any} */
     this.shown = null;
     /** @type {import("./motions.js").Case | null} */
@@ -52,10 +51,15 @@ class Page {
     }
     one("close").addEventListener("click", () => this.leave());
     addEventListener("keydown", (event) => this.key(event));
-    addEventListener("hashchange", () => { if (location.hash.slice(1) !== this.written) this.show(readCase(location.hash.slice(1))); });
+    addEventListener("hashchange", () => { if (location.hash.slice(1) !== this.written) { this.read(); this.show(this.given, !this.answered, this.wrong); } });
     this.compute();
     this.settle();
     document.body.dataset.ready = "1";
+  }
+
+  /** Read the address. */
+  read() {
+    Object.assign(this, readAddress(location.hash.slice(1)), {answered: location.hash.length > 1 && !ASKED.test(location.hash)});
   }
 
   /** @param {KeyboardEvent} event */
@@ -72,6 +76,7 @@ class Page {
   change(patch) {
     this.pending = limited({...(this.pending ?? this.given), ...patch});
     this.answered = true;
+    this.wrong = [];
     if (this.frame) return;
     this.frame = requestAnimationFrame(() => {
       this.frame = 0;
@@ -81,12 +86,10 @@ class Page {
     });
   }
 
-  /** Show another case from its start. @param {import("./motions.js").Case} given @param {boolean} [asked] whether its outcome is asked first */
-  show(given, asked = false) {
+  /** Show another case from its start. @param {import("./motions.js").Case} given @param {boolean} [asked] whether its outcome is asked first @param {string[]} [wrong] what cannot be shown */
+  show(given, asked = false, wrong = []) {
     this.stop();
-    this.given = limited(given);
-    this.pending = null;
-    this.answered = !asked;
+    Object.assign(this, {given, wrong, pending: null, answered: !asked});
     this.guess = undefined;
     this.time = 0;
     this.compute();
@@ -115,6 +118,7 @@ class Page {
     if (this.pending) return;
     const {given} = this;
     this.written = writeCase(given);
+    if (DATA.served) put(one("more"), {href: `/?${this.written}`});
     if (this.answered) history.replaceState(null, "", `#${this.written}`);
     this.panels[this.panel ?? ""]?.settle?.();
     const critical = given.tilt || given.motion === "still" ? null : await this.workers.ask({kind: "critical", given});
@@ -136,7 +140,7 @@ class Page {
     const strong = document.createElement("strong");
     strong.textContent = `${judged}${verdict}`;
     strong.className = this.shown.falling ? "over" : "";
-    one("headline").replaceChildren(strong, ` ${margin(this.shown, this.critical)}`);
+    one("headline").replaceChildren(strong, ` ${margin(this.shown, this.critical)}${this.wrong.length ? ` This page cannot show all of the address: ${this.wrong.join(", ")}.` : ""}`);
     one("why").replaceChildren(...linked(reasons(this.shown), (time) => { this.stop(); this.seek(time); }));
   }
 
