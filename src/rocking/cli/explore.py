@@ -57,7 +57,7 @@ def explore(
     server = start_listening(explorer, texts, study, address=address, port=port)
     path = "/block" if motion is None and is_available() else "/"
     if motion is None and path == "/":
-        note("the page of the block needs WebAssembly, which this installation does not have; the explorer opens instead")
+        note("the page of the block needs WebAssembly, which was not built with this installation; the explorer opens")
     server.announce(open_browser=not no_open, path=path)
     server.run()
 

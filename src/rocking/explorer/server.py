@@ -31,7 +31,7 @@ from rocking.explorer.core import EXPORTS, Explorer
 from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.parameters import PARAMETERS, QUANTITIES, field_label, specification
 from rocking.explorer.payload import Payload, fill_page, pack, phrase
-from rocking.explorer.standalone import build_page
+from rocking.explorer.standalone import build_page, is_available
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import MAX_FILE_SIZE, TOO_LARGE_MESSAGE
 from rocking.inputs.quantities import read_number
@@ -261,6 +261,7 @@ class App:
             **specification(),
             "axes": [asdict(axis) | {"label": phrase(f"axis.{axis.name}")} for axis in maps.AXES.values()],
             "opening": self.opening,
+            "block_page": is_available(),
             "study": None if self.study is None else self.study.describe(),
         }
 

@@ -4,8 +4,6 @@ A step marks and counts the lanes in which an event may occur (always with NaN, 
 the others that have a block. Weights are in the ground's frame, divided by the weight at rest.
 """
 
-import numpy as np
-
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.series import (
     ValueAndSlope,

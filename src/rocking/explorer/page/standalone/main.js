@@ -54,6 +54,7 @@ class Page {
     addEventListener("hashchange", () => { if (location.hash.slice(1) !== this.written) { this.read(); this.show(this.given, !this.answered, this.wrong); } });
     this.compute();
     this.settle();
+    if (DATA.class && !this.answered) this.open("tours");
     document.body.dataset.ready = "1";
   }
 
@@ -222,6 +223,6 @@ class Page {
   }
 }
 
-openKernels().then((kernels) => new Page(kernels)).catch((/** @type {Error} */ error) => {
+openKernels().then((kernels) => { Object.assign(globalThis, {page: new Page(kernels)}); }).catch((/** @type {Error} */ error) => {
   one("headline").textContent = `This browser cannot run the kernels (${error.message}). Use a current version of Chromium, Firefox or Safari.`;
 });

@@ -101,13 +101,13 @@ export class MapView {
     const values = new Float32Array(COLUMNS * ROWS).fill(-1), {workers} = this.page, began = performance.now();
     this.values = values;
     document.body.dataset.map = this.words.textContent = "";
-    let before = Infinity;
+    let before = 0; // of which no number is a multiple
     for (const stride of STRIDES) {
       const asked = [];
       for (let column = 0; column < COLUMNS; column += stride) {
         /** @type {number[]} */
         const rows = [];
-        for (let row = 0; row < ROWS; row += stride) if (column % before || row % before) rows.push(row);
+        for (let row = 0; row < ROWS; row += stride) if (column % before !== 0 || row % before !== 0) rows.push(row);
         const points = rows.map((row) => this.at(given, (column + 0.5) / COLUMNS, (row + 0.5) / ROWS));
         asked.push(workers.ask({kind: "column", given: points[0] ?? given, amplitudes: points.map(({amplitude}) => amplitude), rests: this.kind === "sines"}).then((/** @type {number[]} */ found) => {
           if (this.shape !== key) return;
