@@ -80,7 +80,6 @@ def build_page(names: Sequence[str] = RECORDS, exercises: Path | None = None, *,
         "CORE": core,
         "APP": _bundle("standalone/main.js", seen)[0],
         "MORE": '<a id="more" href="/">Records and studies</a>' if served else "",
-        "SECRET": f'<script type="module">{_read("secret.js")}</script>' if served else "",
     }
     html = _read("standalone/index.html").replace("CONNECT", "'self'" if served else "'none'")
     page = re.sub(r"/\*([A-Z]+)\*/", lambda match: parts[match[1]], html)

@@ -5,10 +5,9 @@ const KEPT = "rocking-secret";
 
 /** @returns {Promise<string>} */
 async function found() {
-  const given = new URLSearchParams(location.hash.slice(1)), token = given.get("token");
+  const token = new URLSearchParams(location.hash.slice(1)).get("token");
   if (token) {
-    given.delete("token");
-    history.replaceState(null, "", location.pathname + location.search + (given.size ? `#${given}` : ""));
+    history.replaceState(null, "", location.pathname + location.search);
     const response = await fetch("/api/secret", {method: "POST", headers: bearing(token)}).catch(() => null);
     if (response?.ok) return keep(await response.text());
   }

@@ -9,14 +9,15 @@ import {measured, whole} from "../numbers.js";
 export const FIRST = "width=0.4&height=1.6&motion=one-sine:amplitude=3.01,frequency=1";
 
 /** Smallest and largest number of each quantity. @type {Record<string, [number, number]>} */
-export const LIMITS = {width: [0.02, 50], height: [0.02, 50], restitution: [0.05, 1], amplitude: [0.01, 100], rate: [0.02, 50], cycles: [0.5, 20], threshold: [1e-9, 0.5], tilt: [-1.4, 1.4]};
-/** Largest ratio of width and height, beyond which no rigid block continues to rock. */
-const STOCKIEST = 1.25;
+export const LIMITS = {width: [0.02, 50], height: [0.02, 50], restitution: [0.05, 0.998], amplitude: [0.01, 100], rate: [0.02, 50], cycles: [0.5, 20], threshold: [1e-9, 0.5], tilt: [-1.4, 1.4]};
+/** Ratios of width and height: no stockier block continues to rock, and no more slender one comes to rest within reasonable time. */
+const STOCKIEST = 1.25, SLENDEREST = 0.04;
 
 /** Bring all numbers of a case into their limits. @param {Case} given @returns {Case} */
 export function limited(given) {
   const made = /** @type {any} */ ({...given});
   for (const [name, [low, high]] of Object.entries(LIMITS)) if (made[name] !== null) made[name] = Math.min(Math.max(made[name], low), high);
+  made.height = Math.min(made.height, made.width / SLENDEREST);
   made.width = Math.min(made.width, STOCKIEST * made.height);
   made.offset = Math.min(Math.max(made.offset, -made.width / 4), made.width / 4);
   made.cycles = Math.round(2 * made.cycles) / 2;

@@ -27,7 +27,7 @@ export const QUANTITIES = {
   width: simple("Width", "m", [0.1, 2], "width"),
   height: simple("Height", "m", [0.2, 6], "height"),
   offset: simple("Mass off the middle", "m", [-0.1, 0.1], "offset"),
-  restitution: {...simple("Restitution", "", [0.5, 1], "restitution"), of: (given, page) => given.restitution ?? page.shown.body.sides[0].restitution},
+  restitution: {...simple("Restitution", "", [0.5, 0.998], "restitution"), of: (given, page) => given.restitution ?? page.shown.body.sides[0].restitution},
   threshold: {text: "Threshold of rest (0: proof)", unit: "", ends: [0, 0.1], of: (given) => given.threshold ?? 0, patch: (threshold) => ({threshold: threshold > 0 ? threshold : null})},
   tilt: simple("Tilt at the start", "°", [-20, 20], "tilt", DEGREE),
   amplitude: simple("Amplitude", "g", [0, 1], "amplitude", GRAVITY),
@@ -59,7 +59,7 @@ export class Numbers {
       make("label", {class: "choice"}, ["Equation ", this.model]), this.derived,
       make("p", {}, [
         make("button", {type: "button", on: {click: () => this.copy()}}, ["Copy link"]), " ",
-        make("button", {type: "button", on: {click: () => page.change({restitution: null, threshold: null, offset: 0, tilt: 0})}}, ["Plain block"]), " ", this.copied,
+        make("button", {type: "button", on: {click: () => page.change({restitution: null, threshold: null, offset: 0, tilt: 0})}}, ["Reset block"]), " ", this.copied,
       ]),
       make("details", {}, [make("summary", {}, ["About"]), make("p", {}, [
         `Computed in this browser by the kernels of rocking ${DATA.version} (${DATA.fingerprint}), compiled to WebAssembly that imports no function. In 1,000 random cases of all motions, no outcome `

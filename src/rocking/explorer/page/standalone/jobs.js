@@ -26,8 +26,7 @@ export const JOBS = {
 };
 
 /** Answer messages, as a worker does. */
-export async function serve() {
-  const kernels = await openKernels();
-  onmessage = ({data: {id, job}}) => postMessage({id, result: JOBS[job.kind](kernels, job)});
-  postMessage({id: -1});
+export function serve() {
+  const opened = openKernels();
+  onmessage = async ({data}) => postMessage(JOBS[data.kind](await opened, data));
 }

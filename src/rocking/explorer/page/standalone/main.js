@@ -27,7 +27,10 @@ class Page {
   /** @param {import("./kernels.js").Kernels} kernels */
   constructor(kernels) {
     this.kernels = kernels;
-    this.read();
+    const {given, wrong} = readAddress(location.hash.slice(1));
+    this.given = given;
+    this.wrong = wrong;
+    this.answered = location.hash.length > 1 && !ASKED.test(location.hash);
     this.time = 0;
     this.playing = false;
     /** @type {any} */
@@ -51,16 +54,12 @@ class Page {
     }
     one("close").addEventListener("click", () => this.leave());
     addEventListener("keydown", (event) => this.key(event));
-    addEventListener("hashchange", () => { if (location.hash.slice(1) !== this.written) { this.read(); this.show(this.given, !this.answered, this.wrong); } });
+    addEventListener("hashchange", () => { if (location.hash.slice(1) !== this.written) this.show(location.hash, ASKED.test(location.hash)); });
     this.compute();
     this.settle();
+    if (DATA.served) redeem().catch(() => {}); // the explorer says what is missing
     if (DATA.class && !this.answered) this.open("tours");
     document.body.dataset.ready = "1";
-  }
-
-  /** Read the address. */
-  read() {
-    Object.assign(this, readAddress(location.hash.slice(1)), {answered: location.hash.length > 1 && !ASKED.test(location.hash)});
   }
 
   /** @param {KeyboardEvent} event */
@@ -87,10 +86,10 @@ class Page {
     });
   }
 
-  /** Show another case from its start. @param {import("./motions.js").Case} given @param {boolean} [asked] whether its outcome is asked first @param {string[]} [wrong] what cannot be shown */
-  show(given, asked = false, wrong = []) {
+  /** Show the case of an address from its start. @param {string} address @param {boolean} asked whether its outcome is asked first */
+  show(address, asked) {
     this.stop();
-    Object.assign(this, {given, wrong, pending: null, answered: !asked});
+    Object.assign(this, readAddress(address.replace(/^#/, "")), {pending: null, answered: !asked});
     this.guess = undefined;
     this.time = 0;
     this.compute();
@@ -221,6 +220,16 @@ class Page {
     }
     if (name) { this.panels[name].update(); this.panels[name].settle?.(); }
   }
+}
+
+/** Exchange the token of the explorer's link for its secret, which the storage of this origin keeps for the explorer. */
+async function redeem() {
+  const given = new URLSearchParams(location.hash.slice(1)), token = given.get("token");
+  if (!token) return;
+  given.delete("token");
+  history.replaceState(null, "", location.pathname + (given.size ? `#${given}` : ""));
+  const response = await fetch("/api/secret", {method: "POST", headers: {authorization: `Bearer ${token}`}});
+  if (response.ok) localStorage.setItem("rocking-secret", await response.text());
 }
 
 openKernels().then((kernels) => { Object.assign(globalThis, {page: new Page(kernels)}); }).catch((/** @type {Error} */ error) => {

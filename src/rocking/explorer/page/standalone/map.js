@@ -75,7 +75,7 @@ export class MapView {
     const isPossible = is(given) && !given.tilt, key = isPossible ? JSON.stringify([this.kind, rest]) : "";
     this.title.textContent = title;
     for (const each of this.choices) each.setAttribute("aria-pressed", String(each.value === this.kind));
-    this.legend.replaceChildren(...legend.flatMap(([colour, text]) => [draw("svg", {class: "key", style: `background: var(--${colour})`}), `${text} `]));
+    this.legend.replaceChildren(...legend.map(([colour, text]) => make("span", {class: "key"}, [draw("svg", {style: `background: var(--${colour})`}), text])));
     if (key === this.shape && key) return;
     this.shape = key;
     workers.drop("column");

@@ -91,15 +91,15 @@ function momentsOf(kernels, body, shaking, response, picture) {
 }
 
 /** Whether a block falls on ground that stops: its energy suffices to pass over a balance, now or after impacts.
- * @param {import("./kernels.js").Body} body @param {import("./kernels.js").Start} start */
-function fallsAlone({sides, model}, {side, u, v}) {
-  const energies = sides.map(({p, alpha}) => (/** @type {number} */ turned) => p * p * (model === "linear" ? turned * (alpha - turned / 2) : 2 * Math.sin(turned / 2) * Math.sin(alpha - turned / 2)));
+ * @param {import("./kernels.js").Body} body @param {import("./kernels.js").Start} start @param {any} libm */
+function fallsAlone({sides, model}, {side, u, v}, libm) {
+  const energies = sides.map(({p, alpha}) => (/** @type {number} */ turned) => p * p * (model === "linear" ? turned * (alpha - turned / 2) : 2 * libm.sin(turned / 2) * libm.sin(alpha - turned / 2)));
   const barriers = sides.map(({alpha}, k) => energies[k](alpha));
   let energy = energies[side](u) + (v * v) / 2, now = side;
   if (u >= sides[side].alpha && (v >= 0 || energy < barriers[side])) return true;
   for (let outward = v >= 0; energy > Math.min(...barriers); outward = true) {
     if (outward && energy > barriers[now]) return true;
-    energy *= sides[now].restitution ** 2;
+    energy *= sides[now].restitution * sides[now].restitution;
     now = 1 - now;
   }
   return false;
@@ -109,8 +109,8 @@ function fallsAlone({sides, model}, {side, u, v}) {
  * @param {import("./kernels.js").Kernels} kernels @param {any} body @param {any} shaking @param {any} response @param {any} picture */
 function noReturn(kernels, body, shaking, response, {times, rotation, velocity}) {
   if (!shaking.pieces) return 0;
-  const k = times.findLastIndex((/** @type {number} */ time, /** @type {number} */ at) => time < response.end && !fallsAlone(body, stateOf(rotation[at], velocity[at])));
-  return k < 0 ? 0 : last(times[k], Math.min(times[k + 1], response.end), (time) => !fallsAlone(body, stateAt(kernels, body, shaking, response, time)));
+  const k = times.findLastIndex((/** @type {number} */ time, /** @type {number} */ at) => time < response.end && !fallsAlone(body, stateOf(rotation[at], velocity[at]), kernels.exports));
+  return k < 0 ? 0 : last(times[k], Math.min(times[k + 1], response.end), (time) => !fallsAlone(body, stateAt(kernels, body, shaking, response, time), kernels.exports));
 }
 
 /** Smallest amplitude that overturns the block, m/s², among levels of half a per cent and that of the case, up to 20 times

@@ -47,8 +47,10 @@ export class Scene {
     this.moving = draw("rect", {class: "moving"});
     this.needed = draw("path", {class: "needed"});
     this.barText = draw("text", {class: "small", "text-anchor": "middle"}, ["energy"]);
-    this.bars.append(draw("rect", {class: "frame"}), this.stored, this.moving, this.needed, this.barText);
-    this.svg.append(this.grid, this.earth, this.hatch, this.scaleText, this.whole, this.push, this.pivot, this.bars);
+    this.needText = draw("text", {class: "small", "text-anchor": "end"}, ["to fall"]);
+    this.pushText = draw("text", {class: "small", "text-anchor": "middle"}, ["push"]);
+    this.bars.append(draw("rect", {class: "frame"}), this.stored, this.moving, this.needed, this.barText, this.needText);
+    this.svg.append(this.grid, this.earth, this.hatch, this.scaleText, this.whole, this.push, this.pushText, this.pivot, this.bars);
     this.scale = 0;
     this.enlarged = 1;
     dragged(this.top, (event) => this.hold(event), (event, held) => this.page.change({height: held.height + (held.y - event.clientY) / this.scale}), () => this.settle());
@@ -138,6 +140,7 @@ export class Scene {
     const cos = Math.cos(rotation), sin = Math.sin(rotation), dx = place - pivot, dy = -tall / 2;
     const x = this.middle + pivot + dx * cos - dy * sin, y = this.floor + dx * sin + dy * cos;
     const length = (-acceleration / GRAVITY) * PUSH * tall, tip = Math.sign(length) * Math.min(9, Math.abs(length));
+    put(this.pushText, {x: x + length / 2, y: y - 10, visibility: Math.abs(length) < 24 ? "hidden" : "visible"});
     put(this.push, {d: Math.abs(length) < 3 ? "" : `M${x} ${y}h${length}m${-tip} ${-0.7 * Math.abs(tip)}l${tip} ${0.7 * Math.abs(tip)}l${-tip} ${0.7 * Math.abs(tip)}`});
   }
 
@@ -152,6 +155,7 @@ export class Scene {
     put(this.moving, {x: x - 9, y: y - of(Math.max(0, stored) + moving), width: 18, height: of(Math.max(0, stored) + moving) - of(stored)});
     put(this.needed, {d: `M${x - 15} ${y - unit}h30`});
     put(this.barText, {x, y: y + 15});
+    put(this.needText, {x: x - 20, y: y - unit + 4});
   }
 
   /** Displacement of the ground as it is drawn: that of records without their drift. @param {number} computed */
@@ -175,7 +179,7 @@ export class Scene {
     let hatch = `M0 ${floor}H${width}`;
     for (let x = (((middle % 18) + 18) % 18) - 18; x < width + 18; x += 18) hatch += `M${(x + 9).toFixed(1)} ${floor + 3}l-9 11`;
     put(this.hatch, {d: hatch});
-    put(this.scaleText, {x: width - 10, y: floor + this.below - 7});
+    put(this.scaleText, {x: width - 10, y: this.below < 34 ? floor - 7 : floor + this.below - 7});
     this.scaleText.textContent = `${this.enlarged > 1 ? `rotation drawn ${short(this.enlarged)} times larger, ` : ""}grid ${short(step)} m`;
   }
 }

@@ -19,7 +19,7 @@ export class Strip {
   constructor(page) {
     this.page = page;
     this.width = this.height = this.span = this.from = this.unit = this.upper = this.middle = this.tall = this.knobTime = this.most = 0;
-    this.sign = 1;
+    this.sign = this.share = 1;
     this.held = false;
     /** @type {SVGSVGElement} */
     this.svg = one("strip");
@@ -47,12 +47,12 @@ export class Strip {
     this.page.rewind();
     this.held = true;
     const {given} = this.page;
-    return {x: event.clientX, y: event.clientY, given, length: isRecord(given.motion) ? 1 : lengthOf(given), time: this.knobTime};
+    return {x: event.clientX, y: event.clientY, given, share: this.share, length: isRecord(given.motion) ? 1 : lengthOf(given), time: this.knobTime};
   }
 
   /** @param {PointerEvent} event @param {any} held */
   reshape(event, held) {
-    const {given} = held, amplitude = given.amplitude + ((held.y - event.clientY) / this.unit) * this.sign;
+    const {given} = held, amplitude = given.amplitude + ((held.y - event.clientY) / this.unit / held.share) * this.sign;
     if (isRecord(given.motion)) { this.page.change({amplitude}); return; }
     const time = Math.max(held.time * 0.1, held.time + ((event.clientX - held.x) / (this.width - LEFT - RIGHT)) * this.span);
     this.page.change({amplitude, rate: rateFor(given, held.length * (held.time > 0 ? time / held.time : 1))});
@@ -105,7 +105,8 @@ export class Strip {
       this.knobTime = given.motion === "rectangular" ? lengthOf(given) : corners[peak];
     } else this.knobTime = corners[peak];
     this.sign = Math.sign(acceleration[peak]) || 1;
-    put(this.knob, {transform: `translate(${this.x(this.knobTime)} ${this.upper - this.sign * given.amplitude * this.unit})`, visibility: stillGround ? "hidden" : "visible"});
+    this.share = isRecord(given.motion) ? Math.abs(acceleration[peak]) / given.amplitude || 1 : 1; // the part that is shown may lack the peak
+    put(this.knob, {transform: `translate(${this.x(this.knobTime)} ${this.upper - this.sign * given.amplitude * this.share * this.unit})`, visibility: stillGround ? "hidden" : "visible"});
     this.moments(shown, y);
     this.follow();
   }

@@ -2,7 +2,6 @@
 
 import {make, one} from "./dom.js";
 import {DATA} from "./kernels.js";
-import {readAddress} from "./case.js";
 
 /** Step: its words, the address of its case, what is done, the panel that is open, and what is outlined.
  * @typedef {{words: string, case?: string, play?: boolean, ask?: boolean, at?: "gone" | "peak" | "lift", panel?: string, ends?: [string, [number, number]], mark?: string}} Step */
@@ -38,7 +37,7 @@ export class Tours {
     /** @type {Partial<Step>} */
     const chosen = ended ? {} : steps[step];
     const before = steps.slice(0, step + 1).findLast((each) => each.case)?.case;
-    if (!ended && before && (chosen.case || this.shown !== before)) { page.show(readAddress(before).given, Boolean(chosen.ask)); this.shown = before; }
+    if (!ended && before && (chosen.case || this.shown !== before)) { page.show(before, Boolean(chosen.ask)); this.shown = before; }
     page.open(chosen.panel ?? "tours");
     const place = chosen.panel ? one(chosen.panel) : this.root;
     this.card?.remove();
