@@ -893,7 +893,7 @@ def tables_of_responses() -> Iterator[Item]:
 
 @group(digits=6)
 def surveys() -> Iterator[Item]:
-    found = rocking.survey(STATUE, {"one": record(), "two": lobes(4.0, 0.8)}, friction=0.4, **QUIET)
+    found = rocking.survey(STATUE, {"one": record(), "two": lobes(4.0, 0.8)}, available_friction=0.4, **QUIET)
     yield from of_result(found)
 
 

@@ -92,9 +92,9 @@ def simulate(
 
     Notes
     -----
-    Without `friction` the block does not slide, and `Response.sliding_time` and ``summary(friction)`` report when it
-    would. With `friction` it sticks, slides on both pivots or slips on one while it rocks, and every transition is
-    located (see "Sliding" in the documentation).
+    Without `friction` the block does not slide, and `Response.sliding_time` and ``summary(available_friction)`` report
+    when it would. With `friction` it sticks, slides on both pivots or slips on one while it rocks, and every transition
+    is located (see "Sliding" in the documentation).
 
     Examples
     --------
