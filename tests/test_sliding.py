@@ -233,7 +233,7 @@ def bracket_by_kernel(case: Sequence) -> tuple[float, float] | None:
     """The proven bracket on the end of the impacts, from the time of the first on."""
     bodies = case.block.as_bodies()
     setup = Setup(bodies, case.model, Certified(), friction=resolve_friction(case.friction))
-    run = setup.prepare(None, record=True)
+    run = setup.prepare(None, writes_tables=True)
     start, table = run.states[0], state.new_table(4096)
     start["side"], start["v"], start["direction"] = case.side, case.speed, case.direction
     start["slip_rate"], start["peak"], start["budget"] = 2.0 * case.direction, math.inf, 100_000

@@ -363,7 +363,7 @@ def test_a_file_may_describe_walls_and_restraints(walls):
         rocking.RestrainedBlock(
             rocking.Block(width=width, height=4.0, mass=5e3, restitution=0.4),
             rocking.Spring(2e3), rocking.Tendon(1e5, offset=-0.1), rocking.Thrust(force, 3.0),
-            rocking.Load(100.0, 4.0, follows=False), one_sided=True, lean=np.deg2rad(lean), restitution=0.4,
+            rocking.Load(100.0, 4.0, moves_with_block=False), one_sided=True, lean=np.deg2rad(lean), restitution=0.4,
         )
         for width in (0.5, 0.6) for lean in (0.0, 0.5) for force in (300.0, 600.0)
     ]  # fmt: skip

@@ -44,7 +44,7 @@ from rocking.kernels.state import ORDER, Record
 _FIRST_STEP = 1.3
 
 #: Accelerations of the foot that rounding may cause, divided by g.
-_ROUNDING = 2.0**-48
+_ACCELERATION_ROUNDING = 2.0**-48
 
 #: Number of last terms that must be negligible where a series ends, and largest number of times that a step is
 #: shortened until they are.
@@ -280,7 +280,9 @@ def shorten_slip(block: Record, scratch: Record, h: float) -> float:
 @inlined
 def ignore_rounding_at_start(velocity: Floats) -> None:
     """Set the first acceleration of a foot that starts to slip to zero if it may be a rounding error."""
-    if velocity[0] == 0.0 and abs(velocity[1]) <= _ROUNDING:  # the forces are on the cone except for rounding
+    if (
+        velocity[0] == 0.0 and abs(velocity[1]) <= _ACCELERATION_ROUNDING
+    ):  # the forces are on the cone except for rounding
         velocity[1] = 0.0
 
 

@@ -16,7 +16,7 @@ from rocking.core.tables import format_count
 from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
-from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
+from rocking.kernels.trace import Quantity, Trail, compute_variation, copy_trail
 from rocking.kernels.uplift import write_next_uplifts
 from rocking.response.history import TimeHistory
 from rocking.response.perturbed import Repeat
@@ -154,7 +154,9 @@ def _vary_input(trail: Trail, quantity: int, times: Floats, impacts: int, events
     start = _START_FIELDS.get(quantity)
     if start is None or trail.nodes[start][0] != 0.0:  # a share of zero has no effect
         scratch, variation = state.new_scratch(), state.new_record(state.VARIATION)
-        vary(copy_trail(trail), scratch, variation, quantity, times, heights, impact_changes, event_changes)
+        compute_variation(
+            copy_trail(trail), scratch, variation, quantity, times, heights, impact_changes, event_changes
+        )
     return heights, impact_changes, event_changes
 
 
