@@ -38,6 +38,7 @@ from rocking.cli.output import (
 from rocking.core.progress import note
 from rocking.core.tables import format_table, to_json
 from rocking.errors import OptionError, RecordError
+from rocking.inputs.declared import INPUTS
 from rocking.inputs.notes import reading_notes
 from rocking.inputs.pulses import FAMILIES, PulseFamily
 from rocking.records.named import (
@@ -63,12 +64,7 @@ class _ResponseOptions(StartOptions):
     friction: Annotated[
         float | None, Parameter(help="Coefficient of friction, to report whether and when the block would slide.")
     ] = None
-    sliding: Annotated[
-        str | None,
-        Parameter(
-            help="Coefficient of friction with which slip is simulated, or the static and the kinetic one, as 0.3,0.25."
-        ),
-    ] = None
+    sliding: Annotated[str | None, Parameter(help=INPUTS["sliding"].help)] = None
     precision: Annotated[
         float, Parameter(help="Relative precision of the record; 11 motions within it are also simulated.")
     ] = MOTION_PRECISION
@@ -104,7 +100,10 @@ def simulate(
     choose_steps(start.precision)
     summary_options: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
     body = block.body()
-    options: dict[str, Any] = {**model.arguments(), **start.read_values()}
+    options: dict[str, Any] = {
+        **model.arguments(),
+        **start.read_values("duration", "initial_rotation", "initial_velocity"),
+    }
     slip = read_friction(start.sliding)
     for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
         raise OptionError("{} writes files; set their folder with {}", name, "out")
