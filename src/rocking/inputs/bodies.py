@@ -7,9 +7,10 @@ import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from rocking.block import Block, RestrainedBlock, Restraint
+from rocking.block import Block, Blocks, RestrainedBlock, Restraint
 from rocking.block.body import Body
 from rocking.core import checks
+from rocking.core.distributions import Distribution
 from rocking.core.progress import note
 from rocking.errors import BlockError, OptionError, escape_braces, join_placeholders
 from rocking.inputs import texts
@@ -61,7 +62,31 @@ def create_block(values: Mapping[str, Any], descriptions: Sequence[BlockDescript
     (0.12, 'Block.from_parameters(p=2.0, alpha=0.2)')
     """
     block_values = {name: value for name, value in values.items() if name in BLOCK or name == "gravity"}
+    if uncertain := find_uncertain(values):
+        message = f"this analysis requires one number for {join_placeholders(uncertain)}; omit the standard deviation"
+        raise BlockError(message, *uncertain)
     return find_description(block_values, descriptions).make(**_convert_arguments(block_values))
+
+
+def find_uncertain(values: Mapping[str, Any]) -> list[str]:
+    """Return the names of values that are distributions."""
+    return [name for name, value in values.items() if isinstance(value, Distribution)]
+
+
+def sample_bodies(values: Mapping[str, Any], count: int, seed: int = 0, restraints: Sequence[Restraint] = ()) -> Blocks:
+    """Sample blocks with uncertain values (distributions), each with the restraints.
+
+    Examples
+    --------
+    >>> blocks = sample_bodies({"width": INPUTS["width"].read_uncertain("24 +- 1 cm"), "height": 1.1}, 50)
+    >>> f"{blocks.alpha.mean():.4f}"
+    '0.2149'
+    """
+
+    def create(**row: Any) -> Any:
+        return create_body(create_block(row), row, restraints)
+
+    return Blocks.sample(count, create, seed=seed, **values)
 
 
 def write_block_call(values: Mapping[str, Any]) -> str:
