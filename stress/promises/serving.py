@@ -129,7 +129,7 @@ def served() -> Iterator[Running]:
         ) as process:
             try:
                 assert process.stdout is not None
-                found = re.search(r"http://127\.0\.0\.1:(\d+)/#token=([\w-]+)", process.stdout.readline())
+                found = re.search(r"http://127\.0\.0\.1:(\d+)/(?:block)?#token=([\w-]+)", process.stdout.readline())
                 assert found is not None
                 opening = Running(process, int(found[1]), found[2], folder)
                 status, secret = opening.status("POST", "/api/secret", opening.own)

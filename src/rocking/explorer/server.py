@@ -7,7 +7,7 @@ import math
 import secrets
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any, Final, NamedTuple, TypeVar
@@ -28,6 +28,7 @@ from rocking.explorer.core import EXPORTS, Explorer
 from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.parameters import PARAMETERS, QUANTITIES, field_label, specification
 from rocking.explorer.payload import Payload, fill_page, load_english_texts, pack
+from rocking.explorer.standalone import build_page, is_available
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import MAX_FILE_SIZE, TOO_LARGE
 from rocking.inputs.quantities import read_number
@@ -120,6 +121,7 @@ class App:
         self, explorer: Explorer, opening: Mapping[str, str], study: StudyView | None = None, framed_by: str = "'none'"
     ) -> None:
         self.explorer, self.opening, self.study = explorer, dict(opening), study
+        self._framed_by = framed_by
         self._secret, self._tokens = secrets.token_urlsafe(32), list[str]()
         self._files = page_files()
         self._html = fill_page(self._files["index.html"].decode(), load_english_texts())
@@ -151,6 +153,7 @@ class App:
         self.asgi = Starlette(
             routes=[
                 Route("/", self._send_page),
+                Route("/block", self._send_block),
                 Route("/page/{path:path}", self._send_file),
                 Route(EXCHANGE, self._exchange, methods=["POST"]),
                 Route("/api/files", self._guard(self._receive_file), methods=["POST"]),
@@ -167,6 +170,12 @@ class App:
 
     async def _send_page(self, _: Request) -> Response:
         return Response(self._html, media_type="text/html", headers=self._page_headers)
+
+    async def _send_block(self, _: Request) -> Response:
+        """Return the standalone page, which leads to this one."""
+        html = await self._run_in_thread(_build_block_page)
+        headers = {**_HEADERS, "content-security-policy": f"frame-ancestors {self._framed_by}"}
+        return Response(html, media_type="text/html", headers=headers)
 
     async def _send_file(self, request: Request) -> Response:
         path = request.path_params["path"]
@@ -248,7 +257,8 @@ class App:
     def _describe_page(self) -> dict[str, Any]:
         """Return the specification of the page and its initial case."""
         study = None if self.study is None else self.study.describe()
-        return specification() | {"axes": maps.describe_axes(), "opening": self.opening, "study": study}
+        own = {"axes": maps.describe_axes(), "opening": self.opening, "study": study, "block_page": is_available()}
+        return specification() | own
 
     def _export(self, query: Query) -> Download:
         form = query.fields.get("form", "")
@@ -284,6 +294,11 @@ class App:
         if self.study is None:
             raise OptionError("no study is open: start with rocking explore FOLDER")
         return self.study
+
+
+@cache
+def _build_block_page() -> str:
+    return build_page(served=True)
 
 
 def _carries(request: Request, credentials: str) -> bool:

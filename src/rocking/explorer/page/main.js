@@ -9,7 +9,7 @@ import {View as Assess} from "./assess.js";
 import {View as MapView} from "./map.js";
 import {View as Periodic} from "./periodic.js";
 import {copyButtons, figures} from "./save.js";
-import {readAddress, writeAddress} from "./state.js";
+import {readAddress, specification, writeAddress} from "./state.js";
 import {say} from "./texts.js";
 import {angle, caseName, ofG, unitFields} from "./units.js";
 import {short} from "./numbers.js";
@@ -94,6 +94,8 @@ class Page {
     const {state, shown} = this;
     if (!shown) return;
     writeAddress(state, {soon: true});
+    one("to-block").hidden = !specification.block_page;
+    one("to-block").href = `/block#${new URLSearchParams(state.texts)}`;
     this.forms.block.show(state.texts, shown.header.block);
     document.title = `${TITLES[state.view]}: ${caseName(shown.header)} – rocking explorer`;
   }
