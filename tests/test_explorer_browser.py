@@ -143,7 +143,7 @@ def test_a_slider_and_a_field_change_the_response(opened):
 
 
 @pytest.mark.parametrize(
-    ("name", "text"), [("width", "-1"), ("pga", "much"), ("restitution", "0.9999"), ("sliding", "-3")]
+    ("name", "text"), [("width", "-1"), ("pga", "much"), ("restitution", "0.9999"), ("friction", "-3")]
 )
 def test_what_is_refused_is_marked_and_leaves_the_last_case_in_grey(opened, name, text):
     page = opened(STATUE, allowed=["422"])
@@ -186,17 +186,17 @@ def test_motions_are_chosen_scaled_and_released(opened):
 
 
 def test_a_slipping_block_moves_along(opened):
-    page = opened("width=0.4&height=0.8&motion=ridgecrest-clc-090&pga=0.9g&sliding=0.35&at=235")
+    page = opened("width=0.4&height=0.8&motion=ridgecrest-clc-090&pga=0.9g&friction=0.35&at=235")
     response = rocking.simulate(
         rocking.Block(width=0.4, height=0.8), rocking.records.load("ridgecrest-clc-090").scaled_to(0.9 * 9.80665),
         friction=0.35,
     )  # fmt: skip
     page.says("reading", f"slip {response.slip(235.0):.3g} m".replace("-", "−"))
     assert page.page.locator("#slip path.line").count() == 1
-    assert "friction=0.35" in page.text("#python") and "--sliding 0.35" in page.text("#command")
+    assert "friction=0.35" in page.text("#python") and "--friction 0.35" in page.text("#command")
     page.page.click("[data-tab=explore]")
     page.until("!document.getElementById('problem').hidden")
-    assert "Friction coefficient" in page.text("#problem") and page.js(MARKED) == ["sliding"]
+    assert "Friction coefficient" in page.text("#problem") and page.js(MARKED) == ["friction"]
     page.allowed = ["422"]
     page.complaints = [each for each in page.complaints if "422" not in each]
 

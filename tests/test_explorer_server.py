@@ -265,7 +265,7 @@ def test_every_module_that_is_imported_is_served(page):
         ({"motion": "file:00ff"}, "motion", "“Record”"),
         ({"motion": "given:00ff"}, "motion", "“Record”"),
         ({"motion": "sine:amplitude=1,frequency=1,cycles=2000"}, "cycles", "“Cycles” of a pulse"),
-        ({"sliding": "-1"}, "friction", "“Friction coefficient”"),
+        ({"friction": "-1"}, "friction", "“Friction coefficient”"),
         ({"height": ""}, "width", "“Height”"),
     ],
 )

@@ -101,7 +101,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
         duration=values.get("duration"),
         initial_rotation=values.get("initial_rotation", 0.0),
         initial_velocity=values.get("initial_velocity", 0.0),
-        friction=values.get("sliding"),
+        friction=values.get("friction"),
         block_call=written_block.python,
         block_options=written_block.options,
         body=written_block.body,
@@ -115,7 +115,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
 def require_sticking(case: Case) -> None:
     """Raise `OptionError` if a case has friction, which maps, diagrams and assessments do not support."""
     if case.friction is not None:
-        raise OptionError("{} is simulated for the response alone; leave it empty here", "sliding")
+        raise OptionError("{} is simulated for the response alone; leave it empty here", "friction")
 
 
 def require_rest(restitutions: Iterable[float]) -> None:
@@ -140,7 +140,7 @@ def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str
     texts = _block_to_texts(block)
     texts |= {"motion": "none"} if motion is None else motion_to_texts(motion, uploads)
     if response.friction is not None:
-        texts["sliding"] = ",".join(map(repr, dict.fromkeys(response.friction)))
+        texts["friction"] = ",".join(map(repr, dict.fromkeys(response.friction)))
     if response.model != "nonlinear":
         texts["model"] = response.model
     if str(response.chattering) != str(chattering_scheme("certified")):

@@ -297,8 +297,8 @@ export class ModelForm {
     this.about = make("p", {class: "soft"});
     /** @type {Record<string, Field>} */
     this.limits = Object.fromEntries(treatments.filter((/** @type {any} */ {limit}) => limit).map((/** @type {any} */ {name, limit}) => [name, new Field({...limit, name: `${name}-limit`}, tell)]));
-    this.sliding = new Field(parameter("sliding"), tell, "never slips");
-    element.replaceChildren(this.model.element, this.treatment.element, this.about, ...Object.values(this.limits).map(({element: each}) => each), this.sliding.element);
+    this.friction = new Field(parameter("friction"), tell, "never slips");
+    element.replaceChildren(this.model.element, this.treatment.element, this.about, ...Object.values(this.limits).map(({element: each}) => each), this.friction.element);
   }
 
   /** @param {Texts} texts */
@@ -307,7 +307,7 @@ export class ModelForm {
     this.model.select.value = texts.model ?? "nonlinear";
     choose(this.treatment.select, name);
     if (Object.hasOwn(this.limits, name)) this.limits[name].show(limit ?? specification.treatments.find((/** @type {any} */ each) => each.name === name).unnamed);
-    this.sliding.show(texts.sliding ?? "");
+    this.friction.show(texts.friction ?? "");
     this.showFields();
   }
 
@@ -319,9 +319,9 @@ export class ModelForm {
 
   tell() {
     this.showFields();
-    const name = this.treatment.select.value, limit = Object.hasOwn(this.limits, name) ? this.limits[name] : null, {text} = this.sliding;
-    const texts = {...(this.model.select.value === "nonlinear" ? {} : {model: this.model.select.value}), ...(name === "certified" ? {} : {chattering: limit ? `${name}=${limit.text}` : name}), ...(text ? {sliding: text} : {})};
-    this.changed(/** @type {Texts} */ (texts), ["model", "chattering", "sliding"]);
+    const name = this.treatment.select.value, limit = Object.hasOwn(this.limits, name) ? this.limits[name] : null, {text} = this.friction;
+    const texts = {...(this.model.select.value === "nonlinear" ? {} : {model: this.model.select.value}), ...(name === "certified" ? {} : {chattering: limit ? `${name}=${limit.text}` : name}), ...(text ? {friction: text} : {})};
+    this.changed(/** @type {Texts} */ (texts), ["model", "chattering", "friction"]);
   }
 }
 
