@@ -164,7 +164,7 @@ one_sided = true -> one_sided = 1 | 5 | one_sided must be true or false
 force = [300, 600] -> forze = 300 | 11 | [[blocks.thrusts]] has no forze; did you mean force
 force = [300, 600] -> force = 9e5 | 1 | does not stand
 force = [300, 600]\n ->  | 10 | [[blocks.thrusts]] also requires force
-moves_with_block = false -> follows = "no" | 17 | moves_with_block must be a number
+moves_with_block = false -> moves_with_block = "no" | 17 | moves_with_block must be a number
 offset = -0.1 -> offset = -0.5 | 1 | is beyond the pivot
 """
 
