@@ -30,7 +30,7 @@ from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes, vertical_notes
 from rocking.inputs.pulses import named_pulse
 from rocking.inputs.quantities import (
-    Quantity,
+    NumberReader,
     read_acceleration,
     read_array,
     read_duration,
@@ -220,7 +220,7 @@ def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Ite
 
 
 def _read_pairs(
-    text: str, option: str, find_reader: Callable[[str], Quantity], flags: Collection[str] = ()
+    text: str, option: str, find_reader: Callable[[str], NumberReader], flags: Collection[str] = ()
 ) -> dict[str, Any]:
     """Return the values of NAME=VALUE pairs."""
     values: dict[str, Any] = {}
@@ -455,7 +455,7 @@ class MeasureOptions(IntensityOptions):
 
     def arguments(self, component: ComponentName = "own") -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        measure, acceleration = self.create_measure(component), cast(Quantity, read_positive_acceleration)
+        measure, acceleration = self.create_measure(component), cast(NumberReader, read_positive_acceleration)
         readers = {"m/s^2": acceleration, "m/s": read_velocity, "m": read_length, "s": read_duration}
         reader = readers.get(measure.units, _read_ratio)
         levels = None if self.levels is None else read_array(self.levels, "levels", reader)

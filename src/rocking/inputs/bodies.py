@@ -16,7 +16,7 @@ from rocking.errors import BlockError, OptionError, escape_braces, join_placehol
 from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, INPUTS, READERS, BlockDescription
 from rocking.inputs.notes import block_notes, restraint_notes
-from rocking.inputs.quantities import Quantity
+from rocking.inputs.quantities import NumberReader
 from rocking.motion.motion import Motion
 from rocking.motion.stochastic import synthesize_motions
 
@@ -113,14 +113,14 @@ def note_likely_mistakes(blocks: Sequence[Block], bodies: Sequence[Body] = ()) -
         note(sentence)
 
 
-def find_reader(parameter: str) -> Quantity:
+def find_reader(parameter: str) -> NumberReader:
     """Return the reader of a parameter of a restraint or of another body."""
     kind = INPUTS[parameter].kind if parameter in INPUTS else "number"
     return READERS.get(kind, READERS["number"])[0]
 
 
 #: Readers of parameters of stochastic motions.
-STOCHASTIC: Final[Mapping[str, Quantity]] = {
+STOCHASTIC: Final[Mapping[str, NumberReader]] = {
     "arias_intensity": READERS["velocity"][0],
     **dict.fromkeys(("duration", "middle_time", "dt"), READERS["duration"][0]),
     **dict.fromkeys(("frequency", "highpass"), READERS["frequency"][0]),

@@ -14,7 +14,7 @@ from rocking.inputs.notes import level_notes
 from rocking.records.units import normalise_spelling
 
 #: Reader of a number of each kind, and its SI unit.
-READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
+READERS: Final[Mapping[str, tuple[quantities.NumberReader, str]]] = {
     "number": (quantities.read_number, ""),
     "length": (quantities.read_length, "m"),
     "position": (quantities.read_position, "m"),
@@ -121,7 +121,14 @@ class Input:
         names = ("name", "group", "unit", "default", "low", "high", "logarithmic", "values", "step")
         plain = {name: getattr(self, name) for name in names}
         kind = "angle" if self.kind == "tilt" else self.kind
-        return {**plain, "kind": kind, "text": self.text or self.name, "suffix": self.suffix, "units": self._sizes()}
+        return {
+            **plain,
+            "kind": kind,
+            "text": self.text or self.name,
+            "argument": self.argument or self.name,
+            "suffix": self.suffix,
+            "units": self._sizes(),
+        }
 
     @property
     def suffix(self) -> str:
@@ -186,8 +193,8 @@ INPUTS: Final = index_by_name(
     Input("thrust", "", "texts",
         "Horizontal force to side +, as force=1500,height=4 (N, m), with offset (m); several times for several."),
     Input("load", "", "texts",
-        "Weight on it, as mass=250,height=3 (kg, m), with offset (m), and follows=no for one that presses and does "
-        "not move with it; several times for several."),
+        "Weight on it, as mass=250,height=3 (kg, m), with offset (m), and moves_with_block=no for one that only "
+        "presses; several times for several."),
     Input("gravity", "model", "acceleration", "", "m/s²"),
     Input("motion", "motion", "text", default="ridgecrest-clc-090"),
     Input("channel", "motion", "text", "Channel, by number or name, of files that hold several."),
@@ -216,6 +223,9 @@ INPUTS: Final = index_by_name(
     Input("model", "model", "text",
         "Equation of motion: of finite rotations (nonlinear, the default), or linearised for slender blocks.",
         default="nonlinear"),
+    Input("friction", "model", "number",
+        "Coefficient of friction with which slip is simulated, or the static and the kinetic one, as 0.3,0.25.",
+        "", "0.5", 0.05, 1.5, values="one or two"),
     Input("chattering", "treatment", "text",
         "How chattering ends: certified, velocity, bypass, interval, or (under a sine) time; with a limit, as "
         "certified=1e-9 (s), velocity=5e-10 or bypass=1e-3 (over p alpha), interval=1e-9 (s).", default="certified"),
