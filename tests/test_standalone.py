@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import itertools
 import json
 import re
 import runpy
@@ -541,6 +542,21 @@ def test_a_case_in_the_address_is_shown_again(opened):
     page.until("document.body.dataset.settled", "computed")
     page.says("headline", "This page cannot show all of the address: motion, width, amplitude, height, p.")
     assert numbers(page) == {"width": 0.4, "height": 10.0, "amplitude": 3.01, "frequency": 1.0}
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [1280, 794])
+def test_what_is_printed_hides_nothing(opened, width):
+    page = opened(FALLING, width, 1123, color_scheme="dark")
+    page.page.click("[data-panel=map]")
+    page.until("document.body.dataset.map === 'complete'", "the map is computed")
+    page.page.emulate_media(media="print")
+    page.paused(100)
+    tops = [page.page.locator(f"#{name}").bounding_box() for name in ("stage", "strip", "answer", "panel")]
+    assert all(above["y"] + above["height"] <= below["y"] for above, below in itertools.pairwise(tops))
+    assert not page.page.locator("nav, #transport, #close, .buttons, .knob >> visible=true").count()
+    corner = page.js("[...page.panels.map.picture.getContext('2d').getImageData(0, 95, 1, 1).data]")
+    assert corner == [255, 255, 255, 255]  # paper
 
 
 @pytest.mark.browser
