@@ -182,7 +182,7 @@ def test_the_explorer_opens_on_the_page_and_both_share_the_case(built, browser):
     page.js("location.hash = 'width=0.3&height=1.3&offset=0.02&motion=one-sine:amplitude=0.4g,frequency=1'")
     page.until("document.getElementById('more').search.includes('width=0.3&')", "the link has the case")
     page.page.click("#more")
-    page.until("document.body.innerText.includes('overturns')", "the explorer shows the case")
+    page.until("document.body?.innerText.includes('overturns')", "the explorer shows the case")
     page.page.click("#to-block")
     page.until("document.getElementById('headline')?.textContent.includes('It falls.')", "the page shows the case")
     page.until("location.hash.includes('amplitude=3.92266,')", "the case is in the address")
