@@ -141,7 +141,9 @@ class Fragility(Result):
             for curve in self.curves
         ]
         heading = f"{100 * self.curves[0].confidence:g} % between"
-        table = format_table(["limit state", "exceeded", "median", heading, "dispersion", heading, "p of fit"], rows)
+        table = format_table(
+            ["limit state", "exceeded", "median", heading, "dispersion", heading, "p-value of fit"], rows
+        )
         notes = [f"note: {sentence}" for sentence in self.notes]
         return "\n".join([f"{self.description}; intensity: {self.measure.label}", "", table, *notes])
 
@@ -165,9 +167,9 @@ class Fragility(Result):
         ]
         if not independent:
             reason = f"the test takes all outcomes for independent, and those of one {self.source} belong together"
-            notes.append(f"there is no p of fit: {reason}")
+            notes.append(f"no p-value of the fit: {reason}")
         elif self.curves[0].goodness.degrees_of_freedom < 1:
-            notes.append("there is no p of fit: the test needs three groups of outcomes, of five or so each")
+            notes.append("no p-value of the fit: the test needs three groups of outcomes, of five or so each")
         return tuple(notes)
 
     @property

@@ -29,7 +29,14 @@ from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.notes import motion_notes, vertical_notes
 from rocking.inputs.pulses import named_pulse
-from rocking.inputs.quantities import Quantity, read_acceleration, read_array, read_number, read_scaling, read_velocity
+from rocking.inputs.quantities import (
+    NumberReader,
+    read_acceleration,
+    read_array,
+    read_number,
+    read_scaling,
+    read_velocity,
+)
 from rocking.inputs.texts import write_option_name
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
@@ -378,7 +385,7 @@ class MeasureOptions(IntensityOptions):
 
     def arguments(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        acceleration: Quantity = read_positive_acceleration
+        acceleration: NumberReader = read_positive_acceleration
         readers = {"pga": acceleration, "sa": acceleration, "pgv": read_velocity}
         reader = readers.get(self.measure, _read_ratio)
         levels = None if self.levels is None else read_array(self.levels, "levels", reader)

@@ -124,14 +124,14 @@ class ProcessingMethods(MotionMeasures):
         vertical = None if self.vertical is None else self.vertical.delayed(wait)
         return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, vertical=vertical)
 
-    def floor(self, period: float, damping: float = DAMPING, *, ringing: float | None = None) -> Self:
+    def on_floor(self, period: float, damping: float = DAMPING, *, free_vibration: float | None = None) -> Self:
         """Return the motion of a floor: the absolute acceleration of a linear oscillator under the motion.
 
         Parameters
         ----------
         period, damping : float
             Natural period of the building, s, and its fraction of critical damping.
-        ringing : float, optional
+        free_vibration : float, optional
             Duration of the floor motion after the ground motion, s, by default until a free oscillation decays to a
             thousandth.
 
@@ -143,7 +143,7 @@ class ProcessingMethods(MotionMeasures):
         Raises
         ------
         MotionError
-            If period or damping is out of range, or both damping and `ringing` are missing.
+            If period or damping is out of range, or both damping and `free_vibration` are missing.
 
         Notes
         -----
@@ -151,7 +151,7 @@ class ProcessingMethods(MotionMeasures):
         At 0.6 the motion is ``ground + (floor + -ground) * 0.6``. Contents do not act back on the floor. A hazard curve
         of the ground does not apply to a fragility against floor measures.
         """
-        breakpoints, coefficients, error = _compute_floor_motion(self, period, damping, ringing, self.error)
+        breakpoints, coefficients, error = _compute_floor_motion(self, period, damping, free_vibration, self.error)
         history_entry = f"on a floor of period {period:.6g} s, damping {damping:.6g}"
         return self._derive("floor", history_entry, breakpoints=breakpoints, coefficients=coefficients, error=error)
 
@@ -342,7 +342,7 @@ def _join_samples(samples: Floats, step: float, history_entry: str) -> Processed
 
 
 def _compute_floor_motion(
-    motion: Piecewise, period: float, damping: float, ringing: float | None, error: float = 0.0
+    motion: Piecewise, period: float, damping: float, free_vibration: float | None, error: float = 0.0
 ) -> tuple[Floats, Floats, float]:
     """Compute the absolute acceleration of an oscillator from rest, and its error bound, m/s^2.
 
@@ -352,17 +352,17 @@ def _compute_floor_motion(
     end = float(motion.breakpoints[-1])
     natural_period = checks.positive(period, "period", MotionError, "s")
     rate, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, MotionError)
-    if ringing is None and damping_ratio == 0.0:
-        raise MotionError("the motion of a floor without {} does not decay; give {}, in s", "damping", "ringing")
+    if free_vibration is None and damping_ratio == 0.0:
+        raise MotionError("the motion of a floor without {} does not decay; give {}, in s", "damping", "free_vibration")
     # By default a free oscillation continues until it has decayed to a thousandth.
-    if ringing is None:
+    if free_vibration is None:
         tail = -math.log(1e-3) / (damping_ratio * rate)
     else:
-        tail = checks.between(ringing, "ringing", MotionError, 0.0, 1e15, "s")
+        tail = checks.between(free_vibration, "free_vibration", MotionError, 0.0, 1e15, "s")
     step = _MAX_ANGLE / rate
     if not (end + tail) / step <= 1e6:
         message = f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s"
-        raise MotionError(f"{message}; use a longer one, or a shorter {{}}", "period", "ringing", value=period)
+        raise MotionError(f"{message}; use a longer one, or a shorter {{}}", "period", "free_vibration", value=period)
     nodes = np.append(motion.breakpoints, end + tail) if tail > 0.0 else motion.breakpoints
     subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / step)).astype(np.intp)
     start, width = np.repeat(nodes[:-1], subdivisions), np.repeat(np.diff(nodes) / subdivisions, subdivisions)

@@ -176,7 +176,9 @@ class Product:
 
     def __post_init__(self) -> None:
         checks.choice(self.polarity, "polarity", OptionError, list(SIGNS))
-        build_settings(self.bodies, self.model, self.chattering, self.duration, record=False)  # raises before the work
+        build_settings(
+            self.bodies, self.model, self.chattering, self.duration, writes_tables=False
+        )  # raises before the work
         check_friction(self.bodies, self.model, self.friction)
         for motion in self.motions:
             check_components(self.bodies, motion)

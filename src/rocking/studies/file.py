@@ -40,7 +40,7 @@ from rocking.simulation.ensemble import Product, Scales
 TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")
 
 #: Measures for scaling motions, and how their levels are read.
-_MEASURES: Final[Mapping[str, quantities.Quantity]] = {
+_MEASURES: Final[Mapping[str, quantities.NumberReader]] = {
     "factor": quantities.read_number,
     "pga": read_noted_acceleration,
     "pgv": quantities.read_velocity,
@@ -210,7 +210,7 @@ def _create_objects(
     table: str,
     k: int,
     entries: Mapping[str, Any],
-    find_quantity: Callable[[str], quantities.Quantity | None],
+    find_quantity: Callable[[str], quantities.NumberReader | None],
     create: Callable[[dict[str, Any]], Any],
 ) -> list[Any]:
     """Create the object of the k-th table, or several for lists or ranges."""
