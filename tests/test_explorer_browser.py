@@ -531,9 +531,8 @@ def test_a_study_opens_as_a_map(opened, tmp_path):
     page.page.keyboard.press("ArrowRight")
     page.page.keyboard.press("ArrowUp")
     said = page.text("#map-at")
-    page.page.keyboard.press("Enter")
+    page.rested(lambda: page.page.keyboard.press("Enter"))
     page.until("document.body.dataset.view === 'shake' && location.search.includes('alpha')")
-    page.until(READY)
     assert ("overturns" in page.text("#verdict")) == ("Overturns" in said or ": overturns" in said)
     server.server.should_exit = True
 
