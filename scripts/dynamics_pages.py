@@ -13,7 +13,7 @@ from pages import markdown, write
 
 import rocking
 from rocking import dynamics
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, REST, add_labels, add_legend, collect_handles, open_figure
+from rocking.plot.canvas import ACCENT, CURVES, GREY, INK, PALE, add_labels, add_legend, collect_handles, open_figure
 
 #: The block of Hogan's orbits, forced at three times its frequency parameter; what it hits the ground twice in.
 HOGAN_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.1, restitution=0.925)
@@ -108,15 +108,15 @@ def hogan_figure(branches):
                         left.plot(each.value, branch.peaks[near] / alpha, mark, zorder=4, **look)
         for mark, name in (("o", "fold"), ("D", "symmetry lost"), ("s", "period doubles")):
             left.plot([], [], mark, label=name, **look)
-        left.axvline(heteroclinic(HOGAN_RATIO, restitution), color=GROUND, linewidth=1.0, label="heteroclinic")
-        left.axvline(1.0, color=GROUND, linewidth=1.0, linestyle=(0, (1, 1.5)), label="uplift")
+        left.axvline(heteroclinic(HOGAN_RATIO, restitution), color=GREY, linewidth=1.0, label="heteroclinic")
+        left.axvline(1.0, color=GREY, linewidth=1.0, linestyle=(0, (1, 1.5)), label="uplift")
         left.set_xscale("log")
         add_labels(left, "peak acceleration over that of uplift", "largest rotation over the slenderness")
         dots = diagram.coordinate.values[0, :, 0] / alpha
         right.plot(np.repeat(diagram.value.values, dots.shape[1]), dots.ravel(), ".", color=INK, markersize=0.8)
         for value in (values_of(branches[1][0])["symmetry breaking"], values_of(branches[1][1])["flip"]):
             right.axvline(
-                value, color=ABOVE, linewidth=0.8, linestyle=(0, (4, 2)), label="closed form" if value < 6 else None
+                value, color=ACCENT, linewidth=0.8, linestyle=(0, (4, 2)), label="closed form" if value < 6 else None
             )
         add_labels(
             right, "peak acceleration over that of uplift", "rotation at the start of a period, over the slenderness"
@@ -160,7 +160,7 @@ def sticking_figure():
         times, period = np.linspace(0.0, motion.duration, 3001), 0.5 * motion.duration
         course.plot(times / period, -response.states(times)[:, 0], color=INK, linewidth=1.1)
         for first, last in response.rest_intervals / period:
-            course.axvspan(first, last, color=REST, linewidth=0.0)
+            course.axvspan(first, last, color=PALE, linewidth=0.0)
         add_labels(course, "time (periods of the forcing)", "x (amplitude of the force over the stiffness)")
         for curve, (restitution, end) in zip(CURVES, ends.items(), strict=False):
             frequencies = np.append(np.linspace(0.05, end, 240)[:-1], end - np.geomspace(1e-3, 1e-9, 25))

@@ -11,7 +11,7 @@ import numpy as np
 from pages import DOCS, write
 
 import rocking
-from rocking.plot.canvas import ABOVE, GROUND, INK, add_labels, open_figure
+from rocking.plot.canvas import ACCENT, GREY, INK, add_labels, open_figure
 
 
 def main() -> None:
@@ -35,10 +35,10 @@ def gradient_figure(names):
     times = np.arange(0.0, 14.0, 0.005)
     with open_figure(None, (6.4, 5.0), None, "") as figure:
         ground, rotation, derivative = figure.subplots(3, 1, sharex=True)
-        ground.plot(times, record.acceleration(times), color=GROUND, linewidth=0.8)
+        ground.plot(times, record.acceleration(times), color=GREY, linewidth=0.8)
         rotation.plot(times, response.rotation(times), color=INK, linewidth=0.9)
-        rotation.plot(response.peak_time, response.rotation(response.peak_time), "o", color=ABOVE, markersize=4.0)
-        derivative.plot(record.breakpoints, samples, color=ABOVE, linewidth=0.9)
+        rotation.plot(response.peak_time, response.rotation(response.peak_time), "o", color=ACCENT, markersize=4.0)
+        derivative.plot(record.breakpoints, samples, color=ACCENT, linewidth=0.9)
         add_labels(ground, "", "ground (m/s$^2$)")
         add_labels(rotation, "", "rotation (rad)")
         add_labels(derivative, "time (s)", "derivative\n(rad per m/s$^2$)")
@@ -53,9 +53,9 @@ def change_figure(names):
     times, shown, longer = first + names["step"] * np.arange(len(samples)), slice(1100, 1450), slice(1100, 3300)
     with open_figure(None, (6.4, 6.6), None, "") as figure:
         ground, rotation, energy = figure.subplots(3, 1)
-        ground.plot(times[shown], samples[shown], color=GROUND, linewidth=2.0, label="record")
+        ground.plot(times[shown], samples[shown], color=GREY, linewidth=2.0, label="record")
         ground.plot(times[shown], (samples + change)[shown], "--", color=INK, linewidth=1.0, label="changed record")
-        ground.plot(times[shown], change[shown], color=ABOVE, linewidth=1.2, label="change")
+        ground.plot(times[shown], change[shown], color=ACCENT, linewidth=1.2, label="change")
         for label, added, style in (("record", 0.0, "-"), ("changed record", change, "--")):
             response = rocking.simulate(statue, rocking.Motion.from_samples(samples + added, names["step"]))
             lasting = np.minimum(times[longer] - first, response.duration)

@@ -15,7 +15,7 @@ from matplotlib.patches import Polygon
 from PIL import Image
 
 import rocking
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST
+from rocking.plot.canvas import ACCENT, GREY, INK, PALE
 
 FILE = Path(__file__).resolve().parents[1] / "docs" / "_static" / "rocking.webp"
 
@@ -61,7 +61,7 @@ class Drawing:
         time = np.linspace(START, END, 3000)
         self.draw_stage()
         self.draw_panels(panels, time, motion)
-        self.cursors = [panel.axvline(START, color=ABOVE, linewidth=1.2) for panel in panels]
+        self.cursors = [panel.axvline(START, color=ACCENT, linewidth=1.2) for panel in panels]
         # The panels stay where they are, and need not be laid out again for each picture.
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
@@ -71,7 +71,7 @@ class Drawing:
         self.stage.set_aspect("equal")
         self.stage.set_axis_off()
         self.stage.set(xlim=(-0.42, 0.42), ylim=(-0.2, 1.35))
-        self.stage.axhspan(-0.06, 0.0, facecolor=REST)
+        self.stage.axhspan(-0.06, 0.0, facecolor=PALE)
         self.stage.axhline(0.0, color=INK, linewidth=1.2)
         self.block = Polygon(np.zeros((4, 2)), facecolor="#cfc6b8", edgecolor=INK, linewidth=1.4)
         self.stage.add_patch(self.block)
@@ -92,7 +92,7 @@ class Drawing:
         rotation.set_ylabel("rotation (°)")
         rotation.set_title("Ridgecrest 2019, China Lake, scaled to 0.42 g", loc="left", fontsize="medium", color=INK)
         threshold = WIDTH / HEIGHT
-        ground.plot(time, motion.acceleration(time) / 9.80665, color=GROUND, linewidth=0.8)
+        ground.plot(time, motion.acceleration(time) / 9.80665, color=GREY, linewidth=0.8)
         for level in (-threshold, threshold):
             ground.axhline(level, color=INK, linewidth=0.8, linestyle=(0, (5, 2)))
         ground.set_ylabel("ground (g)")
@@ -105,7 +105,7 @@ class Drawing:
         for at, kind, until in zip(events["time"], events["kind"], ends[1:], strict=True):
             if kind == "rest":
                 for panel in (rotation, impacts):
-                    panel.axvspan(max(at, START), min(until, END), color=REST, linewidth=0.0, zorder=0)
+                    panel.axvspan(max(at, START), min(until, END), color=PALE, linewidth=0.0, zorder=0)
         for panel in panels:
             panel.set_xlim(START, END)
             panel.spines[["top", "right"]].set_visible(False)

@@ -12,7 +12,7 @@ from pages import write
 
 import rocking
 from rocking import Block, RestrainedBlock, Tendon, Thrust
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, collect_handles, open_figure
+from rocking.plot.canvas import ACCENT, CURVES, GREY, INK, add_labels, add_legend, collect_handles, open_figure
 
 G = 9.80665
 
@@ -48,9 +48,9 @@ def facade_figure():
     lowest = found.data.overturning_level.transpose("motion", "block").values / G
     with open_figure(None, (6.2, 3.4), None, "") as figure:
         axes, x = figure.subplots(), 1e-3 * np.array(THRUSTS)
-        axes.plot(x, lowest.T, "o", color=GROUND, markersize=3.0, label="_each motion")
-        axes.plot([], [], "o", color=GROUND, markersize=3.0, label=f"overturns, each of {len(shaking)} motions")
-        axes.plot(x, np.median(lowest, axis=0), color=ABOVE, label="overturns, median")
+        axes.plot(x, lowest.T, "o", color=GREY, markersize=3.0, label="_each motion")
+        axes.plot([], [], "o", color=GREY, markersize=3.0, label=f"overturns, each of {len(shaking)} motions")
+        axes.plot(x, np.median(lowest, axis=0), color=ACCENT, label="overturns, median")
         axes.plot(x, [body.uplift_thresholds()[0] / G for body in bodies], "--", color=INK, label="lifts")
         axes.set_ylim(0.0)
         add_labels(axes, "thrust per metre of wall (kN/m)", "lowest peak acceleration (g)")

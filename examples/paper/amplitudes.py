@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST, add_text, open_figure
+from rocking.plot.canvas import ACCENT, GREY, INK, PALE, add_text, open_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 #: How the curves of several methods are distinguished, in colour and in grey.
 _CURVES: Final[tuple[dict[str, Any], ...]] = (
     {"color": INK, "linewidth": 1.3},
-    {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (5, 2))},
-    {"color": GROUND, "linewidth": 0.0, "marker": "o", "markersize": 4.0, "markerfacecolor": "white", "markevery": 6},
+    {"color": ACCENT, "linewidth": 1.2, "linestyle": (0, (5, 2))},
+    {"color": GREY, "linewidth": 0.0, "marker": "o", "markersize": 4.0, "markerfacecolor": "white", "markevery": 6},
 )
 _FREQUENCY_CURVES: Final[tuple[dict[str, Any], ...]] = (
     {"color": INK, "linewidth": 1.4},
-    {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (5, 2))},
-    {"color": GROUND, "linewidth": 1.4, "linestyle": (0, (1, 1))},
+    {"color": ACCENT, "linewidth": 1.2, "linestyle": (0, (5, 2))},
+    {"color": GREY, "linewidth": 1.4, "linestyle": (0, (1, 1))},
 )
 
 #: Least distance of a contour's label from the frame and from other labels, over the size of the axes.
@@ -78,7 +78,7 @@ def contour_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
             axes.set_ylim(eta[0], eta[-1] + 0.03 * (eta[-1] - eta[0]))
         levels = np.arange(1.01, 1.13, 0.01)
         lines = surface.contour(omega, eta, exact.T, levels=levels, colors=INK, linewidths=1.0)
-        surface.contour(omega, eta, fitted.T, levels=levels, colors=ABOVE, linewidths=0.9, linestyles="dashed")
+        surface.contour(omega, eta, fitted.T, levels=levels, colors=ACCENT, linewidths=0.9, linestyles="dashed")
         _label(surface, lines, "%.2f")
         surface.set_title(r"(a) critical amplitude $a_{cr}$", loc="left")
         surface.set_ylabel(r"coefficient of restitution, $\eta$")
@@ -92,7 +92,7 @@ def contour_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
         error.set_title("(b) error of Eq. 76, %", loc="left")
         handles = [
             Line2D([], [], color=INK, linewidth=1.0, label="exact"),
-            Line2D([], [], color=ABOVE, linewidth=0.9, linestyle="dashed", label="Eq. 76"),
+            Line2D([], [], color=ACCENT, linewidth=0.9, linestyle="dashed", label="Eq. 76"),
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
@@ -115,9 +115,9 @@ def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
         axes.plot_surface(x[mesh], y[mesh], exact[mesh], edgecolor=INK, linewidth=0.35, **facets)
         some = _spread(omega.size, 17, eta.size, 11)
         above = fitted[some] >= exact[some]
-        for shown, face in ((above, ABOVE), (~above, "white")):
+        for shown, face in ((above, ACCENT), (~above, "white")):
             axes.plot(
-                x[some][shown], y[some][shown], fitted[some][shown], "o", color=ABOVE, markerfacecolor=face,
+                x[some][shown], y[some][shown], fitted[some][shown], "o", color=ACCENT, markerfacecolor=face,
                 markersize=2.6, markeredgewidth=0.6, zorder=5,
             )  # fmt: skip
         axes.view_init(elev=27.0, azim=118.0)
@@ -126,7 +126,7 @@ def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
         axes.set_zlabel(r"critical amplitude, $a_{cr}$")
         axes.set_xlim(omega[0], omega[-1])
         axes.set_box_aspect((1.2, 1.0, 0.75), zoom=0.95)
-        point: dict[str, Any] = {"color": ABOVE, "linestyle": "", "marker": "o", "markersize": 3.5}
+        point: dict[str, Any] = {"color": ACCENT, "linestyle": "", "marker": "o", "markersize": 3.5}
         handles = [
             Line2D([], [], color=INK, linewidth=1.0, label="exact"),
             Line2D([], [], **point, label="Eq. 76, above it"),
@@ -145,7 +145,7 @@ def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: st
         axes = figure.add_subplot()
         exact = next(iter(critical.values()))
         low, high = float(exact.min()), float(exact.max())
-        axes.axhspan(low, high, color=REST, linewidth=0.0)
+        axes.axhspan(low, high, color=PALE, linewidth=0.0)
         for (name, values), style in zip(critical.items(), _FREQUENCY_CURVES, strict=False):
             axes.plot(omega, values, label=name, **style)
         axes.annotate(

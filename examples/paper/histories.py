@@ -11,10 +11,10 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.plot.canvas import (
-    ABOVE,
-    GROUND,
+    ACCENT,
+    GREY,
     INK,
-    REST,
+    PALE,
     add_legend,
     add_text,
     add_ticks,
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 #: How responses are distinguished, in colour and in grey: the first is a broad line below all others.
 _SCHEMES: Final[tuple[dict[str, Any], ...]] = (
-    {"color": GROUND, "linewidth": 3.0},
+    {"color": GREY, "linewidth": 3.0},
     {"color": INK, "linewidth": 1.1},
-    {"color": ABOVE, "linewidth": 1.3, "linestyle": (0, (4, 2))},
+    {"color": ACCENT, "linewidth": 1.3, "linestyle": (0, (4, 2))},
     {"color": "#3c6aa0", "linewidth": 1.8, "linestyle": (0, (1, 1))},
 )
 
@@ -42,7 +42,7 @@ _LAST_CYCLES: Final = 5
 _NARROW: Final = 0.1
 
 #: The line at which a block comes to rest, or to which ratios tend.
-_LIMIT: Final[dict[str, Any]] = {"color": ABOVE, "linestyle": (0, (4, 2))}
+_LIMIT: Final[dict[str, Any]] = {"color": ACCENT, "linestyle": (0, (4, 2))}
 
 _ARROW: Final = {
     "arrowstyle": "<->",
@@ -52,7 +52,7 @@ _ARROW: Final = {
     "shrinkB": 0.0,
     "mutation_scale": 6,
 }
-_MARK: Final[dict[str, Any]] = {"color": ABOVE, "markersize": 4.5, "markeredgewidth": 0.0, "zorder": 4}
+_MARK: Final[dict[str, Any]] = {"color": ACCENT, "markersize": 4.5, "markeredgewidth": 0.0, "zorder": 4}
 
 
 def find_magnification(largest: float) -> tuple[float, str]:
@@ -96,7 +96,7 @@ def excitation_figure(
             add_text(axes, text, (0.5 * (first + end), height), (0, 2), ha="center", va="bottom")
         if not math.isnan(rest):
             axes.plot([rest, rest], [-0.75, 0.1], linewidth=0.9, **_LIMIT)
-            add_text(axes, "at rest", (rest, -0.75), (-3, 0), ha="right", color=ABOVE)
+            add_text(axes, "at rest", (rest, -0.75), (-3, 0), ha="right", color=ACCENT)
         axes.set_xlim(time[0], time[-1])
         axes.set_xlabel("time over period, $t/T$")
         axes.legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.04))
@@ -119,7 +119,7 @@ def history_figure(
     """
     with open_figure(None, (7.0, 5.6), title=title) as figure:
         response, excitation, close = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 1.2))
-        response.axvspan(*detail.time, color=REST, label="the time of (c)")
+        response.axvspan(*detail.time, color=PALE, label="the time of (c)")
         low = min(float(rotation.min()) for rotation in rotations.values())
         high = max(float(rotation.max()) for rotation in rotations.values())
         margin = 0.07 * (high - low)
@@ -152,8 +152,8 @@ def _draw_responses(axes: Axes, time: Floats, rotations: Mapping[str, Floats], l
 
 def _draw_excitation(axes: Axes, time: Floats, acceleration: Floats) -> None:
     axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time, acceleration, color=GROUND, linewidth=1.2, label="ground acceleration")
-    beyond: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
+    axes.plot(time, acceleration, color=GREY, linewidth=1.2, label="ground acceleration")
+    beyond: dict[str, Any] = {"color": ACCENT, "linewidth": 0.9, "interpolate": True, "zorder": 3}
     axes.fill_between(time, acceleration, 1.0, where=acceleration > 1.0, **beyond)
     axes.fill_between(time, acceleration, -1.0, where=acceleration < -1.0, **beyond)
     for threshold, label in ((1.0, "uplift thresholds"), (-1.0, None)):
@@ -168,7 +168,7 @@ def _mark_initiations(axes: Axes, marks: tuple[Mark, ...], peak: float) -> None:
     axes.set_yticks([-1.0, 0.0, 1.0])
     for mark in marks:
         axes.plot(mark.time, height, "v", **_MARK)
-        add_text(axes, mark.text, (mark.time, height), (-4, 4), color=ABOVE, fontsize=7.5)
+        add_text(axes, mark.text, (mark.time, height), (-4, 4), color=ACCENT, fontsize=7.5)
 
 
 class Ratios(NamedTuple):
@@ -210,7 +210,7 @@ def _draw_whole(axes: Axes, time: Floats, rotation: Floats, impact_times: Floats
     add_ticks(axes, impact_times, 0.06)
     axes.axvline(rest, linewidth=1.0, **_LIMIT)
     text, across = rf"at rest, $\tau_{{ch}}$ = {rest:.6f}", axes.get_xaxis_transform()
-    add_text(axes, text, (rest, 0.3), (-6, 0), xycoords=across, ha="right", color=ABOVE)
+    add_text(axes, text, (rest, 0.3), (-6, 0), xycoords=across, ha="right", color=ACCENT)
     axes.set_xlim(0.0, 1.06 * rest)
     low, high = axes.get_ylim()
     axes.set_ylim(low - 0.18 * (high - low), high)
@@ -234,7 +234,7 @@ def _draw_cycles(axes: Axes, time: Floats, rotation: Floats, impacts: Floats, nu
     axes.set_ylim(low - 0.24 * span, high + 0.4 * span)
     for k, at in enumerate(impacts):
         height = high + (0.16 if k % 2 else 0.3) * span
-        axes.plot([at, at], [low - 0.08 * span, height], color=GROUND, linewidth=0.6, zorder=0)
+        axes.plot([at, at], [low - 0.08 * span, height], color=GREY, linewidth=0.6, zorder=0)
         axes.annotate(rf"$\tau_{{{number + k}}}$", (at, height), ha="center", va="bottom")
     _draw_intervals(axes, impacts, number, low - 0.05 * span)
     axes.set_ylabel(rf"rotation, {power}$\phi$")
@@ -260,10 +260,10 @@ def ratio_figure(panels: Sequence[Ratios]) -> Figure:
                 axes.plot(n[chosen], panel.values[chosen], "o", **look)
             axes.axhline(panel.limit, linewidth=0.9, **_LIMIT, zorder=0)
             text, at, up = rf"$\eta^2$ = {panel.limit:.4f}", (0.98, panel.limit), axes.get_yaxis_transform()
-            add_text(axes, text, at, (0, -5), xycoords=up, ha="right", va="top", color=ABOVE)
+            add_text(axes, text, at, (0, -5), xycoords=up, ha="right", va="top", color=ACCENT)
             axes.set_title(f"({'abcdef'[k]}) {panel.title}", loc="left")
             axes.set_xlabel("impact $n$")
-            axes.grid(color=GROUND, linewidth=0.3, alpha=0.6)
+            axes.grid(color=GREY, linewidth=0.3, alpha=0.6)
             axes.legend(loc="center right")
         figure.axes[0].set_ylabel(r"$\Delta\tau_{n+2}\,/\,\Delta\tau_n$")
     return figure

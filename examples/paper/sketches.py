@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST, open_figure
+from rocking.plot.canvas import ACCENT, GREY, INK, PALE, open_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,8 +39,8 @@ def block_figure(*, upright: Floats, rocking: Floats, title: str) -> Figure:
         axes = figure.add_subplot()
         axes.set_aspect("equal")
         axes.set_axis_off()
-        axes.add_patch(Polygon(rocking[:4], facecolor=REST, edgecolor=INK, linewidth=1.3))
-        axes.add_patch(Polygon(upright[:4], fill=False, edgecolor=GROUND, linewidth=0.9, linestyle=(0, (4, 2))))
+        axes.add_patch(Polygon(rocking[:4], facecolor=PALE, edgecolor=INK, linewidth=1.3))
+        axes.add_patch(Polygon(upright[:4], fill=False, edgecolor=GREY, linewidth=0.9, linestyle=(0, (4, 2))))
         _draw_ground(axes, rocking, upright)
         _draw_sizes(axes, rocking)
         _draw_angles(axes, upright, rocking)
@@ -57,7 +57,7 @@ def _draw_ground(axes: Axes, rocking: Floats, upright: Floats) -> None:
     left = min(rocking[:4, 0].min(), upright[3, 0]) - 0.35
     right = max(rocking[:4, 0].max(), upright[0, 0]) + 0.35
     soil = Rectangle(
-        (left, -_DEPTH), right - left, _DEPTH, facecolor="none", edgecolor=GROUND, linewidth=0.0, hatch="////"
+        (left, -_DEPTH), right - left, _DEPTH, facecolor="none", edgecolor=GREY, linewidth=0.0, hatch="////"
     )
     axes.add_patch(soil)
     axes.plot([left, right], [0.0, 0.0], color=INK, linewidth=1.3)
@@ -65,7 +65,7 @@ def _draw_ground(axes: Axes, rocking: Floats, upright: Floats) -> None:
         axes.plot(*place, "o", color=INK, markersize=4.0, markerfacecolor="white", zorder=4)
         axes.annotate(name, place - [0.0, 1.3 * _DEPTH], ha="center", va="top")
     middle, height = 0.5 * (upright[0, 0] + upright[3, 0]), -4.0 * _DEPTH
-    _draw_arrow(axes, np.array([middle - 0.25, height]), np.array([middle + 0.25, height]), "->", ABOVE)
+    _draw_arrow(axes, np.array([middle - 0.25, height]), np.array([middle + 0.25, height]), "->", ACCENT)
     axes.annotate(r"$\ddot u_g$", (middle + 0.25, height), xytext=(4, 0), textcoords="offset points", va="center")
     axes.set_xlim(left, right)
     axes.set_ylim(height - 0.1, max(rocking[:4, 1].max(), upright[:4, 1].max()) + 0.3)
@@ -167,7 +167,7 @@ def _draw_box(axes: Axes, box: Box) -> None:
     from matplotlib.patches import FancyBboxPatch, Polygon
 
     (x, y), (width, height) = box.at, box.size
-    style: dict[str, Any] = {"facecolor": "white" if box.kind == "step" else REST, "edgecolor": INK, "linewidth": 0.9}
+    style: dict[str, Any] = {"facecolor": "white" if box.kind == "step" else PALE, "edgecolor": INK, "linewidth": 0.9}
     if box.kind == "decision":
         slope = 0.14
         corners = [

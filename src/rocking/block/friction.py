@@ -76,12 +76,16 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
     base = height * bodies.alpha if is_linear else radii * np.sin(bodies.alpha)
     ratio = arm * bodies.p**2 / g
     inertia = g * arm / bodies.p**2
-    square = inertia[:, ::-1] - height**2 - base[:, ::-1] ** 2  # of the radius of gyration, by the side entered
+    gyration_square = (
+        inertia[:, ::-1] - height**2 - base[:, ::-1] ** 2
+    )  # of the radius of gyration, by the side entered
     static, kinetic = friction
-    _refuse(~((ratio < 1.0) & (square > 0.0)), _MISSING)
-    gyration = (1.0 - ratio) / ratio
-    limit = square + base[:, ::-1] ** 2
-    largest = np.minimum(2.0 * np.sqrt(gyration * (1.0 + gyration)), limit / (height * base[:, ::-1]))
+    _refuse(~((ratio < 1.0) & (gyration_square > 0.0)), _MISSING)
+    centroidal_inertia = (1.0 - ratio) / ratio
+    pivot_square = gyration_square + base[:, ::-1] ** 2
+    largest = np.minimum(
+        2.0 * np.sqrt(centroidal_inertia * (1.0 + centroidal_inertia)), pivot_square / (height * base[:, ::-1])
+    )
     if np.any(~(kinetic < largest)):
         index = int(np.argmin(largest.min(axis=1)))
         raise OptionError(
@@ -90,9 +94,9 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
             "friction",
             value=kinetic,
         )
-    gain = (inertia[:, ::-1] * bodies.restitution - height**2) ** 2 - (square + base**2) * limit
+    gain = (inertia[:, ::-1] * bodies.restitution - height**2) ** 2 - (gyration_square + base**2) * pivot_square
     _refuse(
-        gain > _SIZE_TOLERANCE * limit**2,
+        gain > _SIZE_TOLERANCE * pivot_square**2,
         "this restitution would gain energy in a slip, so that {} requires another one; omit the restitution",
     )
     records["has_friction"], records["static_friction"], records["kinetic_friction"] = True, static, kinetic

@@ -72,10 +72,10 @@ def compute_log_density(populations: Floats, width: float, points: Floats) -> Fl
     centre, centred = centre - mean, points - mean
     precision = (width * dispersion) ** -2
     constant = 0.5 * (np.log(precision / (2.0 * np.pi)) - precision * centre**2).sum(axis=1)
-    powers = np.ascontiguousarray(np.vstack([(precision * centre).T, -0.5 * precision.T, constant]))
-    factors = np.hstack([centred, centred**2, np.ones((len(points), 1))])
+    coefficients = np.ascontiguousarray(np.vstack([(precision * centre).T, -0.5 * precision.T, constant]))
+    monomials = np.hstack([centred, centred**2, np.ones((len(points), 1))])
     log_sums = np.empty(len(points))
-    kernel.write_log_sums(factors, powers, np.empty(len(populations)), log_sums)
+    kernel.write_log_sums(monomials, coefficients, np.empty(len(populations)), log_sums)
     return np.asarray(log_sums - np.log(len(populations)))
 
 

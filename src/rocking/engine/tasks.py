@@ -93,7 +93,7 @@ class Setup:
         writes_tables: bool = False,
         ground: Ground | None = None,
         name: str | None = None,
-    ) -> Run:
+    ) -> KernelArguments:
         """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments."""
         bodies = self.bodies
         check_components(bodies, motion)
@@ -105,10 +105,10 @@ class Setup:
             ground = prepare_ground(motion, bodies.gravity)._replace(factor=float(factor))
         states = state.new_states(len(bodies), 0)
         set_start(states, records, bodies, *self.start, name)
-        return Run(ground, records, settings, states)
+        return KernelArguments(ground, records, settings, states)
 
 
-class Run(NamedTuple):
+class KernelArguments(NamedTuple):
     """Bodies under a motion, as kernels accept them: the ground, a record and a state per body, and the settings."""
 
     ground: Ground
@@ -124,7 +124,7 @@ class Task:
     bodies: slice | Integers  # body of each
     motions: tuple[Motion, ...]
     factor: float | Floats = 1.0  # of all motions, or of each simulation
-    motion: Integers | None = None  # index of the motion of each; None: the first of all
+    motion_indices: Integers | None = None  # index of the motion of each; None: the first of all
     key: Any = ()  # index of the outcomes for the caller
 
 
@@ -164,22 +164,26 @@ def split_simulations(motions: Sequence[Motion], counts: Integers) -> Iterator[s
 
 
 def simulate_each(
-    setup: Setup, motions: Sequence[Motion], bodies: Integers, motion: Integers, factors: Floats
+    setup: Setup, motions: Sequence[Motion], bodies: Integers, motion_indices: Integers, factors: Floats
 ) -> Iterator[tuple[Integers, NDArray[np.void]]]:
-    """Yield indices k and outcomes of ``bodies[k]`` under the motion of index ``motion[k]`` times ``factors[k]``."""
-    order = np.argsort(motion, kind="stable")
+    """Yield indices k and outcomes of ``bodies[k]`` under motion ``motion_indices[k]`` times ``factors[k]``."""
+    order = np.argsort(motion_indices, kind="stable")
     tasks = (
-        create_task(bodies[part], motions, motion[part], factors[part], part)
-        for part in (order[part] for part in split_simulations(motions, np.bincount(motion, minlength=len(motions))))
+        create_task(bodies[part], motions, motion_indices[part], factors[part], part)
+        for part in (
+            order[part] for part in split_simulations(motions, np.bincount(motion_indices, minlength=len(motions)))
+        )
     )
     for task, outcomes in simulate_tasks(setup, tasks):
         yield task.key, outcomes
 
 
-def create_task(bodies: Integers, motions: Sequence[Motion], motion: Integers, factors: Floats, key: Any = ()) -> Task:
+def create_task(
+    bodies: Integers, motions: Sequence[Motion], motion_indices: Integers, factors: Floats, key: Any = ()
+) -> Task:
     """Create a task of simulations under some of the motions, from the indices of bodies and motions."""
-    first, last = int(motion.min()), int(motion.max())
-    return Task(bodies, tuple(motions[first : last + 1]), factors, motion - first, key)
+    first, last = int(motion_indices.min()), int(motion_indices.max())
+    return Task(bodies, tuple(motions[first : last + 1]), factors, motion_indices - first, key)
 
 
 def require_finished(unfinished: bool) -> None:
@@ -210,20 +214,22 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
     bodies = setup.bodies.select(task.bodies)
     for ground_motion in task.motions:
         check_components(bodies, ground_motion)
-    motion = np.zeros(len(bodies), dtype=np.int64) if task.motion is None else task.motion
+    motion_indices = np.zeros(len(bodies), dtype=np.int64) if task.motion_indices is None else task.motion_indices
     factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(bodies)).copy()
     settings = build_settings(bodies, setup.model, setup.chattering, setup.duration, writes_tables=False)
-    records = bodies.kernel_records(setup.model, _compute_thresholds(setup, bodies, task.motions, motion, factors))
+    records = bodies.kernel_records(
+        setup.model, _compute_thresholds(setup, bodies, task.motions, motion_indices, factors)
+    )
     if setup.friction is not None:
         add_friction(records, bodies, setup.model, setup.friction)
     states = state.new_states(len(bodies), 0)
     set_start(states, records, bodies, *setup.start)
     complete = np.empty(len(bodies), dtype=bool)
     for group in prepare_grounds(task.motions, bodies.gravity):
-        for indices, substeps in _split_group(group, motion, factors, records, setup.model):
+        for indices, substeps in _split_group(group, motion_indices, factors, records, setup.model):
             if cancelled is not None and cancelled.is_set():
                 break
-            index = np.searchsorted(group.indices, motion[indices])
+            index = np.searchsorted(group.indices, motion_indices[indices])
             # `take` copies records 20 times as fast as indexing, which copies field by field.
             batch = _Batch(group.grounds, index, factors[indices], records.take(indices), states.take(indices))
             batch.states["budget"] = _FIRST_SLICE + BUDGET_PER_PIECE * np.diff(group.grounds.first_pieces)[index]
@@ -231,7 +237,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
             _resume_marches(settings, batch, cancelled)
             state.replace_records(states, indices, batch.states)
             complete[indices] = detect_complete_chattering(*batch)
-    outcomes = _collect_outcomes(states, np.array([motion.end for motion in task.motions])[motion])
+    outcomes = _collect_outcomes(states, np.array([motion.end for motion in task.motions])[motion_indices])
     outcomes["peak_rotation"] = compute_peaks(states, records, bodies.stops)
     is_known = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"] | outcomes["lost_contact"])
     side = states["side"]
@@ -244,14 +250,14 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
 
 
 def _compute_thresholds(
-    setup: Setup, bodies: Bodies, motions: Sequence[Motion], motion: Integers, factors: Floats
+    setup: Setup, bodies: Bodies, motions: Sequence[Motion], motion_indices: Integers, factors: Floats
 ) -> Floats:
     """Compute the thresholds of the chattering scheme for each simulation, shape (n, 2)."""
     if len(motions) == 1 or setup.chattering.code != state.RestRule.TIME:
         return setup.chattering.thresholds(bodies, motions[0], setup.model, factors)
     thresholds = np.empty((len(bodies), 2))
-    for m in np.unique(motion):
-        members = np.flatnonzero(motion == m)
+    for m in np.unique(motion_indices):
+        members = np.flatnonzero(motion_indices == m)
         thresholds[members] = setup.chattering.thresholds(
             bodies.select(members), motions[m], setup.model, factors[members]
         )
@@ -262,21 +268,21 @@ class _Batch(NamedTuple):
     """Simulations under similar motions, as kernels accept them."""
 
     grounds: Grounds
-    motion: Integers  # index of the motion of each
+    motion_indices: Integers  # index of the motion of each
     factors: Floats
     records: Records
     states: Records
 
 
 def _split_group(
-    group: GroundGroup, motion: Integers, factors: Floats, records: Records, model: Model
+    group: GroundGroup, motion_indices: Integers, factors: Floats, records: Records, model: Model
 ) -> Iterator[tuple[Integers, int]]:
     """Yield simulations under a group of motions for one call of a kernel, and their number of substeps.
 
     It is -1 for bodies simulated alone.
     """
-    members = np.flatnonzero(np.isin(motion, group.indices))
-    index = np.searchsorted(group.indices, motion[members])
+    members = np.flatnonzero(np.isin(motion_indices, group.indices))
+    index = np.searchsorted(group.indices, motion_indices[members])
     weight = max_absolute_weights(group.grounds, index, factors[members])
     step, with_vertical = group.steps[index], group.grounds.stretches.shape[1] > 1
     width = step * np.sqrt(np.abs(records["stiffness"][members]).max(axis=1) * weight)
@@ -310,7 +316,10 @@ def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event 
     empty_table, scratch = state.new_table(0), state.new_scratch()
     ending = batch.states["ending"]
     for k in np.flatnonzero((ending == state.Ending.RUNNING) | (ending == state.Ending.PAUSED)):
-        body_state, ground = batch.states[k], select_ground(batch.grounds, batch.motion[k], float(batch.factors[k]))
+        body_state, ground = (
+            batch.states[k],
+            select_ground(batch.grounds, batch.motion_indices[k], float(batch.factors[k])),
+        )
         body_state["stop_piece"] = state.TO_THE_END
         for _ in range(count_slices(ground)):
             if cancelled is not None and cancelled.is_set():
@@ -329,11 +338,11 @@ def count_slices(ground: Ground) -> int:
 
 
 def detect_complete_chattering(
-    grounds: Grounds, motion: Integers, factors: Floats, records: Records, states: Records
+    grounds: Grounds, motion_indices: Integers, factors: Floats, records: Records, states: Records
 ) -> Flags:
     """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
-    write_completeness(grounds, motion, factors, records, states, state.new_scratch(), complete)
+    write_completeness(grounds, motion_indices, factors, records, states, state.new_scratch(), complete)
     return complete
 
 

@@ -159,7 +159,7 @@ def propagate_through_impact(trail: Trail, k: int, v: float, number: int, change
 
 
 @kernel
-def adjoint_of_final_state(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
+def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
     """Write the derivative of the time at which the step of a row ends by the state before it; return the `AdjointEnd`.
 
     That state is at the end of the step, before an impact or an overturning, otherwise at its node. For an uplift or

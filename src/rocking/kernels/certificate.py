@@ -167,8 +167,8 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
         or (block.has_friction and not sticks_until_rest(block, settings, motion_bounds, height, max_square))
     ):
         return no_proof()
-    write_local_series(ground, state.piece, state.offset, 1.0, set_zero(scratch.ground))
-    write_weight_series(ground, state.piece, state.offset, set_zero(scratch.weight))
+    write_local_series(ground, state.piece, state.offset, 1.0, clear_lowest_coefficients(scratch.ground))
+    write_weight_series(ground, state.piece, state.offset, clear_lowest_coefficients(scratch.weight))
     horizon = Horizon(motion_bounds, ground_error(ground), ground.columns, upper, height, drag)
     side_i = fit_restoring_parabola(block, settings, i, scratch, horizon)
     side_j = fit_restoring_parabola(block, settings, j, scratch, horizon)
@@ -406,7 +406,7 @@ def bound_higher_terms(A: Floats, horizon: Horizon) -> float:
 
 
 @inlined
-def set_zero(A: Floats) -> Floats:
+def clear_lowest_coefficients(A: Floats) -> Floats:
     """Set the lowest coefficients of a polynomial to zero and return it."""
     A[0] = A[1] = A[2] = 0.0
     return A

@@ -34,8 +34,8 @@ GROUP = define_record(
     **dict.fromkeys(
         (
             "length", "push_start", "push_slope", "lift_start", "lift_slope",
-            "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine", "stiffness", "pull", "push",
-            "first", "second", "third", "curve", "peak", "overturn_angle", "h", "factor",
+            "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine", "stiffness", "pull",
+            "push_gain", "first", "second", "third", "curve", "peak", "overturn_angle", "h", "factor",
             "sticking_push", "sticking_slope", "twice_slenderness",
         ),
         _LANES,
@@ -46,7 +46,7 @@ GROUP = define_record(
 #: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
 #: instead of its gain. ``curve`` max |u''| bounds the distance of the rotation above or below both ends of the step.
 STEP_CONSTANTS = define_record(
-    **dict.fromkeys(("stiffness", "pull", "push", "first", "second", "third", "curve"), _SIDES)
+    **dict.fromkeys(("stiffness", "pull", "push_gain", "first", "second", "third", "curve"), _SIDES)
 )
 
 #: Largest bound on the next terms by the last ones, divided by the first two; the truncation is 1/100 of it.
@@ -99,7 +99,7 @@ def step_linear(group: Record, unit: float) -> int:
         start, slope = push_line(group, lane, unit)
         end = start + slope * h
         u, v = group.u[lane], group.v[lane]
-        lam, push_gain = group.stiffness[lane], group.push[lane]
+        lam, push_gain = group.stiffness[lane], group.push_gain[lane]
         w = lam * u - (group.pull[lane] + push_gain * start)
         j = lam * v - push_gain * slope
         u1 = u + (h * v + (group.second[lane] * w + group.third[lane] * j))
@@ -184,20 +184,22 @@ def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> 
         weight = line_during(weight_line(group, lane, unit), k, h)
         w, d = weight
         u, v = group.next_u[lane], group.next_v[lane]
-        q, gain = group.stiffness[lane] * square, group.push[lane] * square
+        q, gain = group.stiffness[lane] * square, group.push_gain[lane] * square
         z0 = q * u - group.pull[lane] * square
         terms, r10, r11 = weighted_velocity_terms(v * h, z0, q, (gain * side_push[0], gain * side_push[1]), weight)
         r1, r2, r3, r4, r5, r6, r7, r8, r9 = terms
-        high = 0.125 * r8 + ((1.0 / 9.0) * r9 + (0.1 * r10 + (1.0 / 11.0) * r11))
-        low = (1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + ((1.0 / 7.0) * r7 + high))))
-        u1 = u + (r1 + (0.5 * r2 + low))
+        last_terms = 0.125 * r8 + ((1.0 / 9.0) * r9 + (0.1 * r10 + (1.0 / 11.0) * r11))
+        middle_terms = (1.0 / 3.0) * r3 + (
+            0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + ((1.0 / 7.0) * r7 + last_terms)))
+        )
+        u1 = u + (r1 + (0.5 * r2 + middle_terms))
         v1 = v + rate * (r2 + (r3 + (r4 + (r5 + (r6 + (r7 + (r8 + (r9 + (r10 + r11)))))))))
         tail = 3.0 * abs(r4) + (4.0 * abs(r5) + (5.0 * abs(r6) + (6.0 * abs(r7) + 7.0 * abs(r8))))
         tail += 8.0 * abs(r9) + (9.0 * abs(r10) + 10.0 * abs(r11))
         lower, upper = min(r2 + 2.0 * min(r3, 0.0) - tail, 0.0), max(r2 + 2.0 * max(r3, 0.0) + tail, 0.0)
         is_free = is_event_free(group, lane, (u, u1), r1, (lower, upper))
-        last_terms = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
-        is_free &= abs(q) * last_terms <= _NEXT_TERMS * (abs(r1) + abs(r2))
+        next_terms = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
+        is_free &= abs(q) * next_terms <= _NEXT_TERMS * (abs(r1) + abs(r2))
         group.blocked[lane] |= not is_free
         group.next_u[lane] = u1
         group.next_v[lane] = v1
@@ -255,7 +257,7 @@ def take_nonlinear_substep(
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
         weight = weight_during(group, lane, at_rest, unit, k, span)
         lane_push = line_during(push_line(group, lane, unit), k, span)
-        side_push = (group.push[lane] * lane_push[0], group.push[lane] * lane_push[1])
+        side_push = (group.push_gain[lane] * lane_push[0], group.push_gain[lane] * lane_push[1])
         l2 = group.stiffness[lane] * scale
         terms, angles = nonlinear_velocity_terms(r1, (s0, c0), l2, side_push, weight)
         _, r2, r3, r4, r5, r6, r7, r8, r9 = terms

@@ -94,12 +94,12 @@ def compute_step_constants(blocks: Records, lengths: Floats, substeps: int) -> R
     sign = np.array([1.0, -1.0])
     if substeps > 0:
         steps["stiffness"] = -0.5 * lam * (h / substeps) ** 2
-        steps["push"] = sign
+        steps["push_gain"] = sign
         return steps
     q = lam * h * h
     steps["stiffness"] = lam
     steps["pull"] = blocks["threshold_slope"] * blocks["threshold"]
-    steps["push"] = blocks["threshold_slope"] * sign
+    steps["push_gain"] = blocks["threshold_slope"] * sign
     steps["first"] = h * stumpff(1, q)
     steps["second"] = h * h * stumpff(2, q)
     steps["third"] = h * h * h * stumpff(3, q)
@@ -134,7 +134,7 @@ def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
     group.peak[lane] = state.peak
     group.stiffness[lane] = steps.stiffness[side]
     group.pull[lane] = steps.pull[side]
-    group.push[lane] = steps.push[side]
+    group.push_gain[lane] = steps.push_gain[side]
     group.first[lane] = steps.first[side]
     group.second[lane] = steps.second[side]
     group.third[lane] = steps.third[side]
@@ -178,7 +178,7 @@ def clear_lane(pool: Pool, lane: int) -> None:
     group.v[lane] = group.sine[lane] = group.cosine[lane] = group.factor[lane] = 0.0
     group.peak[lane] = group.overturn_angle[lane] = group.sticking_push[lane] = np.inf
     group.h[lane] = pool.grounds.pieces[0, LENGTH]
-    group.stiffness[lane] = group.pull[lane] = group.push[lane] = group.curve[lane] = 0.0
+    group.stiffness[lane] = group.pull[lane] = group.push_gain[lane] = group.curve[lane] = 0.0
     group.first[lane] = group.second[lane] = group.third[lane] = 0.0
 
 

@@ -166,16 +166,20 @@ _GAUSS_LEGENDRE = (
 
 
 @shared
-def find_leaning_rotation(block: Record, settings: Record, state: Record, rate: float) -> float:
+def find_leaning_rotation(block: Record, settings: Record, state: Record, acceleration: float) -> float:
     """Find the rotation without moment about which a body leans forever; NaN if this is not proven.
 
     The largest rotation so far will not be exceeded by more than the fraction `PEAK_MARGIN`. Either the body, with the
-    acceleration ``rate``, moves and is pushed outwards, as after turning back before the ground, which no rocking body
+    ``acceleration``, moves and is pushed outwards, as after turning back before the ground, which no rocking body
     does below its balance. Or it has crept back to within `PEAK_MARGIN` of the rotation, at the corresponding speed.
     """
     side, u, nonlinear = state.side, state.u, settings.nonlinear
     drag = block.damping[side]
-    if rate + drag * state.v <= 0.0 if state.v > 0.0 else rate < 0.0 or -state.v > PEAK_MARGIN * drag * u:
+    if (
+        acceleration + drag * state.v <= 0.0
+        if state.v > 0.0
+        else acceleration < 0.0 or -state.v > PEAK_MARGIN * drag * u
+    ):
         return np.nan
     plastic = state.plastic
     if block.yielding:

@@ -56,7 +56,7 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
             array(),
         ),
         "adjoint.adjoint": (trail, scratch, state.new_record(state.VARIATION), 0, 0.0, array(3), array(2, 2)),
-        "adjoint.adjoint_of_final_state": (trail, scratch, 0, array(3), array(2, 2)),
+        "adjoint.differentiate_step_end": (trail, scratch, 0, array(3), array(2, 2)),
         "periodic.iterate": (problem, scratch, states, 1, array(1, 1, 3), array(1, TRAP_COLUMNS), count, count),
         "periodic.differentiate": (trail, scratch, state.new_record(state.VARIATION), table, states, array(1, 2, 2)),
         "periodic.measure_stretches": (

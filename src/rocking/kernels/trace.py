@@ -183,7 +183,7 @@ def compute_variation(
     impact_count = event_count = 0
     du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
     dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
-    plastic, dp = 0.0, plastic_by_start(trail) * du  # plastic elongation of a tendon, and its variation
+    plastic, plastic_variation = 0.0, plastic_by_start(trail) * du  # plastic elongation of a tendon, and its variation
     written = count_times_until(times, 0, nodes[0].time)
     changes[:written] = du
     changes[written:] = 0.0
@@ -199,25 +199,29 @@ def compute_variation(
         next_node = nodes[k + 1]
         first, written = written, count_times_until(times, written, next_node.time)
         if node.side < 0:
-            tendon_change = restoring_by_tendon(trail.block, next_node.side, plastic, dp)
-            landing = events[event_count - 1] if event_count > 0 else 0.0
+            tendon_change = restoring_by_tendon(trail.block, next_node.side, plastic, plastic_variation)
+            shift_of_rest = events[event_count - 1] if event_count > 0 else 0.0
             du = 0.0
-            events[event_count], dv = vary_uplift(trail, node, next_node, quantity, tendon_change, landing)
+            events[event_count], dv = vary_uplift(trail, node, next_node, quantity, tendon_change, shift_of_rest)
             event_count += 1
         elif next_node.side < 0:
             shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
-            events[event_count] = rest_shift(trail, node, quantity, (dv, shift, plastic, dp), next_node)
+            events[event_count] = rest_shift(trail, node, quantity, (dv, shift, plastic, plastic_variation), next_node)
             event_count += 1
             if written > first:
-                order = expand_variation(trail, scratch, work, node, quantity, (du, dv, dp), next_node.time - node.time)
+                order = expand_variation(
+                    trail, scratch, work, node, quantity, (du, dv, plastic_variation), next_node.time - node.time
+                )
                 write_changes(trail, scratch, work, node, order, times[first:written], changes[first:written], True)
         else:
-            order = expand_variation(trail, scratch, work, node, quantity, (du, dv, dp), next_node.time - node.time)
+            order = expand_variation(
+                trail, scratch, work, node, quantity, (du, dv, plastic_variation), next_node.time - node.time
+            )
             write_changes(trail, scratch, work, node, order, times[first:written], changes[first:written], False)
             t = step_duration(trail, node, next_node)
             du, dv, _ = evaluate_series(work.change, order, t)
             if node.law == TendonLaw.PLASTIC and next_node.law != node.law:
-                dp = elongation_rate(trail, node.side, next_node.u) * du
+                plastic_variation = elongation_rate(trail, node.side, next_node.u) * du
             if is_impact(nodes, k):
                 _, speed, _ = evaluate_series(scratch.rotation, order, t)
                 shift = du / -speed
@@ -230,13 +234,13 @@ def compute_variation(
 
 @inlined
 def vary_uplift(
-    trail: Trail, node: Record, next_node: Record, quantity: int, tendon_change: float, landing: float
+    trail: Trail, node: Record, next_node: Record, quantity: int, tendon_change: float, shift_of_rest: float
 ) -> tuple[float, float]:
-    """Compute shift and velocity variation of an uplift after a rest whose start shifts by ``landing``."""
+    """Compute shift and velocity variation of an uplift after a rest whose start shifts by ``shift_of_rest``."""
     if next_node.time > node.time or node.time == trail.nodes[0].time:
         return uplift_shift(trail, next_node, quantity, tendon_change), 0.0
     # The ground ends the rest immediately: the arc starts at the same time.
-    return landing, landing * restoring_acceleration(
+    return shift_of_rest, shift_of_rest * restoring_acceleration(
         trail.ground, trail.block, next_node.side, next_node.piece, next_node.offset
     )
 
@@ -482,15 +486,15 @@ def rest_shift(
     elongation of a tendon and its variation. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g
     at the impact.
     """
-    dv, shift, plastic, dp = changes
+    dv, shift, plastic, plastic_variation = changes
     if rest.time == node.time:
         return shift
     block, i = trail.block, node.side
     j = block.next_side[i]
     g_i = restoring_acceleration(trail.ground, block, i, node.piece, node.offset)
     g_j = restoring_acceleration(trail.ground, block, j, node.piece, node.offset)
-    dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, i, plastic, dp)
-    dg_j = restoring_shift(trail, node, j, quantity, shift) + restoring_by_tendon(block, j, plastic, dp)
+    dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, i, plastic, plastic_variation)
+    dg_j = restoring_shift(trail, node, j, quantity, shift) + restoring_by_tendon(block, j, plastic, plastic_variation)
     e_i, e_j = mean_factor(block, i, node.v), mean_factor(block, j, node.v)
     de_i = 1.0 if quantity_on_side(quantity, i) == Quantity.RESTITUTION else 0.0
     de_j = 1.0 if quantity_on_side(quantity, j) == Quantity.RESTITUTION else 0.0

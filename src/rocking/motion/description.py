@@ -116,10 +116,10 @@ class Description:
         return Description, (self.family, dict(self.parameters), self.text, self.origin)
 
     def __repr__(self) -> str:
-        return f"<Description: {', '.join(part for part in (self.family, self.numbers) if part)}>"
+        return f"<Description: {', '.join(part for part in (self.family, self.parameter_text) if part)}>"
 
     @property
-    def numbers(self) -> str:
+    def parameter_text(self) -> str:
         """Parameters as readable text: "amplitude 3, frequency 2"."""
         return ", ".join(f"{name} {value:.5g}" for name, value in self.parameters.items())
 

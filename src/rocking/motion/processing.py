@@ -63,7 +63,7 @@ class ProcessingMethods(MotionMeasures):
 
     def _describe_origin(self) -> str:
         """Return name, parameters, formula and history in one line, for the description of a sum."""
-        description_parts = (self.description.family, self.description.numbers, self.description.text)
+        description_parts = (self.description.family, self.description.parameter_text, self.description.text)
         return ", ".join(part for part in (self.name, *description_parts, *self.history) if part)
 
     def rotated(self, other: Self, azimuth: float, *, recorded: tuple[float, float] | None = None) -> Self:

@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 # Luminances differ, so that figures are legible in greyscale.
 INK: Final = "#10243e"
-GROUND: Final = "#94a0ad"
-REST: Final = "#e3e6ea"
-ABOVE: Final = "#b0390c"
+GREY: Final = "#94a0ad"
+PALE: Final = "#e3e6ea"
+ACCENT: Final = "#b0390c"
 
 #: Styles of the curves of one figure; luminances and dashes differ.
 CURVES: Final[tuple[dict[str, Any], ...]] = (
     {"color": INK, "linestyle": "-"},
-    {"color": ABOVE, "linestyle": (0, (5, 1.5))},
+    {"color": ACCENT, "linestyle": (0, (5, 1.5))},
     {"color": "#4d7ea8", "linestyle": (0, (1, 1))},
     {"color": "#b8860b", "linestyle": (0, (6, 1.5, 1, 1.5))},
 )
@@ -46,7 +46,7 @@ STYLE: Final[dict[Any, Any]] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
-    "grid.color": REST,
+    "grid.color": PALE,
     "grid.linewidth": 0.6,
     "hatch.linewidth": 0.4,
     "legend.fontsize": 7.5,

@@ -10,9 +10,9 @@ import numpy as np
 from rocking.core.arrays import Flags, Floats, select_evenly
 from rocking.core.tables import escape_dollars
 from rocking.plot.canvas import (
-    ABOVE,
+    ACCENT,
     CURVES,
-    GROUND,
+    GREY,
     INK,
     FigureOptions,
     add_labels,
@@ -62,8 +62,8 @@ def draw_fragility(
             dots = _GROUP_MARKER | {"color": style["color"], "clip_on": False}
             axes.plot(line.group_intensity, line.observed, "os^D"[k % 4], **dots)
         is_bounded = any(np.any(line.lower < line.upper) for line in lines)
-        axes.fill_between([], [], color=GROUND, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
-        axes.plot([], [], "o", color=GROUND, label="dot: share of outcomes at about its intensity", **_GROUP_MARKER)
+        axes.fill_between([], [], color=GREY, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
+        axes.plot([], [], "o", color=GREY, label="dot: share of outcomes at about its intensity", **_GROUP_MARKER)
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid(True)
         add_labels(axes, intensity_label, probability_label)
@@ -154,7 +154,7 @@ def draw_survival(
         set_log_axis(axes, intensity)
         if hazard is not None:
             _draw_hazard(axes, intensity, hazard)
-            style: dict[str, Any] = {"color": ABOVE, "alpha": 0.2, "label": "more often than the block allows"}
+            style: dict[str, Any] = {"color": ACCENT, "alpha": 0.2, "label": "more often than the block allows"}
             axes.fill_between(intensity, largest, np.maximum(largest, hazard.rate), linewidth=0.0, **style)
         axes.plot(intensity, largest, label=largest_label, linewidth=1.5, **CURVES[1])
         rate = largest[largest < np.inf] if hazard is None else hazard.rate
@@ -173,8 +173,8 @@ def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
     """Draw a hazard curve, dotted where it is extrapolated."""
     is_inside = _is_inside(intensity, hazard.known_range)
     label = "hazard curve (dotted: extended)" if not is_inside.all() else "hazard curve"
-    axes.plot(intensity, hazard.rate, color=GROUND, linewidth=1.0, linestyle=":")
-    axes.plot(intensity[is_inside], hazard.rate[is_inside], color=GROUND, linewidth=2.0, label=label)
+    axes.plot(intensity, hazard.rate, color=GREY, linewidth=1.0, linestyle=":")
+    axes.plot(intensity[is_inside], hazard.rate[is_inside], color=GREY, linewidth=2.0, label=label)
     axes.set_yscale("log")
     axes.grid(True)
     add_labels(axes, "", "exceeded, times a year")
@@ -241,7 +241,7 @@ def draw_spectrum(
             peaks.plot([], [], linestyle="none", label=f"({len(labelled)} of {len(curves)} named)")
         if len(motions) > 1:
             if has_singles:
-                peaks.plot([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions")
+                peaks.plot([], [], color=GREY, linewidth=0.5, label=f"each of {len(motions)} motions")
             for share, width in widths.items():
                 label = "median" if share == 0.5 else f"{100 * share:g} % of the motions are below"
                 peaks.plot([], [], color=INK, linewidth=width, label=label)
@@ -293,7 +293,7 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
     with open_page((7.0, 4.2), **options) as page:
         curves, *strips = page.create_panels("AB", sharey=True, width_ratios=(2.0, 1.0))
         for k, motion in enumerate(motions):
-            style = CURVES[k] if has_few else {"color": GROUND, "linewidth": 0.6}
+            style = CURVES[k] if has_few else {"color": GREY, "linewidth": 0.6}
             peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
             label, size = (names[k], 5.0) if has_few else ("each motion", 3.0)
             curves.plot(peak, motion.levels, label=label, marker=".", markersize=size, markeredgewidth=0.0, **style)
@@ -311,7 +311,7 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
                 level = reached[int(np.ceil(share * len(motions))) - 1]
                 label = f"level that suffices for {100 * share:g} % of them"
                 finite_level = np.where(np.isfinite(level), level, np.nan)
-                curves.plot(peaks, finite_level, color=ABOVE, linestyle=linestyle, label=label)
+                curves.plot(peaks, finite_level, color=ACCENT, linestyle=linestyle, label=label)
         curves.set(xlim=(0.0, None), ylim=(0.0, min(1.5 * float(standing_levels.max(initial=0.0)) or last, last)))
         curves.grid(True)
         add_labels(curves, "peak rotation / slenderness", level_label)
@@ -325,16 +325,16 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
 
 def compute_reaching_levels(motion: ScaledMotion, peaks: Floats) -> Floats:
     """Find the lowest level at which a motion reaches each peak rotation; infinite if never."""
-    overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
-    is_below = motion.levels < overturns
+    overturning_level = float(np.min(motion.bands[:, 0], initial=np.inf))
+    is_below = motion.levels < overturning_level
     level, peak = motion.levels[is_below], motion.peak[is_below]
     if not level.size:
-        return np.full(peaks.shape, overturns)
+        return np.full(peaks.shape, overturning_level)
     first = np.searchsorted(np.maximum.accumulate(peak), peaks)
     lower, upper = (np.clip(first - shift, 0, level.size - 1) for shift in (1, 0))
     rise = np.where(peak[upper] > peak[lower], peak[upper] - peak[lower], np.inf)
     interpolated = level[lower] + (peaks - peak[lower]) / rise * (level[upper] - level[lower])
-    return np.where(first < level.size, interpolated, overturns)
+    return np.where(first < level.size, interpolated, overturning_level)
 
 
 #: Bars of a histogram of blocks.
@@ -373,7 +373,7 @@ def draw_outcomes(
         number, is_overturned = np.arange(1, order.size + 1), overturned[order]
         tests.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
         fallen, standing = number[is_overturned], number[~is_overturned]
-        tests.plot(fallen, np.ones(fallen.size), "v", color=ABOVE, label="overturned", **_TEST_MARKER)
+        tests.plot(fallen, np.ones(fallen.size), "v", color=ACCENT, label="overturned", **_TEST_MARKER)
         standing_style: Any = {"color": INK, "mfc": "white", "label": "did not overturn", **_TEST_MARKER}
         tests.plot(standing, np.zeros(standing.size), "o", **standing_style)
         tests.set_ylim(0.0, 1.0)
@@ -398,8 +398,8 @@ def draw_measured_history(
     """Draw measured and fitted rotation histories (rad, against s) and their residual."""
     with open_page((7.0, 4.0), **options) as page:
         main, *residual_panels = page.create_panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
-        main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")
-        main.plot(fitted_time, fitted, color=ABOVE, linewidth=0.9, label="fitted")
+        main.plot(time, measured, ".", color=GREY, markersize=3.5, markeredgewidth=0.0, label="measured")
+        main.plot(fitted_time, fitted, color=ACCENT, linewidth=0.9, label="fitted")
         main.set_xlim(time[0], time[-1])
         add_labels(main, "" if residual_panels else "time (s)", "rotation (rad)")
         for panel in residual_panels:
@@ -416,14 +416,14 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
     styles = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}
     edges = np.histogram_bin_edges(parameter.values, _BIN_COUNT)
     for bound in parameter.bounds:
-        axes.axvline(bound, color=GROUND, linewidth=1.0, linestyle=(0, (3, 2)), label="bound")
+        axes.axvline(bound, color=GREY, linewidth=1.0, linestyle=(0, (3, 2)), label="bound")
     transform = axes.get_xaxis_transform()
     for k, (name, style) in enumerate(styles.items()):
         shares = np.histogram(parameter.values[:, k], edges, weights=weights)[0]
         axes.stairs(shares, edges, linewidth=1.1, label=name, **style)
         ends, height = np.sort(parameter.estimates[k]), 0.97 - 0.07 * k
         axes.plot(ends, [height] * 3, "|-", color=style["color"], linewidth=1.0, transform=transform)
-    axes.plot([], [], "|-", color=GROUND, linewidth=1.0, markersize=7.0, label="centre: median and 90 %")
+    axes.plot([], [], "|-", color=GREY, linewidth=1.0, markersize=7.0, label="centre: median and 90 %")
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.set_yticks([])
     add_labels(axes, parameter.label, "")
@@ -435,9 +435,9 @@ def draw_reliability(
     """Draw observed against predicted fractions (bins,), with the bands of correct predictions."""
     with open_page((3.7, 3.7), **options) as page:
         (axes,) = page.create_panels()
-        axes.plot([0.0, 1.0], [0.0, 1.0], color=GROUND, linewidth=0.8, linestyle=(0, (4, 2)))
+        axes.plot([0.0, 1.0], [0.0, 1.0], color=GREY, linewidth=0.8, linestyle=(0, (4, 2)))
         label = "90 % of what right predictions would show"
-        axes.vlines(predicted, band_lower, band_upper, color=GROUND, linewidth=5.0, alpha=0.55, label=label)
+        axes.vlines(predicted, band_lower, band_upper, color=GREY, linewidth=5.0, alpha=0.55, label=label)
         axes.plot(predicted, observed, "o-", color=INK, linewidth=0.9, markersize=4.0, clip_on=False, label="observed")
         axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
         axes.grid(True)
@@ -448,7 +448,7 @@ def draw_reliability(
 def draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float) -> None:
     """Draw an acceleration against time, with a line at zero."""
     axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time, acceleration, color=GROUND, linewidth=linewidth, label="_ground acceleration")
+    axes.plot(time, acceleration, color=GREY, linewidth=linewidth, label="_ground acceleration")
 
 
 def draw_motion(

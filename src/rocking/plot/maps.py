@@ -13,10 +13,10 @@ from rocking.core.arrays import Floats
 from rocking.core.tables import escape_dollars
 from rocking.errors import OptionError
 from rocking.plot.canvas import (
-    ABOVE,
-    GROUND,
+    ACCENT,
+    GREY,
     INK,
-    REST,
+    PALE,
     FigureOptions,
     add_labels,
     choose_styles,
@@ -218,7 +218,7 @@ def draw_blocks(
             style: dict[str, Any] = {"c": values[is_finite], "marker": "s", "linewidth": 0.0, **size, **shades}
             markers = axes.scatter(p[is_finite], degrees[is_finite], **style)
             if not is_finite.all():
-                style = {"color": ABOVE, "marker": "x", "linewidth": 0.7, "label": missing_label, **size}
+                style = {"color": ACCENT, "marker": "x", "linewidth": 0.7, "label": missing_label, **size}
                 axes.scatter(p[~is_finite], degrees[~is_finite], **style)
             add_labels(axes, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
@@ -291,12 +291,12 @@ def draw_rose(
             add_labels(axes, "azimuth (deg)" if axes is side_panels[-1] else "", label)
         _set_plan_view(main, float(max(acceleration.max(), np.abs(support).max())))
         label = "support over height of centre of mass"
-        main.add_patch(Polygon(support, facecolor=REST, edgecolor=GROUND, linewidth=1.0, label=label))
+        main.add_patch(Polygon(support, facecolor=PALE, edgecolor=GREY, linewidth=1.0, label=label))
         label = "ground acceleration that lifts it"
         main.plot(*_convert_to_points(azimuth, acceleration), color=INK, linewidth=1.4, label=label)
         label = f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg"
         end = _convert_to_points(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
-        main.plot(*np.insert(end, 0, 0.0, axis=1), color=ABOVE, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
+        main.plot(*np.insert(end, 0, 0.0, axis=1), color=ACCENT, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
         add_labels(main, "towards west and east (g)", "towards south and north (g)")
     return page.figure
 

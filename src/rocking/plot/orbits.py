@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.plot.canvas import ABOVE, GROUND, INK, FigureOptions, add_labels, add_ticks, open_page
+from rocking.plot.canvas import ACCENT, GREY, INK, FigureOptions, add_labels, add_ticks, open_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 #: Line styles of stable and unstable orbits.
 _STABLE_STYLE: Final[dict[str, Any]] = {"color": INK, "linewidth": 1.4, "linestyle": "-"}
-_IMPACT_STYLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.8, "linestyle": (0, (1, 1.5))}
-_UNSTABLE_STYLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
+_IMPACT_STYLE: Final[dict[str, Any]] = {"color": ACCENT, "linewidth": 0.8, "linestyle": (0, (1, 1.5))}
+_UNSTABLE_STYLE: Final[dict[str, Any]] = {"color": ACCENT, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 #: Markers of bifurcations by name, and of other bifurcations.
 _MARKERS: Final = {
@@ -31,7 +31,7 @@ _MARKERS: Final = {
     "uplift": ">",
 }
 _OTHER_MARKER: Final = "P"
-_BIFURCATION_STYLE: Final[Any] = {"color": INK, "markersize": 4.5, "mfc": GROUND, "linestyle": "", "zorder": 4}
+_BIFURCATION_STYLE: Final[Any] = {"color": INK, "markersize": 4.5, "mfc": GREY, "linestyle": "", "zorder": 4}
 
 
 def draw_orbit(
@@ -59,7 +59,7 @@ def draw_orbit(
         for history in histories:
             history.plot(time, coordinate, **_STABLE_STYLE)
             heights = np.interp(impact_times, time, coordinate)
-            history.plot(impact_times, heights, "|", color=ABOVE, markersize=8.0, markeredgewidth=1.0)
+            history.plot(impact_times, heights, "|", color=ACCENT, markersize=8.0, markeredgewidth=1.0)
             history.set_xlim(time[0], time[-1])
             add_labels(history, "time (periods of the motion)", labels[0])
     return page.figure
@@ -93,7 +93,7 @@ def draw_branches(
 
 #: Colour and marker area (points squared) of each sweep direction. The first of two is larger, so that both are
 #: visible.
-_SWEEP_STYLES: Final = ((INK, 4.0), (ABOVE, 0.9))
+_SWEEP_STYLES: Final = ((INK, 4.0), (ACCENT, 0.9))
 _SINGLE_SWEEP_STYLE: Final = ((INK, 0.9),)
 
 _SWEEP_LABELS: Final = {"up": "values going up", "down": "values going down", "afresh": "each value afresh"}
@@ -119,7 +119,7 @@ def draw_bifurcation(
             axes.plot([], [], markersize=area**0.5 + 1.0, label=_SWEEP_LABELS[direction], **style)
         for is_marked, marker, label in ((overturned, "|", "overturned"), (not_followed, "x", "not followed")):
             if is_marked is not None and is_marked.any():
-                add_ticks(axes, value[is_marked], 0.015, marker, color=GROUND, label=label)
+                add_ticks(axes, value[is_marked], 0.015, marker, color=GREY, label=label)
         axes.set_xlim(value[0], value[-1] if value.size > 1 else None)
         add_labels(axes, x_label, y_label)
     return page.figure
@@ -146,7 +146,7 @@ def draw_intervals(*, intervals: Floats, eta: float, **options: Unpack[FigureOpt
             panels[0].set_yscale("log")
         for panel in panels[1:]:
             _draw_sides(panel, number[2:], intervals[2:] / intervals[:-2])
-            panel.axhline(eta**2, color=ABOVE, linewidth=1.2, linestyle=(0, (5, 1.5)), label=f"η² = {eta**2:.5g}")
+            panel.axhline(eta**2, color=ACCENT, linewidth=1.2, linestyle=(0, (5, 1.5)), label=f"η² = {eta**2:.5g}")
             add_labels(panel, "impact", "interval over that two impacts before")
         for panel in panels:
             panel.grid(True)

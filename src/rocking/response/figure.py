@@ -16,10 +16,10 @@ from rocking.core.tables import escape_dollars
 from rocking.engine.problem import compute_thresholds
 from rocking.errors import OptionError
 from rocking.plot.canvas import (
-    ABOVE,
-    GROUND,
+    ACCENT,
+    GREY,
     INK,
-    REST,
+    PALE,
     FigureOptions,
     Page,
     add_labels,
@@ -47,7 +47,7 @@ _MAX_IMPACTS: Final = 2000
 #: Limit of drawn rotations and velocities; beyond it a block only falls.
 _MAX_RATIO: Final = 2.0
 
-_BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
+_BOUNDARY: Final[dict[str, Any]] = {"color": ACCENT, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 
 
 def create_title(response: ResponseData) -> str:
@@ -187,12 +187,12 @@ def _create_panels(page: Page, count: int, *, zoomed: bool) -> list[Axes]:
 
 def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
     for start, end in rest_intervals[rest_intervals[:, 0] < rest_intervals[:, 1]]:
-        axes.axvspan(start, end, color=REST, linewidth=0.0, label="at rest")
+        axes.axvspan(start, end, color=PALE, linewidth=0.0, label="at rest")
 
 
 def _shade_slip(axes: Axes, intervals: Floats) -> None:
     for start, end in intervals[intervals[:, 0] < intervals[:, 1]]:
-        axes.axvspan(start, end, color=ABOVE, alpha=0.5, fill=False, hatch="////", linewidth=0.0, label="slips")
+        axes.axvspan(start, end, color=ACCENT, alpha=0.5, fill=False, hatch="////", linewidth=0.0, label="slips")
 
 
 def _draw_rotation(axes: Axes, time: Floats, rotation: Floats, tipping_angles: Floats, limit: str) -> None:
@@ -214,7 +214,7 @@ def _mark_events(axes: Axes, response: ResponseData, start: float, end: float) -
     if impacts.size:
         add_ticks(axes, impacts, 0.055, label=f"resolved impacts ({impacts.size})")
     if uplifts.size:
-        add_ticks(axes, uplifts, 0.13, "^", color=ABOVE, markersize=4.5, markeredgewidth=0.0, label="uplift")
+        add_ticks(axes, uplifts, 0.13, "^", color=ACCENT, markersize=4.5, markeredgewidth=0.0, label="uplift")
 
 
 def _mark_overturning(axes: Axes, time: Floats, rotation: Floats, label: str) -> None:
@@ -222,7 +222,7 @@ def _mark_overturning(axes: Axes, time: Floats, rotation: Floats, label: str) ->
     low, high = axes.get_ylim()
     inside = np.flatnonzero((rotation >= low) & (rotation <= high))
     end = inside[-1] if inside.size else -1
-    style: dict[str, Any] = {"color": ABOVE, "markersize": 7, "clip_on": False, "zorder": 4}
+    style: dict[str, Any] = {"color": ACCENT, "markersize": 7, "clip_on": False, "zorder": 4}
     axes.plot(time[end], np.clip(rotation[end], low, high), "X", label=label, **style)
 
 
@@ -243,7 +243,7 @@ def _draw_thresholds(axes: Axes, response: ResponseData, time: Floats, accelerat
     """Draw the uplift thresholds, which vary with the weight, and the motion beyond them."""
     (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
     lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
-    fill_style: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
+    fill_style: dict[str, Any] = {"color": ACCENT, "linewidth": 0.9, "interpolate": True, "zorder": 3}
     for sign, size, weight_slope in ((-1.0, pair[0], weight_part[0]), (1.0, pair[1], weight_part[1])):
         if math.isinf(size):
             continue  # no uplift to this side
@@ -268,8 +268,8 @@ def _draw_sequence(main: Axes, axes: Axes, response: ResponseData, sequence: np.
     ranges = response.perturbed().event_ranges[response.events["time"] == sequence["end"]]
     low, high = ranges.T.max(axis=1, initial=0.0)
     first, last, transform = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
-    main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=transform)
-    style: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold"}
+    main.plot([first, last], [0.95, 0.95], "|-", color=ACCENT, linewidth=1.3, transform=transform)
+    style: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ACCENT, "fontweight": "bold"}
     add_text(main, "A", (0.5 * (first + last), 0.955), (0, 2), xycoords=transform, **style)
     rest, start, interval = 0.5 * (sequence["lower"] + sequence["upper"]), times[:-1], np.diff(times)
     # Logarithms are undefined for impacts closer than floating-point spacing.
@@ -281,7 +281,7 @@ def _draw_sequence(main: Axes, axes: Axes, response: ResponseData, sequence: np.
     axes.grid(True)
     rest_text = f"about {rest:.0f} s, if at all" if math.isnan(low) else format_time(rest, low, high)
     title = f"A: at rest at {rest_text}; bracket of the computation {sequence['upper'] - sequence['lower']:.0e} s"
-    axes.set_title(textwrap.fill(title, max(20, int(axes.bbox.width / axes.figure.dpi * 14))), color=ABOVE, loc="left")
+    axes.set_title(textwrap.fill(title, max(20, int(axes.bbox.width / axes.figure.dpi * 14))), color=ACCENT, loc="left")
 
 
 class Course(NamedTuple):
@@ -375,11 +375,11 @@ def draw_phase_plane(
         if len(course.impact_rows):
             jumps = np.column_stack([course.velocity[course.impact_rows], course.velocity[course.impact_rows + 1]])
             y = np.insert(jumps, 2, np.nan, axis=1).ravel()
-            axes.plot(0.0 * y, y, color=GROUND, linewidth=1.1, linestyle=(0, (1, 1.5)), label="impact")
+            axes.plot(0.0 * y, y, color=GREY, linewidth=1.1, linestyle=(0, (1, 1.5)), label="impact")
         rotation, velocity = course.insert_gaps(course.rotation), course.insert_gaps(course.velocity)
         axes.plot(rotation, velocity, color=INK, linewidth=0.8, label="response")
         if name := " and ".join(kind for kind, times in find_event_times(response, *span).items() if len(times)):
-            axes.plot(0.0, 0.0, "o", label=name, color=INK, markersize=5.0, markerfacecolor=REST, zorder=4)
+            axes.plot(0.0, 0.0, "o", label=name, color=INK, markersize=5.0, markerfacecolor=PALE, zorder=4)
         for values, set_limits in ((rotation, axes.set_xlim), (velocity, axes.set_ylim)):
             reach = 1.1 * min(max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-12), _MAX_RATIO)
             set_limits(-reach, reach)
@@ -396,7 +396,7 @@ def draw_energies(response: ResponseData, window: Sequence[float] | None, **opti
         _shade_rest(axes, np.clip(response.rest_intervals, time[0], time[-1]))
         top = float(np.max(total, initial=0.0)) or 1.0
         axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")
-        axes.plot(time, course.potential, color=GROUND, linewidth=1.0, label="potential")
+        axes.plot(time, course.potential, color=GREY, linewidth=1.0, label="potential")
         axes.plot(time, course.kinetic, color="#3c6aa0", linewidth=0.8, linestyle=(0, (4, 1.5)), label="kinetic")
         axes.plot(time[course.impact_rows], 0.0 * course.impact_rows, "|", color=INK, markersize=6, markeredgewidth=0.5)
         levels = [level for level in response._energy.overturning_energy.tolist() if level < min(1.6 * top, math.inf)]

@@ -12,7 +12,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.errors import OptionError
 from rocking.kernels import state
-from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
+from rocking.kernels.adjoint import AdjointEnd, adjoint, differentiate_step_end
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, copy_trail
@@ -190,7 +190,7 @@ def gradient(response: Response, quantity: GradientTarget = "peak", time_or_inde
 class _Target:
     """Differentiated result: position in the steps, derivative by the state, and reason for a missing gradient.
 
-    ``since`` is the time after the node of ``row``. ``by_state`` is None for the time at which the step of this row
+    ``elapsed`` is the time after the node of ``row``. ``by_state`` is None for the time at which the step of this row
     ends. A height is the absolute value of a rotation.
     """
 
@@ -198,7 +198,7 @@ class _Target:
     instant: float
     trail: Trail
     row: int = 0
-    since: float = 0.0
+    elapsed: float = 0.0
     by_state: tuple[float, float] | None = None
     reason: str = ""
     is_height: bool = False
@@ -210,8 +210,8 @@ def _target_peak(response: Response, time_or_index: float | None) -> _Target:
     trail, value, instant = response.solution.trail, response.peak_rotation, response.peak_time
     reason = _OVERTURNS if response.overturned else _AT_STOP if response._reaches_second_stop else ""
     row = max(0, int(np.searchsorted(trail.nodes["time"], instant)) - 1)
-    since = instant - float(trail.nodes["time"][row])
-    return _Target(value, instant, trail, row, since, (1.0, 0.0), reason, is_height=True)
+    elapsed = instant - float(trail.nodes["time"][row])
+    return _Target(value, instant, trail, row, elapsed, (1.0, 0.0), reason, is_height=True)
 
 
 def _target_state(response: Response, quantity: GradientTarget, instant: float | None) -> _Target:
@@ -225,8 +225,8 @@ def _target_state(response: Response, quantity: GradientTarget, instant: float |
     nodes = state.expose_fields(np.concatenate([trail.nodes[: row + 1], _find_later_nodes(response, row, time)]))
     trail, row = trail._replace(nodes=nodes), len(nodes) - 1
     sign = _choose_sign(trail, row) if np.any(motion_state) or time == 0.0 else 0.0
-    since = max(0.0, time - float(nodes["time"][row]))
-    return _Target(float(motion_state[column]), time, trail, row, since, (0.0, sign) if column else (sign, 0.0))
+    elapsed = max(0.0, time - float(nodes["time"][row]))
+    return _Target(float(motion_state[column]), time, trail, row, elapsed, (0.0, sign) if column else (sign, 0.0))
 
 
 def _target_time(response: Response, quantity: GradientTarget, index: float | None) -> _Target:
@@ -240,13 +240,13 @@ def _target_time(response: Response, quantity: GradientTarget, index: float | No
     row, instant = int(rows[k]), float(results["time"][k])
     if row > 0 and nodes["side"][row + 1] < 0 and nodes["time"][row + 1] == nodes["time"][row]:
         row -= 1  # a rest at the instant of the impact
-    since = math.inf if nodes["side"][row] >= 0 and nodes["side"][row + 1] >= 0 else 0.0
+    elapsed = math.inf if nodes["side"][row] >= 0 and nodes["side"][row + 1] >= 0 else 0.0
     if nodes["side"][row] >= 0 and nodes["side"][row + 1] < 0:
         later = _find_later_nodes(response, row, instant - _REST_MARGIN)
         later = later[: int(np.max(np.flatnonzero(later["u"] == 0.0), initial=-1)) + 1]
         trail = trail._replace(nodes=state.expose_fields(np.concatenate([nodes[: row + 1], later, nodes[row + 1 :]])))
         row += len(later)
-    return _Target(instant, instant, trail, row, since)
+    return _Target(instant, instant, trail, row, elapsed)
 
 
 def _find_later_nodes(response: Response, row: int, until: float) -> Records:
@@ -275,14 +275,14 @@ def _apply_adjoint(target: _Target, by_state: Floats, derivatives: Floats) -> st
     ending = AdjointEnd.START
     if target.by_state is None:
         trail = copy_trail(target.trail)
-        ending = AdjointEnd(adjoint_of_final_state(trail, scratch, target.row, by_state, derivatives))
+        ending = AdjointEnd(differentiate_step_end(trail, scratch, target.row, by_state, derivatives))
     else:
         by_state[:2] = target.by_state
         if not np.any(by_state) or (target.instant == start_time and not target.is_height):
             return ""  # at rest, or the initial state itself
     if ending not in _REASONS and target.instant > start_time:
         trail, variation = copy_trail(target.trail), state.new_record(state.VARIATION)
-        ending = AdjointEnd(adjoint(trail, scratch, variation, target.row, target.since, by_state, derivatives))
+        ending = AdjointEnd(adjoint(trail, scratch, variation, target.row, target.elapsed, by_state, derivatives))
         is_waiting = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > start_time)
         if ending not in _REASONS and (ending == AdjointEnd.REST or is_waiting):
             return ""  # a new rest before any uplift removes all dependence

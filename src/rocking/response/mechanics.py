@@ -264,10 +264,10 @@ class Energy:
         fields = {name: self.record[name][side] for name in _FIELDS}
         weight, push = 1.0 + fields["added_weight"], fields["added_push"]
         if self.nonlinear:
-            half = 2.0 * np.sin(0.5 * u)
+            chord = 2.0 * np.sin(0.5 * u)
             psi = fields["slenderness"] - 0.5 * u
             raised = fields["stiffness"] * (weight * np.sin(psi) + push * np.cos(psi)) + fields["prestress"]
-            return np.asarray(half * raised + 0.5 * fields["spring"] * u * u)
+            return np.asarray(chord * raised + 0.5 * fields["spring"] * u * u)
         restoring = fields["threshold_slope"] * (fields["threshold"] * weight + push) + fields["prestress"]
         return np.asarray(u * (restoring - 0.5 * (fields["stiffness"] * weight - fields["spring"]) * u))
 
@@ -292,8 +292,8 @@ class Energy:
 
     def compute_losses(self, impacts: NDArray[np.void]) -> Floats:
         """Return the energy loss of each impact of a response."""
-        left, entered = self.find_sides(impacts)
-        return self.kinetic(impacts["speed_before"], left) - self.kinetic(impacts["speed_after"], entered)
+        side_before, side_after = self.find_sides(impacts)
+        return self.kinetic(impacts["speed_before"], side_before) - self.kinetic(impacts["speed_after"], side_after)
 
 
 def compute_linear_balance(body: Block | RestrainedBlock) -> Floats:

@@ -15,7 +15,7 @@ from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import format_count
 from rocking.errors import OptionError
 from rocking.kernels import state
-from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
+from rocking.kernels.adjoint import AdjointEnd, adjoint, differentiate_step_end
 from rocking.kernels.trace import Quantity, Trail, compute_variation, copy_trail
 from rocking.kernels.uplift import write_next_uplifts
 from rocking.response.history import TimeHistory
@@ -220,7 +220,7 @@ def bound_rest_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
     for k in np.flatnonzero(proven):
         node, following, change = nodes[last[k]], nodes[last[k] + 1], np.zeros(5)
         row, time = (last[k], 0.0) if node["v"] > 0.0 else (last[k] - 1, math.inf)
-        if adjoint_of_final_state(trail, scratch, row, change, out) != AdjointEnd.START:
+        if differentiate_step_end(trail, scratch, row, change, out) != AdjointEnd.START:
             continue
         if node["v"] > 0.0:  # derivatives deviate from first order at least twice as much as the time to rest
             change[:3] *= 1.0 + 4.0 * abs((following["time"] - node["time"]) / (change[1] * node["v"]) - 1.0)

@@ -126,11 +126,11 @@ def compute_response(
     run = setup.prepare(motion, factor, writes_tables=True, name=name)
     if factor != 1.0:
         set_start(run.states, run.records, bodies, *_scale_start(initial, factor, run.records, bodies.stops[0]), name)
-    trail, start = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
-    ending, table = march_in_slices(trail, start)
+    trail, body_state = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
+    ending, table = march_in_slices(trail, body_state)
     if ending == state.Ending.BALANCED:
         raise OptionError("the block remains balanced on its corner; give {} or another initial state", "duration")
-    events = table["event"][: start["events"]]
+    events = table["event"][: body_state["events"]]
     overturned = ending == state.Ending.OVERTURNED
     return Response(
         block=block,
@@ -142,20 +142,21 @@ def compute_response(
         unfinished=ending == state.Ending.UNFINISHED,
         leans=ending == state.Ending.LEANS,
         lost_contact=ending == state.Ending.LOST,
-        largest_slip=bodies.gravity * float(start["largest_slip"]),
+        largest_slip=bodies.gravity * float(body_state["largest_slip"]),
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
-        peak_rotation=float(compute_peaks(start, trail.block, np.array(block.stops))),
-        peak_time=float(start["peak_time"]),
-        duration=float(start["end_time"]),
+        peak_rotation=float(compute_peaks(body_state, trail.block, np.array(block.stops))),
+        peak_time=float(body_state["peak_time"]),
+        duration=float(body_state["end_time"]),
         events=_convert_events(events),
-        impacts=_convert_rows(table["impact"][: start["impacts"]], _IMPACT_DTYPE),
-        rests_by_rounding=int(start["rests_by_rounding"]),
-        rounding_decisions=int(start["rounding_decisions"]),
+        impacts=_convert_rows(table["impact"][: body_state["impacts"]], _IMPACT_DTYPE),
+        rests_by_rounding=int(body_state["rests_by_rounding"]),
+        rounding_decisions=int(body_state["rounding_decisions"]),
         solution=Solution(
-            trail=trail._replace(nodes=state.expose_fields(np.array(table["node"][: start["nodes"]]))),
-            sequences=_convert_rows(table["sequence"][: start["sequences"]], _SEQUENCE_DTYPE),
+            trail=trail._replace(nodes=state.expose_fields(np.array(table["node"][: body_state["nodes"]]))),
+            sequences=_convert_rows(table["sequence"][: body_state["sequences"]], _SEQUENCE_DTYPE),
             residual=float(
-                block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning_rotation"]
+                block.stops[int(body_state["side"] in (1, -2))]
+                + (1 - 2 * body_state["side"]) * body_state["leaning_rotation"]
             ),
             repeat=functools.partial(
                 compute_response, block, motion, model, scheme, duration, initial, name, friction=friction
@@ -176,22 +177,22 @@ def _scale_start(
     return float(stops[0]) + min(max(distance, -limit), limit), factor * rate
 
 
-def march_in_slices(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
+def march_in_slices(trail: Trail, body_state: state.Record) -> tuple[int, state.Records]:
     """Integrate in interruptible slices, and return the end and the growing table."""
     ground, block, settings, _ = trail
     table = state.new_table(128 + int(_ROWS_PER_PIECE * len(ground.pieces)))
     scratch = state.new_scratch()
     ending: int = state.Ending.PAUSED
     for _ in range(count_slices(ground)):
-        start["budget"] = SLICE
-        ending = march(ground, block, settings, table, scratch, start)
+        body_state["budget"] = SLICE
+        ending = march(ground, block, settings, table, scratch, body_state)
         while ending == state.Ending.FULL:
             table = state.enlarge_table(table)
-            ending = march(ground, block, settings, table, scratch, start)
+            ending = march(ground, block, settings, table, scratch, body_state)
         if ending != state.Ending.PAUSED:
             return ending, table
-    start["end_time"] = table["node"]["time"][start["nodes"] - 1]
-    start["ending"] = state.Ending.UNFINISHED
+    body_state["end_time"] = table["node"]["time"][body_state["nodes"] - 1]
+    body_state["ending"] = state.Ending.UNFINISHED
     return state.Ending.UNFINISHED, table
 
 

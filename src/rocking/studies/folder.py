@@ -127,7 +127,7 @@ class Store:
         data = read_bytes(self.unit_path(key))
         if data is None:
             return None
-        values = decode(data, self.grid.unit)
+        values = decode(data, self.grid.unit_shape)
         if values is None:
             raise DamagedStudyError(f"unit {format_key(key)} is damaged")
         return dict(zip(OUTCOMES, values, strict=True))
@@ -136,7 +136,9 @@ class Store:
         """Create the complete input of a worker for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
-        return UnitInput(create_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
+        return UnitInput(
+            create_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit_shape
+        )
 
     def _compute_factors(self, unit: int) -> Floats:
         """Return the factors on the motions of a unit, shape (motions, scales, polarities)."""

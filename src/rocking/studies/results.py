@@ -117,10 +117,12 @@ def _read_selection(store: Store, names: Sequence[str], complete: bool, key: _Se
     axes = [np.arange(size)[part] for size, part in zip(grid.shape, key, strict=True)]
     indices = [np.atleast_1d(axis) for axis in axes]
     selection = np.full([len(names), *map(len, indices)], np.nan)
-    units = [np.unique(axis // part).tolist() for axis, part in zip(indices, grid.unit, strict=True)]
+    units = [np.unique(axis // part).tolist() for axis, part in zip(indices, grid.unit_shape, strict=True)]
     for unit in itertools.product(*units):
-        targets = [np.flatnonzero(axis // part == k) for axis, part, k in zip(indices, grid.unit, unit, strict=True)]
-        sources = [axis[target] % part for axis, target, part in zip(indices, targets, grid.unit, strict=True)]
+        targets = [
+            np.flatnonzero(axis // part == k) for axis, part, k in zip(indices, grid.unit_shape, unit, strict=True)
+        ]
+        sources = [axis[target] % part for axis, target, part in zip(indices, targets, grid.unit_shape, strict=True)]
         outcomes = store.read_outcomes(unit)
         if outcomes is not None:
             for values, name in zip(selection, names, strict=True):
@@ -185,7 +187,7 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     store.require_complete()
     names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
     holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
-    for part in split_range(len(product.motions), store.grid.unit[0]):
+    for part in split_range(len(product.motions), store.grid.unit_shape[0]):
         outcomes = _read_selection(store, names, True, (part, _ALL, _ALL, _ALL))
         unfinished, stopped, overturned, completes, rests, rests_by_rounding = (values != 0.0 for values in outcomes)
         holds[part], known[part] = overturned, ~(unfinished | stopped)

@@ -372,7 +372,7 @@ class Study:
 
     def _write(self, kind: str, path: str | Path, critical: StudyOutcome | None) -> None:
         dataset = self.critical_scales(critical) if critical else self.results()
-        write_table(kind, path, dataset, 1 << 16 if critical else self._store.grid.unit[0])
+        write_table(kind, path, dataset, 1 << 16 if critical else self._store.grid.unit_shape[0])
 
     def __repr__(self) -> str:
         names = ("motion", "scale", "polarity", "block")
@@ -450,7 +450,7 @@ def open_or_create(
                 Store.create(folder, product, unit, records)
     study = Study(folder)
     study._store.check_inputs(product)
-    width, count = study._store.grid.unit[3], len(product.bodies)
+    width, count = study._store.grid.unit_shape[3], len(product.bodies)
     if unit_blocks is not None and min(choose_unit_shape(product, unit_blocks)[3], count) != min(width, count):
         raise OptionError(f"the study already exists, in units of {width} blocks: omit {{}}", "unit_blocks")
     return study

@@ -59,12 +59,12 @@ class UnitGrid:
     """Division of simulations (motions, scales, polarities, blocks) into units."""
 
     shape: tuple[int, ...]
-    unit: tuple[int, ...]
+    unit_shape: tuple[int, ...]
 
     @functools.cached_property
     def cells(self) -> tuple[int, ...]:
         """Number of units along each axis."""
-        return tuple(math.ceil(size / part) for size, part in zip(self.shape, self.unit, strict=True))
+        return tuple(math.ceil(size / part) for size, part in zip(self.shape, self.unit_shape, strict=True))
 
     def __len__(self) -> int:
         return math.prod(self.cells)
@@ -75,7 +75,7 @@ class UnitGrid:
 
     def ranges(self, key: Key) -> tuple[slice, ...]:
         """Return the range of a unit along each axis."""
-        axes = zip(key, self.unit, self.shape, strict=True)
+        axes = zip(key, self.unit_shape, self.shape, strict=True)
         return tuple(slice(index * part, min(index * part + part, size)) for index, part, size in axes)
 
     def count_simulations(self, key: Key) -> int:
@@ -128,7 +128,7 @@ class UnitInput:
     setup: Setup
     motions: tuple[Motion, ...]
     factors: Floats
-    unit: tuple[int, ...]
+    unit_shape: tuple[int, ...]
     program: str = field(default_factory=identify_program)
 
 
@@ -138,7 +138,7 @@ def compute_unit(unit_input: UnitInput, cancelled: threading.Event | None = None
         worker = f"the worker on {socket.gethostname()} has {identify_program()}"
         raise StudyError(f"{worker}, the study requires {unit_input.program}")
     # NaN where the unit contains fewer simulations than a full one
-    values = np.full((len(OUTCOMES), *unit_input.unit), np.nan)
+    values = np.full((len(OUTCOMES), *unit_input.unit_shape), np.nan)
     shape = (*unit_input.factors.shape, len(unit_input.setup.bodies))
     for part in split_simulations(unit_input.motions, np.full(shape[0], math.prod(shape[1:]))):
         m, s, k, block = key = np.unravel_index(np.arange(part.start, part.stop), shape)
@@ -149,7 +149,7 @@ def compute_unit(unit_input: UnitInput, cancelled: threading.Event | None = None
     return seal(zlib.compress(np.ascontiguousarray(values, "<f8").data, _COMPRESSION_LEVEL))
 
 
-def decode(data: bytes, unit: tuple[int, ...]) -> Floats | None:
-    """Decode the outcomes of a full unit, shape (outcomes, *unit); return None if any bit has changed."""
+def decode(data: bytes, unit_shape: tuple[int, ...]) -> Floats | None:
+    """Decode the outcomes of a full unit, shape (outcomes, *unit_shape); return None if any bit has changed."""
     packed = unseal(data)
-    return None if packed is None else np.frombuffer(zlib.decompress(packed), "<f8").reshape(len(OUTCOMES), *unit)
+    return None if packed is None else np.frombuffer(zlib.decompress(packed), "<f8").reshape(len(OUTCOMES), *unit_shape)

@@ -112,7 +112,7 @@ def is_proven(x: float, entry: State, delta: float, eta: float, remaining: float
 
 
 #: Speed below which a block is at rest, because no phase changes any more.
-STILL: Final = 1e-120
+MIN_MOVING_SPEED: Final = 1e-120
 
 #: Number of impact pairs after which a sequence is UNRESOLVED (eta = 0.99999 requires about a million).
 _MAX_PAIRS: Final = 5_000_000
@@ -144,7 +144,7 @@ def find_rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float
     row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     elapsed = 0.0
     for pair in range(_MAX_PAIRS):
-        if entry.V < STILL:
+        if entry.V < MIN_MOVING_SPEED:
             return SequenceStatus.FOUND, x
         last = row
         row = extrapolate(estimate_remaining_phase(entry, delta, eta), elapsed, weights, last)
@@ -166,7 +166,7 @@ def find_rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float
 @inlined
 def solve_next_arc(x: float, start: State, s: float, delta: float) -> tuple[int, float, State]:
     """Compute status and duration of the arc from phase x, and the state before its impact; a block at rest stays."""
-    if start.V < STILL:
+    if start.V < MIN_MOVING_SPEED:
         return SequenceStatus.FOUND, 0.0, State(0.0, start.P, start.D)
     return solve_arc(start, estimate_duration(start, s, delta), s, delta, math.pi - x)
 
@@ -229,9 +229,9 @@ def find_semianalytical_phase(excess: float, delta: float, eta: float, resolved:
         x += current
     if status != SequenceStatus.FOUND:
         return status, x
-    pair = eta * eta
-    rest = x + (previous + current) * (pair / (1.0 - pair))
-    return SequenceStatus.FOUND if rest < math.pi else SequenceStatus.INCOMPLETE, rest
+    pair_ratio = eta * eta
+    remaining_phase = x + (previous + current) * (pair_ratio / (1.0 - pair_ratio))
+    return SequenceStatus.FOUND if remaining_phase < math.pi else SequenceStatus.INCOMPLETE, remaining_phase
 
 
 #: Width of the final bracket on a - 1, divided by a: half an ulp.

@@ -15,7 +15,7 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.remaining import ImpactSide, estimate_remaining_time
-from rocking.kernels.sine.sequence import LEVELS, STILL, richardson_weights
+from rocking.kernels.sine.sequence import LEVELS, MIN_MOVING_SPEED, richardson_weights
 
 
 class PowerSeries:
@@ -30,7 +30,7 @@ class PowerSeries:
         self.coefficients = coefficients
         self.lowest = lowest
 
-    def from_power(self, lowest: int) -> Floats:
+    def coefficients_from_power(self, lowest: int) -> Floats:
         """Return the coefficients from a lower power on, without the last ones."""
         shift = (self.lowest - lowest) // 2
         raised = np.zeros_like(self.coefficients)
@@ -44,7 +44,7 @@ class PowerSeries:
             constant[0] = other
             other = PowerSeries(constant, 0)
         lowest = min(self.lowest, other.lowest)
-        return PowerSeries(self.from_power(lowest) + other.from_power(lowest), lowest)
+        return PowerSeries(self.coefficients_from_power(lowest) + other.coefficients_from_power(lowest), lowest)
 
     __radd__ = __add__
 
@@ -113,7 +113,7 @@ def compute_phase_coefficients(delta: float, eta: float, order: int) -> Series:
         v, p, d = entries.transpose(1, 2, 0)
         state = PowerSeries(v, 3), PowerSeries(p, 2), PowerSeries(d, 1)
         with np.errstate(over="ignore", invalid="ignore"):
-            remaining = expand_remaining_phase(state, delta, eta).from_power(1)
+            remaining = expand_remaining_phase(state, delta, eta).coefficients_from_power(1)
             rest, change = extrapolate_series(remaining.T, elapsed, eta)
         x = np.cumsum(elapsed, axis=0)[-change.shape[0] :]
         converged_rows = np.flatnonzero((change <= _EXTRAPOLATION_TOLERANCE * np.abs(x)).all(axis=1))
@@ -190,7 +190,7 @@ def write_arc_series(
     state = start
     for n in range(durations.shape[0]):
         is_uplift = n == 0 and is_first_side  # at zero speed
-        if state[0, 0] < STILL and not is_uplift:
+        if state[0, 0] < MIN_MOVING_SPEED and not is_uplift:
             write_resting_arc(state, durations[n], states[n])
         else:
             expand_series_arc(state, is_first_side, delta, scratch, durations[n], states[n])
