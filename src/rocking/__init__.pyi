@@ -52,6 +52,7 @@ from .engine.schemes import (
 )
 from .errors import RockingError
 from .explorer.launch import explore
+from .inputs.inventory import read_inventory
 from .motion import Motion
 from .motion.scaling import Measure
 from .records.formats import read
@@ -113,6 +114,7 @@ __all__ = [
     "overturning_map",
     "pulses",
     "read",
+    "read_inventory",
     "read_tests",
     "records",
     "response",

@@ -424,7 +424,7 @@ def fragility(
     ratio = compute_ratios(slenderness[:, None], *(table[name].values for name in RATIO_VARIABLES))
     x, trials = (np.broadcast_to(array, ratio.shape).ravel() for array in (intensity, block_weights[:, None]))
     trial_clusters = np.broadcast_to(cluster_numbers[:, None, None], ratio.shape).ravel()
-    outcomes = create_outcome_table(table, measure, x, ratio, states)
+    outcomes = create_outcome_table(bodies, table, measure, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
     # Abandoned simulations and blocks of weight 0 are reported, but excluded from the fit.
