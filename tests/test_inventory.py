@@ -53,19 +53,30 @@ def test_a_workbook_is_read_as_its_csv(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("columns", "cells", "deviations"),
+    ("columns", "cells", "sizes"),
     [
-        ("width,height", "0.30 +- 0.02,1", {"width": 0.02}),
-        ("width,height", "30 ± 2 cm,1 m +/- 5cm", {"width": 0.02, "height": 0.05}),
-        ("Width (cm),height", "30 +- 2,1", {"width": 0.02}),
-        ("width_cm,width_sd_cm,height", "30,2,1", {"width": 0.02}),
-        ("width,width_sd,height", "0.3,,1", {}),
-        ("p,alpha,alpha_sd (deg)", "2,0.2,1", {"alpha": pytest.approx(np.pi / 180)}),
+        ("width,height", "0.30 +- 0.02,1", {"width": (0.3, 0.02), "height": 1.0}),
+        ("width,height", "30 ± 2 cm,1 m +/- 5cm", {"width": (0.3, 0.02), "height": (1.0, 0.05)}),
+        ("Width (cm),height", "30 +- 2,1", {"width": (0.3, 0.02), "height": 1.0}),
+        ("Width (cm),height", "30 ± 20 mm,1", {"width": (0.3, 0.02), "height": 1.0}),
+        ("width_cm,width_sd,height", "30,2,1", {"width": (0.3, 0.02), "height": 1.0}),
+        ("width,width_sd (cm),height", "0.3,2,1", {"width": (0.3, 0.02), "height": 1.0}),
+        ("width,width_sd,height", "0.3,0.0,1", {"width": 0.3, "height": 1.0}),
+        ("width,width_sd,height", "0.3,,1", {"width": 0.3, "height": 1.0}),
+        ("p,alpha,alpha_sd (deg)", "2,0.2,1", {"p": 2.0, "alpha": (0.2, np.pi / 180)}),
     ],
 )
-def test_uncertain_sizes_are_read_in_the_unit_of_their_size(tmp_path, columns, cells, deviations):
+def test_uncertain_sizes_are_read_in_the_unit_of_their_size(tmp_path, columns, cells, sizes):
     inventory = rocking.read_inventory(written(tmp_path, f"{columns}\n{cells}\n"))
-    assert inventory.deviations == (pytest.approx(deviations),)
+    read = {
+        name: (size.first, size.second) if hasattr(size, "ppf") else size for name, size in inventory.values[0].items()
+    }
+    assert read == {name: pytest.approx(size) for name, size in sizes.items()}
+    sample = inventory.sample(0, 40)
+    assert (sample is None) == (not any(isinstance(size, tuple) for size in sizes.values()))
+    if sample is not None:
+        assert sample.alpha.mean() == pytest.approx(rocking.Blocks.from_bodies(inventory).alpha.mean(), rel=0.01)
+        assert np.ptp(sample.alpha) > 0.0
 
 
 def test_restraints_and_sides_are_columns_as_options_are(tmp_path):
@@ -92,8 +103,11 @@ def test_restraints_and_sides_are_columns_as_options_are(tmp_path):
     [
         ("name,width,height\nvase,-0.3,1\n", "line 2: width must be"),
         ("name,width,height\nvase,0.3,\n", "line 2: a block requires more than width"),
-        ("name,width,height\nvase,0.3 +- 0.1 +- 2,1\n", "line 2: width must be a number, or a number"),
-        ("name,width,height\nvase,0.3 +- -2,1\n", "line 2: the standard deviation of width"),
+        (
+            "name,width,height\nvase,0.3 +- 0.1 +- 2,1\n",
+            "line 2: width must be a mean and a positive standard deviation",
+        ),
+        ("name,width,height\nvase,0.3 +- -2,1\n", "line 2: width must be a mean and a positive standard deviation"),
         ("width_sd,p,alpha\n0.1,2,0.2\n", "line 2: a standard deviation of width is given, but no value"),
         ("name,width,height,one_sided\nvase,0.3,1,maybe\n", "line 2: one_sided must be yes or no"),
         ("name,width,Width (m),height\nvase,0.3,1,2\n", "line 1: two columns contain width"),

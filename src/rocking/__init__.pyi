@@ -40,6 +40,7 @@ from .calibration.history import calibrate_history
 from .calibration.outcomes import Calibration, calibrate
 from .calibration.tables import read_tests
 from .calibration.validate import ShakeTest, validate
+from .core.distributions import lognormal, normal, uniform
 from .core.result import Result
 from .core.threads import set_options
 from .engine.schemes import (
@@ -109,7 +110,9 @@ __all__ = [
     "gradient",
     "impact_restitution",
     "incremental_dynamic_analysis",
+    "lognormal",
     "motion",
+    "normal",
     "one_sided_restitution",
     "overturning_map",
     "pulses",
@@ -127,5 +130,6 @@ __all__ = [
     "solid",
     "studies",
     "survey",
+    "uniform",
     "validate",
 ]

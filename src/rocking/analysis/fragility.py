@@ -243,8 +243,8 @@ class Fragility(Result):
         survival = Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
         if hazard is None or not self.several_blocks or self.outcomes is None:
             return survival
-        mean = compute_mean_survival(self.outcomes, self.measure.column, limit_state, hazard, survival.years)
-        return replace(survival, mean_probability=mean)
+        mean, error = compute_mean_survival(self.outcomes, self.measure.column, limit_state, hazard, survival.years)
+        return replace(survival, mean_probability=mean, mean_error=error)
 
     @property
     def range(self) -> tuple[float, float]:

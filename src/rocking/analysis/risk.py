@@ -280,6 +280,9 @@ class Survival(Result):
     mean_probability : float
         Weighted mean of the survival probabilities of several blocks, each with its own curve, under the hazard curve.
         NaN for one block, or without hazard curve or outcomes.
+    mean_error : float
+        Standard error of `mean_probability` if the blocks are a sample (`Blocks.sample`). It does not contain the
+        record-to-record variability, because all blocks met the same motions.
 
     See Also
     --------
@@ -304,6 +307,7 @@ class Survival(Result):
     rate: Rate | None
     several_blocks: bool = False
     mean_probability: float = math.nan
+    mean_error: float = math.nan
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "years", checks.positive(self.years, "years", OptionError))
@@ -420,7 +424,9 @@ class Survival(Result):
             estimate = f"{single}, and {estimate} if each motion met another of them"
         if not math.isnan(self.mean_probability):
             likeliest = self.mean_probability
-            estimate = f"{likeliest:.2g} in the mean and {estimate}"
+            estimate = (
+                f"{likeliest:.2g} in the mean (standard error of the sample {self.mean_error:.1g}) and {estimate}"
+            )
         name = "" if self.hazard is None else self.hazard.name
         years = format_count(self.years, "year")
         sentence = f"under the hazard curve {name!r} the probability of {years} without it is {estimate}"
@@ -451,6 +457,7 @@ class Survival(Result):
             "probability_interval": [*self.interval],
             "most_probable": self.max_probability,
             "mean_probability": self.mean_probability,
+            "mean_probability_standard_error": self.mean_error,
             "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
             "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
             "contradicts": self.contradicts_hazard,
@@ -485,8 +492,8 @@ class Survival(Result):
 
 def compute_mean_survival(
     outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float
-) -> float:
-    """Compute the mean survival probability of blocks, each with a curve fitted to its own outcomes."""
+) -> tuple[float, float]:
+    """Compute the mean survival probability of blocks, each with its own curve, and the standard error of the mean."""
     table = outcomes.sort_values("block", kind="stable")
     blocks = table.drop_duplicates("block")
     values = table[[column, f"exceeded_{limit_state}", "unfinished"]].to_numpy(np.float64)
@@ -495,4 +502,9 @@ def compute_mean_survival(
     # For a curve that does not rise, the rate below the hazard curve is unbounded and therefore omitted.
     rising, level = compute_log_rate(fits, hazard), compute_log_rate_within(fits, hazard)
     rates = np.exp(np.where(fits.slope > 0.0, rising[:, 0], level[:, 0]))
-    return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))
+    probabilities, weights = np.exp(-years * rates), np.asarray(blocks.get("weight", np.ones(len(blocks))), np.float64)
+    shares = weights / weights.sum()
+    mean = float(shares @ probabilities)
+    count = 1.0 / float(shares @ shares)  # of equally weighted blocks with this error
+    variance = float(shares @ (probabilities - mean) ** 2)
+    return mean, math.sqrt(variance / (count - 1.0)) if count > 1.0 else math.nan

@@ -108,9 +108,13 @@ def _with_inputs(*names: str) -> Callable[[type[OptionsClass]], type[OptionsClas
 class BlockOptions(InputOptions):
     """Block described by its sizes, parameters, or pivots."""
 
+    def read_uncertain(self, *names: str) -> dict[str, Any]:
+        """Return the values of supplied texts, some of which may be distributions."""
+        return {name: INPUTS[name].read_uncertain(text) for name, text in self.supplied(*names).items()}
+
     def block(self) -> Block:
         """Return the block, with notes on likely mistakes."""
-        block = bodies.create_block(self.read_values(*declared.BLOCK))
+        block = bodies.create_block(self.read_uncertain(*declared.BLOCK))
         bodies.note_likely_mistakes([block])
         return block
 
@@ -121,7 +125,8 @@ class RestrainedOptions(BlockOptions):
 
     def body(self) -> Body:
         """Return the block, with its restraints if any."""
-        block, body = bodies.read_body(self.supplied())
+        texts = self.supplied()
+        block, body = bodies.create_restrained(bodies.read_values(texts), bodies.read_forces(texts))
         bodies.note_likely_mistakes([block], [body])
         return body
 
@@ -164,18 +169,34 @@ class ObjectOptions(RestrainedOptions, _InventoryOptions):
         return self.objects(self.body)
 
 
+_SAMPLES: Final = 100
+_SAMPLES_HELP: Final = (
+    "Number of sampled blocks if a size or parameter is uncertain (mean +- standard deviation), as in --width '0.30 +- "
+    "0.02'; 100 by default."
+)
 _ENSEMBLE_HELP: Final = "File ensemble.csv from rocking calibrate, instead of a block; includes weights and model."
 
 
 @dataclass(frozen=True)
 class EnsembleOptions(RestrainedOptions):
-    """Block described by its sizes or parameters, or an ensemble from a calibration."""
+    """Block described by its sizes or parameters, possibly uncertain, or an ensemble from a calibration."""
 
     ensemble: Annotated[Path | None, Parameter(help=_ENSEMBLE_HELP)] = None
+    samples: Annotated[int | None, INTEGER, Parameter(help=_SAMPLES_HELP)] = None
+    seed: Annotated[int | None, INTEGER, Parameter(help="Seed of the samples, 0 by default.")] = None
 
     def blocks(self, model: ModelOptions) -> dict[str, Any]:
         """Return blocks, weights and equation of motion as arguments."""
         if self.ensemble is None:
+            values = self.read_uncertain(*declared.BLOCK, "one_sided", "lean")
+            if bodies.find_uncertain(values):
+                blocks = bodies.sample_bodies(
+                    values, self.samples or _SAMPLES, self.seed or 0, bodies.read_forces(self.supplied())
+                )
+                return {"blocks": blocks, "model": model.model}
+            for name in self.supplied("samples", "seed"):
+                message = "{} requires an uncertain size or parameter, as in {} '0.30 +- 0.02'"
+                raise OptionError(message, name, "width")
             return {"blocks": self.body(), "model": model.model}
         if conflicting := [name for name in self.supplied() if name != "ensemble"]:
             message = f"{{}} replaces the block: omit {join_placeholders(conflicting)}"

@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, TypeVar
 
-from rocking.block import Block, RestrainedBlock, Restraint
+from rocking.block import Block, Blocks, RestrainedBlock, Restraint
 from rocking.block.body import Body
 from rocking.core import checks
+from rocking.core.distributions import Distribution
 from rocking.core.progress import note
 from rocking.errors import BlockError, OptionError, RockingError, escape_braces, join_placeholders
 from rocking.inputs import texts
@@ -64,7 +65,31 @@ def create_block(values: Mapping[str, Any], descriptions: Sequence[BlockDescript
     (0.12, 'Block.from_parameters(p=2.0, alpha=0.2)')
     """
     block_values = {name: value for name, value in values.items() if name in BLOCK or name == "gravity"}
+    if uncertain := find_uncertain(values):
+        message = f"this analysis requires one number for {join_placeholders(uncertain)}; omit the standard deviation"
+        raise BlockError(message, *uncertain)
     return find_description(block_values, descriptions).make(**_convert_arguments(block_values))
+
+
+def find_uncertain(values: Mapping[str, Any]) -> list[str]:
+    """Return the names of values that are distributions."""
+    return [name for name, value in values.items() if isinstance(value, Distribution)]
+
+
+def sample_bodies(values: Mapping[str, Any], count: int, seed: int = 0, restraints: Sequence[Restraint] = ()) -> Blocks:
+    """Sample blocks with uncertain values (distributions), each with the restraints.
+
+    Examples
+    --------
+    >>> blocks = sample_bodies({"width": INPUTS["width"].read_uncertain("24 +- 1 cm"), "height": 1.1}, 50)
+    >>> f"{blocks.alpha.mean():.4f}"
+    '0.2149'
+    """
+
+    def create(**row: Any) -> Any:
+        return create_body(create_block(row), row, restraints)
+
+    return Blocks.sample(count, create, seed=seed, **values)
 
 
 def write_block_call(values: Mapping[str, Any]) -> str:
@@ -82,14 +107,25 @@ def create_body(
     return RestrainedBlock(block, *restraints, **options, restitution=values.get("restitution"))
 
 
-def read_body(texts: Mapping[str, Any]) -> tuple[Block, Block | RestrainedBlock]:
-    """Create a block, and the same with its restraints, from texts of inputs (of forces: a sequence of texts)."""
-    values = {name: INPUTS[name].read(text) for name, text in texts.items() if name in INPUTS and name not in FORCES}
-    block = create_block({name: value for name, value in values.items() if name in BLOCK})
+def read_values(texts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of inputs from their texts, without forces; uncertain values are distributions."""
+    return {
+        name: INPUTS[name].read_uncertain(text) for name, text in texts.items() if name in INPUTS and name not in FORCES
+    }
+
+
+def read_forces(texts: Mapping[str, Any]) -> list[Restraint]:
+    """Create the restraints and loads from texts of inputs, of which those of `FORCES` are sequences."""
     forces = [create_from_pairs(FORCES[name], text, name) for name in FORCES for text in texts.get(name, ())]
     for name in (name for name in COUPLES if name in texts):
         with add_option_to_errors(name):
-            forces.append(COUPLES[name](values[name]))
+            forces.append(COUPLES[name](INPUTS[name].read(texts[name])))
+    return forces
+
+
+def create_restrained(values: Mapping[str, Any], forces: Sequence[Restraint]) -> tuple[Block, Block | RestrainedBlock]:
+    """Create a block without and with its restraints."""
+    block = create_block({name: value for name, value in values.items() if name in BLOCK})
     try:
         return block, create_body(block, values, forces)
     except BlockError as error:

@@ -96,6 +96,12 @@ class Input:
             return tuple(numbers)
         return (numbers, numbers) if self.values == "two" else numbers
 
+    def read_uncertain(self, text: str) -> Any:
+        """Return the value of a text, as `read`, or a distribution from "0.30 +- 0.02" (mean, standard deviation)."""
+        if self.kind not in READERS or not quantities.PLUS_MINUS.search(text):
+            return self.read(text)
+        return quantities.read_uncertain(text, self.name, READERS[self.kind][0])
+
     def axis(self, value: Any) -> list[Any]:
         """Return the values of an entry of a study file: a number, a list, or a range (for pivots, of pairs)."""
         if self.kind not in READERS:

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple, overload
 
-from rocking.block import Block, RestrainedBlock
+from rocking.block import Block, Blocks, RestrainedBlock, Restraint
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import format_count, read_csv_rows
 from rocking.errors import OptionError, RecordError, RockingError, escape_braces
-from rocking.inputs.bodies import note_likely_mistakes, read_body
-from rocking.inputs.declared import BLOCK, FORCES, INPUTS, SUPPORTS
+from rocking.inputs.bodies import (
+    create_restrained,
+    find_uncertain,
+    note_likely_mistakes,
+    read_forces,
+    read_values,
+    sample_bodies,
+)
+from rocking.inputs.declared import BLOCK, FORCES, INPUTS, READERS, SUPPORTS
 from rocking.inputs.quantities import UNITS
 from rocking.records.formats.source import read_text
 from rocking.records.named import make_names_unique
@@ -28,14 +35,8 @@ _DEVIATION: Final = "_sd"
 _NAMES: Final = ("object", "object_name", "item", "title")
 
 #: Inputs by the names that headings may have.
-_KNOWN: Final = {
-    name + side + suffix: name
-    for name in (*BLOCK, *SUPPORTS)
-    for side in ("", *SIDE_SUFFIXES)
-    for suffix in ("", _DEVIATION)
-}
+_KNOWN: Final = {name + suffix: name for name in (*BLOCK, *SUPPORTS) for suffix in ("", *SIDE_SUFFIXES, _DEVIATION)}
 
-_PLUS_MINUS: Final = re.compile(r"\s*(?:\+/?-|±)\s*")
 _YES: Final = {"yes": True, "true": True, "1": True, "no": False, "false": False, "0": False, "": False}
 
 
@@ -47,10 +48,10 @@ class Inventory(Sequence[Block | RestrainedBlock]):
     ----------
     bodies : tuple of Block or RestrainedBlock
         Blocks in the order of the rows. Their `labels` contain the name, standard deviations, and further columns.
-    inputs : tuple of dict of str to object
-        Values of the inputs of each block, in SI units.
-    deviations : tuple of dict of str to float
-        Standard deviations of uncertain inputs of each block, in SI units.
+    values : tuple of dict of str to object
+        Inputs of each block in SI units: numbers, pairs, or distributions of uncertain inputs.
+    restraints : tuple of tuple of Restraint
+        Restraints and loads of each block.
     lines : tuple of int
         Line (or row of the sheet) of each block.
     failures : dict of str to str
@@ -63,8 +64,8 @@ class Inventory(Sequence[Block | RestrainedBlock]):
     """
 
     bodies: tuple[Block | RestrainedBlock, ...]
-    inputs: tuple[Mapping[str, Any], ...]
-    deviations: tuple[Mapping[str, float], ...]
+    values: tuple[Mapping[str, Any], ...]
+    restraints: tuple[tuple[Restraint, ...], ...]
     lines: tuple[int, ...]
     failures: Mapping[str, str]
 
@@ -78,18 +79,24 @@ class Inventory(Sequence[Block | RestrainedBlock]):
     def __len__(self) -> int:
         return len(self.bodies)
 
+    def sample(self, index: int, count: int, *, seed: int = 0) -> Blocks | None:
+        """Sample a block with uncertain inputs as `Blocks.sample`; None for a block without."""
+        if not find_uncertain(self.values[index]):
+            return None
+        return sample_bodies(self.values[index], count, seed, self.restraints[index])
+
     def __repr__(self) -> str:
         names = ", ".join(body.description for body in self.bodies[:3]) + ", ..." * (len(self) > 3)
         return f"<Inventory: {format_count(len(self), 'object')}: {names}>"
 
 
 class _Entry(NamedTuple):
-    """Block without and with its restraints and labels, its inputs and their standard deviations, and its line."""
+    """Block with its restraints and labels, block alone, its inputs and restraints, and its line."""
 
-    block: Block
     body: Block | RestrainedBlock
-    inputs: dict[str, Any]
-    deviations: dict[str, float]
+    block: Block
+    values: dict[str, Any]
+    restraints: tuple[Restraint, ...]
     line: int
 
 
@@ -163,17 +170,19 @@ def read_labelled(file: Path, *, keep_going: bool = False, expected: Collection[
             if len(cells) > len(headings):
                 counts = format_count(len(cells), "cell"), format_count(len(headings), "column")
                 raise OptionError(f"this row has {counts[0]} for {counts[1]}; correct it")
-            texts, deviations = _read_row(headings, cells)
-            block, body = read_body(texts)
+            texts = _read_row(headings, cells)
+            values, restraints = read_values(texts), tuple(read_forces(texts))
+            spreads = {name: values[name] for name in find_uncertain(values)}
+            nominal = values | {name: spread.first for name, spread in spreads.items()}
+            block, body = create_restrained(nominal, restraints)
         except RockingError as error:
             if not keep_going:
                 error.path, error.line = error.path or str(file), error.line or line
                 raise
             failures[f"{labels.get('name') or 'object'} (line {line})"] = error.text()
             continue
-        spreads = {f"{name}{_DEVIATION}": value for name, value in deviations.items()}
-        inputs = {name: INPUTS[name].read(text) for name, text in texts.items() if name in BLOCK}
-        entries.append(_Entry(block, body.with_labels(**labels, **spreads), inputs, deviations, line))
+        deviations = {f"{name}{_DEVIATION}": spread.second for name, spread in spreads.items()}
+        entries.append(_Entry(body.with_labels(**labels, **deviations), block, values, restraints, line))
     if not entries:
         reason = f"; the first failure: {next(iter(failures.values()))}" if failures else ""
         raise RecordError(escape_braces(f"the table contains no objects below its heading{reason}"), path=str(file))
@@ -181,9 +190,9 @@ def read_labelled(file: Path, *, keep_going: bool = False, expected: Collection[
     if any("name" in body.labels for body in bodies):
         names = [str(body.labels.get("name") or f"block {k}") for k, body in enumerate(bodies, start=1)]
         bodies = [body.with_labels(name=name) for body, name in zip(bodies, make_names_unique(names), strict=True)]
-    blocks, _, inputs_of_all, deviations_of_all, lines = zip(*entries, strict=True)
+    _, blocks, values_of_all, restraints_of_all, lines = zip(*entries, strict=True)
     note_likely_mistakes(blocks, bodies)
-    return Inventory(tuple(bodies), inputs_of_all, deviations_of_all, lines, failures)
+    return Inventory(tuple(bodies), values_of_all, restraints_of_all, lines, failures)
 
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:
@@ -239,14 +248,19 @@ def _note_labels(file: Path, columns: Sequence[tuple[_Heading, str]]) -> None:
         note(escape_braces(f"{file}: carried along, without effect on the motion of a block: {', '.join(texts)}"))
 
 
-def _read_row(headings: Sequence[_Heading], cells: Sequence[str]) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the texts of the inputs in a row, and their standard deviations."""
-    texts, errors = dict[str, str](), dict[str, float]()
-    for heading, cell in zip(headings, cells, strict=True):
-        if heading.input and cell:
-            name, text, error = _read_cell(heading, cell)
-            texts |= {name: text} if text else {}
-            errors |= {} if error is None else {name: error}
+def _read_row(headings: Sequence[_Heading], cells: Sequence[str]) -> dict[str, Any]:
+    """Return the texts of the inputs in a row, those of forces as lists, and of a wall True."""
+    columns = [(heading, cell) for heading, cell in zip(headings, cells, strict=True) if heading.input and cell]
+    units = {heading.name: heading.unit for heading, _ in columns}
+    texts = {heading.name: _add_unit(cell, heading) for heading, cell in columns}
+    for name in [name for name in texts if name.endswith(_DEVIATION)]:
+        size, heading = name.removesuffix(_DEVIATION), _Heading(name, _KNOWN[name], units[name])
+        deviation = _add_unit(texts.pop(name), replace(heading, unit=heading.unit or units.get(size, "")))
+        if size not in texts:
+            raise OptionError("a standard deviation of {} is given, but no value", size)
+        if re.search("[1-9]", deviation):  # zero: the size is known
+            unit = READERS[INPUTS[size].kind][1]  # otherwise the unit of the deviation would be read
+            texts[size] = f"{_add_unit(texts[size], _Heading(size, size, unit))} +- {deviation}"
     values = dict[str, Any]()
     for name in (*BLOCK, *SUPPORTS):
         sides = [texts[name + suffix] for suffix in SIDE_SUFFIXES if name + suffix in texts]
@@ -254,39 +268,13 @@ def _read_row(headings: Sequence[_Heading], cells: Sequence[str]) -> tuple[dict[
             values[name] = [text] if name in FORCES else text
     if (flag := str(values.pop("one_sided", "no")).lower()) not in _YES:
         raise OptionError(f"{{}} must be yes or no; got {flag!r}", "one_sided", value=flag)
-    for name in (name for name in errors if name not in values):
-        raise OptionError("a standard deviation of {} is given, but no value", name)
-    values |= {"one_sided": True} if _YES[flag] else {}
-    return values, {name: error for name, error in errors.items() if error > 0.0}
-
-
-def _read_cell(heading: _Heading, cell: str) -> tuple[str, str, float | None]:
-    """Return the name of an input, its text in a cell (or ""), and its standard deviation if the cell contains one."""
-    name = heading.name.removesuffix(_DEVIATION)
-    has_spread = INPUTS[heading.input].kind in {*UNITS, "tilt"}
-    parts = _PLUS_MINUS.split(cell) if has_spread else [cell]
-    if len(parts) > 2 or not all(parts):
-        raise OptionError(f"{{}} must be a number, or a number +- its standard deviation; got {cell!r}", name)
-    if len(parts) == 2 and (unit := re.search(r"[^\d.,\s].*$", parts[1])) and not re.search(r"[^\d.,\s]", parts[0]):
-        parts[0] += unit[0]  # 30 +- 2 cm
-    numbers = [_add_unit(part, heading) for part in parts]
-    if heading.name.endswith(_DEVIATION):
-        numbers = ["", *numbers]
-    if len(numbers) == 1:
-        return name, numbers[0], None
-    # A size must be positive, and its standard deviation only nonnegative.
-    deviation = INPUTS["offset" if INPUTS[heading.input].kind == "length" else heading.input].read(numbers[1])
-    if not (isinstance(deviation, float) and deviation >= 0.0):
-        message = f"the standard deviation of {{}} must be a number that is not negative; got {numbers[1]}"
-        raise OptionError(message, name, value=cell)
-    return name, numbers[0], deviation
+    return values | ({"one_sided": True} if _YES[flag] else {})
 
 
 def _add_unit(text: str, heading: _Heading) -> str:
-    """Add the unit of the heading to each number without a unit."""
-    if INPUTS[heading.input].values == "one":
-        text = re.sub(r"^\s*([+-]?\d+),(\d+)", r"\1.\2", text)  # a decimal comma
+    """Add the unit of the heading to each number without a unit, and replace a decimal comma."""
+    if INPUTS[heading.input].values == "one" and heading.input not in FORCES:
+        text = re.sub(r"(?<![\d,])(\d+),(\d+)(?![\d,])", r"\1.\2", text)
     if not heading.unit:
         return text
-    parts = [part.strip() for part in text.split(",")]
-    return ",".join(part if re.search(r"[^\d.eE+-]", part) else part + heading.unit for part in parts)
+    return re.sub(r"(?<![\w.])([+-]?[\d.]+(?:e[+-]?\d+)?)(?=\s*(?:$|,|\+|±))", rf"\1{heading.unit}", text, flags=re.I)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
+from rocking.core.distributions import Distribution, normal
 from rocking.core.tables import round_decimal
 from rocking.errors import OptionError, escape_braces, join_placeholders
 from rocking.motion.scaling import FACTOR, Measure
@@ -124,6 +125,21 @@ def _read_one_or_two(text: str, name: str, quantity: Quantity, expected: str) ->
     if len(numbers) > 2:
         raise OptionError(f"{{}} must be {expected}, not {text!r}", name, value=text)
     return numbers[0] if len(numbers) == 1 else numbers
+
+
+#: Sign between the mean and the standard deviation of an uncertain number.
+PLUS_MINUS: Final = re.compile(r"\+-|±|\+/-")
+
+
+def read_uncertain(text: str, name: str, quantity: Quantity = read_number) -> Distribution:
+    """Return the normal distribution of "0.30 +- 0.02" (mean and standard deviation) or "30 +- 2 cm"."""
+    mean, deviation = PLUS_MINUS.split(text, maxsplit=1)
+    unit = "" if _split_unit(mean)[1] else _split_unit(deviation)[1]
+    try:
+        return normal(quantity(mean + unit, name), quantity(deviation, name))
+    except OptionError:
+        message = "{} must be a mean and a positive standard deviation, as 0.30 +- 0.02 or 30 +- 2 cm, not "
+        raise OptionError(message + escape_braces(repr(text.strip())), name, value=text) from None
 
 
 def read_axis(value: Any, name: str, quantity: Quantity = read_number) -> Floats:
