@@ -22,6 +22,7 @@ from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
+from .assessment.assess import Assessment, assess
 from .block import (
     Block,
     Blocks,
@@ -66,6 +67,7 @@ from .studies import Study, create_study
 __version__: str
 
 __all__ = [
+    "Assessment",
     "AsymptoticTime",
     "Block",
     "Blocks",
@@ -94,6 +96,7 @@ __all__ = [
     "Thrust",
     "VelocityThreshold",
     "analysis",
+    "assess",
     "block",
     "calibrate",
     "calibrate_history",

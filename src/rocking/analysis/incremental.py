@@ -128,7 +128,7 @@ def incremental_dynamic_analysis(
     options: dict[str, Any] = {"model": model, "friction": friction}
     coefficients = resolve_friction(friction)
     check_friction(bodies, model, coefficients)
-    lowest_uplift = _compute_lowest_uplift(bodies, motion_list, values, measure, model)
+    lowest_uplift = compute_lowest_uplift(bodies, motion_list, values, measure, model)
     if levels is None:
         table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
     else:
@@ -282,7 +282,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         )
 
 
-def _compute_lowest_uplift(
+def compute_lowest_uplift(
     blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model
 ) -> float:
     """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""

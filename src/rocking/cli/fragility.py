@@ -112,7 +112,7 @@ def fragility(
             raise OptionError(message, "outcomes", option)
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", OptionError)
-    curve = _read_hazard(hazard, site, years, measure.period)
+    curve = read_hazard(hazard, site, years, measure.period)
     states = parse_limit_states(limit_states)
     if output.out is not None:
         check_nrml_names("taxonomy", taxonomy)
@@ -188,7 +188,7 @@ def _save_outcomes_on_failure(folder: Path | None) -> Iterator[None]:
         raise
 
 
-def _read_hazard(file: Path | None, site: int, years: float, period: float | None) -> HazardCurve | None:
+def read_hazard(file: Path | None, site: int, years: float, period: float | None) -> HazardCurve | None:
     """Read a hazard curve, if any, with notes."""
     if file is None:
         for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():

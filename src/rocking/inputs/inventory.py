@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, overload
 
 from rocking.block import Block, Blocks, RestrainedBlock, Restraint
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import format_count, read_csv_rows
@@ -188,11 +189,16 @@ def read_labelled(file: Path, *, keep_going: bool = False, expected: Collection[
         raise RecordError(escape_braces(f"the table contains no objects below its heading{reason}"), path=str(file))
     bodies = [entry.body for entry in entries]
     if any("name" in body.labels for body in bodies):
-        names = [str(body.labels.get("name") or f"block {k}") for k, body in enumerate(bodies, start=1)]
-        bodies = [body.with_labels(name=name) for body, name in zip(bodies, make_names_unique(names), strict=True)]
+        bodies = [body.with_labels(name=name) for body, name in zip(bodies, list_names(bodies), strict=True)]
     _, blocks, values_of_all, restraints_of_all, lines = zip(*entries, strict=True)
     note_likely_mistakes(blocks, bodies)
     return Inventory(tuple(bodies), values_of_all, restraints_of_all, lines, failures)
+
+
+def list_names(bodies: Sequence[Body]) -> list[str]:
+    """Return distinct names of bodies for texts and figures: their own, or else numbers from 1."""
+    names = [getattr(body, "labels", {}).get("name") for body in bodies]
+    return make_names_unique([str(name or f"block {k}") for k, name in enumerate(names, start=1)])
 
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:
@@ -241,7 +247,7 @@ def _note_labels(file: Path, columns: Sequence[tuple[_Heading, str]]) -> None:
     """Report columns that do not affect the blocks, and whether their names resemble inputs."""
     texts = []
     for heading, cell in columns:
-        hint = checks.suggest(heading.name, [*_KNOWN], "")
+        hint = checks.suggest(heading.name, [*_KNOWN], "", 0.8)
         if cell and not heading.input:
             texts.append(f"{cell} ({hint})" if hint else cell)
     if texts:
