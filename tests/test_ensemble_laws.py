@@ -9,7 +9,7 @@ from oracles.problem import Problem
 import rocking
 from rocking import Blocks, Motion, simulate, simulate_many
 from rocking.engine.problem import prepare_ground
-from rocking.kernels.ground import component_coefficients, ground_error, stretch_range
+from rocking.kernels.ground import bound_stretch, component_coefficients, ground_error
 from rocking.simulation import ensemble
 from rocking.simulation.ensemble import Scales
 
@@ -80,7 +80,7 @@ def test_a_motion_times_a_factor_is_laid_out_as_the_scaled_motion(
         assert_allclose(scaled, component_coefficients(expected, pieces)[k], rtol=1e-14, atol=1e-15)
     assert_allclose(found.pieces[:, :2], expected.pieces[:, :2])
     for stretch in range(len(found.stretches)):
-        assert_allclose(stretch_range(found, stretch), stretch_range(expected, stretch), rtol=1e-13, atol=1e-14)
+        assert_allclose(bound_stretch(found, stretch), bound_stretch(expected, stretch), rtol=1e-13, atol=1e-14)
     if errors is not None:
         (_, lifts), (_, as_it_is) = (
             component_coefficients(each, np.arange(30)) for each in (found, prepare_ground(motion, GRAVITY))

@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike
 
 from rocking.analysis.levels import (
     MIRROR_NOTE,
+    RATIO_VARIABLES,
     Brackets,
     compute_intensities,
+    compute_ratios,
     compute_units,
     create_motion_labels,
     describe_blocks,
@@ -318,8 +320,6 @@ def _combine_bands(
     table: xr.Dataset, flat_grid: Integers, brackets: Brackets, alpha: Floats, measure: Measure
 ) -> xr.Dataset:
     """Pair the levels of outcome changes in a (level, column) grid, NaN for bands beyond it."""
-    import xarray as xr
-
     columns, starts, ends = list[int](), list[float](), list[float]()
     for column in range(flat_grid.shape[1]):
         selected = brackets.column == column
@@ -333,11 +333,12 @@ def _combine_bands(
     lowest[np.isinf(lowest)] = np.nan
     attributes: dict[str, Any] = {"units": measure.units, "long_name": measure.quantity, "label": measure.label}
     attributes |= {"scale": measure.display_factor, **measure.options()}
-    table = table.assign_coords(level=("level", table.level.values, attributes))
-    slenderness = xr.DataArray(alpha, dims="block")
-    over_alpha = (table.peak_rotation / slenderness).where(~table.overturned, np.inf).where(~table.unfinished)
+    table = table.transpose(..., "block")
+    ratios = compute_ratios(alpha, *(table[name].values for name in RATIO_VARIABLES))
+    ratio_attributes = {"units": "1", "long_name": "peak rotation over slenderness"}
     return table[["peak_rotation", "overturned"]].assign(
-        peak_over_alpha=over_alpha.assign_attrs(units="1", long_name="peak rotation over slenderness"),
+        level=("level", table.level.values, attributes),
+        peak_over_alpha=(table.peak_rotation.dims, ratios, ratio_attributes),
         overturning_level=(("motion", "block"), lowest, attributes),
         band_motion=("band", motion, {"units": "1", "long_name": "position of the motion"}),
         band_block=("band", block, {"units": "1", "long_name": "position of the block"}),

@@ -197,17 +197,19 @@ def simulate_levels(
     """Simulate every block under every motion at every level, with the dimension ``level``."""
     import xarray as xr
 
-    units = compute_units(blocks, measure, model)
+    units, coordinate = compute_units(blocks, measure, model), {"measure": measure.name, "units": measure.units}
     groups = [np.flatnonzero(units == unit) for unit in np.unique(units)]
     parts = []
     for group in groups:
         scaled = {"levels": levels * units[group[0]], "measure": measure.motion_measure}
         part = simulate_many(blocks.select(group), motions, model=model, **scaled, **options)
-        part = part.drop_vars(body_coordinates(blocks.select(group)))  # added to the full table
-        parts.append(part.assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units})))
+        parts.append(part.rename(scale="level").assign_coords(level=("level", levels, coordinate)))
+    if len(parts) == 1:
+        return parts[0]
+    names = (body_coordinates(blocks.select(group)) for group in groups)  # added to the full table
+    parts = [part.drop_vars(list(each)) for part, each in zip(parts, names, strict=True)]
     table = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
-    ordered = table.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
-    return ordered.assign_coords(body_coordinates(blocks))
+    return table.isel(block=np.argsort(np.concatenate(groups))).assign_coords(body_coordinates(blocks))
 
 
 #: Variables of a table of simulations from which `compute_ratios` is computed.
@@ -337,28 +339,52 @@ class Brackets:
         return bisection.compute_midpoints(self.low, self.high)
 
 
+#: Number of simulations that take hardly longer together than one.
+_SIMULATED_TOGETHER: Final = 16
+
+
 def find_boundaries(
     levels: Floats, outcome: Integers, find_outcome: Callable[[Integers, Floats], Integers], *, rtol: float
 ) -> Brackets:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
     A bracket with a third outcome is split, but in an interval with 64 changes or more only one half is followed.
-    Changes between two levels of equal outcome are not detected.
+    Changes between two levels of equal outcome are not detected. Few brackets are bisected several times per call of
+    `find_outcome`, by all midpoints that may be needed.
     """
+    known: dict[tuple[int, float], int] = {}
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
     brackets = Brackets(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
     origin = np.arange(len(brackets.level))
     remaining = _count_bisections(brackets, rtol)
     with Progress("refining", remaining) as bar:
         while (is_wide := bisection.is_wide(brackets.low, brackets.high, rtol)).any():
+            wanted = list(zip(brackets.column[is_wide].tolist(), brackets.level[is_wide].tolist(), strict=True))
+            if not known.keys() >= set(wanted):
+                columns, midpoints = _collect_midpoints(
+                    brackets.column[is_wide], brackets.low[is_wide], brackets.high[is_wide]
+                )
+                points = zip(columns.tolist(), midpoints.tolist(), strict=True)
+                known = dict(zip(points, find_outcome(columns, midpoints).tolist(), strict=True))
             outcomes = brackets.below.copy()
-            outcomes[is_wide] = find_outcome(brackets.column[is_wide], brackets.level[is_wide])
+            outcomes[is_wide] = [known[point] for point in wanted]
             brackets, origin = _bisect(brackets, is_wide, outcomes, origin)
             # A third outcome adds brackets, for which the progress bar does not move back.
             previous, remaining = remaining, min(remaining, _count_bisections(brackets, rtol))
             bar.advance(previous - remaining)
     order = np.lexsort((brackets.low, brackets.column))
     return Brackets(*(values[order] for values in vars(brackets).values()))
+
+
+def _collect_midpoints(column: Integers, low: Floats, high: Floats) -> tuple[Integers, Floats]:
+    """Return the columns and midpoints of brackets, and of their halves as long as there are few."""
+    columns, midpoints = [column], [bisection.compute_midpoints(low, high)]
+    while sum(map(len, columns)) + 2 * len(column) < _SIMULATED_TOGETHER:
+        low, high = np.append(low, midpoints[-1]), np.append(midpoints[-1], high)
+        column = np.append(column, column)
+        columns.append(column)
+        midpoints.append(bisection.compute_midpoints(low, high))
+    return np.concatenate(columns), np.concatenate(midpoints)
 
 
 def _count_bisections(brackets: Brackets, rtol: float) -> int:

@@ -23,16 +23,16 @@ STRETCH = 16
 #: Largest number of pieces and whole stretches in a window.
 _MAX_WINDOW = 128
 
-#: Columns of a piece (start, length, first coefficient), and of the the range of a stretch.
+#: Columns of a piece (start, length, first coefficient), and of bounds on a stretch, as in `Window`.
 START, LENGTH, FIRST = 0, 1, 2
-_MIN, _MAX = 0, 1
+_MIN, _MAX, _STEEPEST, _JUMPS = 0, 1, 2, 3
 
 
 class Ground(NamedTuple):
     """One component of a motion: the horizontal one, or that of `vertical_component`."""
 
     pieces: Floats  # pieces of the motion, one per row
-    stretches: Floats  # bounds on stretches of unscaled pieces, shape (stretches, components, 2)
+    stretches: Floats  # bounds on stretches of unscaled pieces, shape (stretches, components, 4)
     error: float  # approximation error of the unscaled motion
     columns: int  # number of coefficients per component
     first: int  # first column of this component
@@ -71,7 +71,7 @@ def build_ground(
     components = [coefficients] if vertical is None else [coefficients, vertical]
     columns = max(2, *(component.shape[1] for component in components))
     pieces = np.zeros((len(coefficients) + 1, FIRST + columns * len(components)))
-    stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), 2))
+    stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), 4))
     ground = Ground(pieces, stretches, error, columns, FIRST, 1.0, 1.0)
     for k, component in enumerate(components):
         write_pieces(breakpoints, component, ground._replace(first=FIRST + k * columns), np.zeros(columns))
@@ -135,33 +135,26 @@ def write_pieces(breakpoints: Floats, coefficients: Floats, ground: Ground, A: F
     pieces[count, START] = breakpoints[count]
     pieces[count, LENGTH] = np.inf
     for stretch in range(ground.stretches.shape[0]):
-        low, high = np.inf, -np.inf
+        low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
         for k in range(stretch * STRETCH, min((stretch + 1) * STRETCH, count + 1)):
             piece = bound_piece(ground, k, 0.0, pieces[k, LENGTH], A)
-            low, high = min(low, piece.low), max(high, piece.high)
+            low, high, steepest = min(low, piece.low), max(high, piece.high), max(steepest, piece.slope)
+            # A factor changes jumps by its rounding, which has the same bound as the rounding of the piece.
+            jumps += 2.0 * piece.jumps + (jump_at_end(ground, k) if k < count else 0.0)
         row = ground.stretches[stretch, component_index(ground)]
-        row[_MIN], row[_MAX] = low, high
+        row[_MIN], row[_MAX], row[_STEEPEST], row[_JUMPS] = low, high, steepest, jumps
 
 
 @inlined
-def stretch_range(ground: Ground, stretch: int) -> tuple[float, float]:
-    """Compute bounds on the acceleration in a stretch from those of the unscaled motion, wider by the rounding."""
+def bound_stretch(ground: Ground, stretch: int) -> Window:
+    """Compute bounds on a stretch from those of the unscaled motion; those in scaled units include the rounding."""
     row = ground.stretches[stretch, component_index(ground)]
     scale = ground.factor * ground.unit
-    first, second = scale * row[_MIN], scale * row[_MAX]
+    first, second, size = scale * row[_MIN], scale * row[_MAX], abs(scale) * (1.0 + ROUNDING)
     rounding = ROUNDING * max(abs(first), abs(second))
-    return min(first, second) - rounding, max(first, second) + rounding
-
-
-@inlined
-def bound_stretch(ground: Ground, stretch: int, A: Floats) -> Window:
-    """Compute bounds on a stretch that ends before the last piece; ``A`` is scratch space."""
-    low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
-    for k in range(stretch * STRETCH, (stretch + 1) * STRETCH):
-        piece = bound_piece(ground, k, 0.0, piece_length(ground, k), A)
-        low, high, steepest = min(low, piece.low), max(high, piece.high), max(steepest, piece.slope)
-        jumps += piece.jumps + jump_at_end(ground, k)
-    return Window(low, high, steepest, jumps)
+    return Window(
+        min(first, second) - rounding, max(first, second) + rounding, size * row[_STEEPEST], size * row[_JUMPS]
+    )
 
 
 @inlined
@@ -321,7 +314,7 @@ def bound_window(
         if spans_stretch(ground, piece, offset, duration):
             next_piece = piece + STRETCH
             remaining = piece_start(ground, next_piece) - piece_start(ground, piece)
-            bounds = bound_stretch(ground, piece // STRETCH, A)
+            bounds = bound_stretch(ground, piece // STRETCH)
         else:
             next_piece = piece + 1
             remaining = piece_length(ground, piece) - offset
@@ -362,9 +355,9 @@ def next_piece_beyond(ground: Ground, piece: int, limits: tuple[float, float], r
     below, above = limits
     while piece < last_piece(ground):
         stretch = piece // STRETCH
-        weight = 1.0 + (stretch_range(vertical_component(ground), stretch)[0] if has_vertical(ground) else 0.0)
-        low, high = stretch_range(ground, stretch)
-        if low < below * weight + restraint[0] or high > above * weight + restraint[1]:
+        weight = 1.0 + (bound_stretch(vertical_component(ground), stretch).low if has_vertical(ground) else 0.0)
+        bounds = bound_stretch(ground, stretch)
+        if bounds.low < below * weight + restraint[0] or bounds.high > above * weight + restraint[1]:
             return piece
         piece = (stretch + 1) * STRETCH
     return last_piece(ground)

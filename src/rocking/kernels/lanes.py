@@ -240,8 +240,8 @@ def mark_slips(group: Record, unit: float, substeps: int) -> None:
             speed += group.stiffness[lane] * h * (group.twice_slenderness[lane] + largest)
         sticks = largest <= group.sticking_push[lane] - group.sticking_slope[lane] * (speed * speed)
         sticks &= max(group.peak[lane], group.u[lane] + speed * h) <= group.twice_slenderness[lane]
-        if not sticks and group.simulation[lane] >= 0:
-            group.overturn_angle[lane] = -np.inf
+        sticks |= group.simulation[lane] < 0
+        group.overturn_angle[lane] = group.overturn_angle[lane] if sticks else -np.inf
 
 
 @inlined

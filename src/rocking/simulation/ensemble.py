@@ -241,14 +241,14 @@ def create_setup(product: Product, bodies: slice | None = None) -> Setup:
 
 
 def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
-    """Divide a product into tasks for the engine, with indices into its outcomes as keys."""
+    """Divide a product into tasks for the engine, with slices of its outcomes, in order, as keys."""
     signs, per_motion = np.asarray(product.signs, dtype=float), math.prod(product.shape[1:])
     factors = [product.scales.factors(motion) for motion in product.motions]
     for part in split_simulations(product.motions, np.full(len(factors), per_motion)):
-        m, s, k, block = key = np.unravel_index(np.arange(part.start, part.stop), product.shape)
+        m, s, k, block = np.unravel_index(np.arange(part.start, part.stop), product.shape)
         first = m[0]
         scales = np.array(factors[first : m[-1] + 1])[m - first, s]
-        yield create_task(block, product.motions, m, perturbation * (signs[k] * scales), key)
+        yield create_task(block, product.motions, m, perturbation * (signs[k] * scales), part)
 
 
 def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
@@ -429,10 +429,11 @@ def simulate_product(
     product: Product, setup: Setup, names: Iterable[str] = tuple(VARIABLES), perturbation: float = 1.0
 ) -> dict[str, NDArray[np.generic]]:
     """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME`."""
-    results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
-    with Progress("simulating", math.prod(product.shape)) as bar:
+    count = math.prod(product.shape)
+    results: dict[str, NDArray[np.generic]] = {name: np.empty(count, dtype=OUTCOME[name]) for name in names}
+    with Progress("simulating", count) as bar:
         for task, outcomes in simulate_tasks(setup, _generate_tasks(product, perturbation)):
             for name, values in results.items():
                 values[task.key] = outcomes[name]
             bar.advance(len(outcomes))
-    return results
+    return {name: values.reshape(product.shape) for name, values in results.items()}
