@@ -218,7 +218,8 @@ class Assessment(Result):
             return []
         if item.rate is None:
             low, _, high = _bound_vulnerability(item, self.hazard)
-            return [f"> {low:.2g}" if math.isinf(high) else f"{low:.2g} to {high:.2g}", "-", "-"]
+            texts = [f"{float(f'{end:.2g}'):.9g}" for end in (low, high)]
+            return [f"> {texts[0]}" if math.isinf(high) else " to ".join(texts), "-", "-"]
         period, interval = item.rate._format_period()
         ends = [-math.expm1(-rate * self.years) for rate in (*item.rate.interval, *item.rate.bounds)]
         probability = item.rate.probability(self.years)

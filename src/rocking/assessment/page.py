@@ -118,7 +118,9 @@ def _describe_outcome(data: Any, k: int, m: int) -> str:
         return "undecided"
     if data.overturned.values[k, m]:
         return "overturns"
-    return "stands" if data.peak_over_alpha.values[k, m] > 0.0 else "does not rock"
+    if data.peak_over_alpha.values[k, m] > 0.0:
+        return "stands"
+    return "slides" if "largest_slip" in data and data.largest_slip.values[k, m] > 0.0 else "does not move"
 
 
 def describe_object(assessment: Any, k: int) -> list[str]:
