@@ -110,7 +110,7 @@ def test_every_request_is_answered_as_specified():
             (b"authorization", f"Bearer {application.new_token()}".encode()),
         ],
     )
-    files = {"/", "/page/{name}", "/library/{name}"}
+    files = {"/", "/block", "/page/{name}", "/library/{name}"}
     routes = [route.path for route in App(Explorer(), {}).asgi.routes]
     assert files < {*routes}
     paths = [*routes, EXCHANGE, "/api", "//api/start", "/pages/x", "/page", "http://127.0.0.1:8123/"]

@@ -16,7 +16,7 @@ import pytest
 
 import rocking.kernels
 from rocking.errors import KernelsError
-from rocking.kernels import compiled, library, sources
+from rocking.kernels import compiled, lane_steps, lanes, library, sources, state
 from rocking.kernels.signatures import sample_arguments
 from rocking.kernels.sine.sequence import write_critical_amplitudes
 
@@ -183,3 +183,19 @@ def test_numba_compiles_the_same_where_it_is_asked_to() -> None:
         answers[name], with_numba = done.stdout.split()
         assert with_numba == expected
     assert len({*answers.values()}) == 1
+
+
+def test_numbers_of_records_are_aligned_to_their_sizes_on_every_platform() -> None:
+    kinds = [
+        kind for module in (state, lanes, lane_steps) for kind in vars(module).values() if isinstance(kind, np.dtype)
+    ]
+    checked = 0
+    for kind in kinds:
+        assert kind.itemsize % 8 == 0 and kind.isalignedstruct
+        end = 0
+        for field, offset, *_ in kind.fields.values():
+            size = 8 if field.names else field.base.itemsize
+            assert offset % size == 0 and 0 <= offset - end < size
+            end, checked = offset + field.itemsize, checked + 1
+        assert 0 <= kind.itemsize - end < 8
+    assert len(kinds) >= 12 and checked > 150

@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import json
 import re
 import runpy
 from pathlib import Path
@@ -15,6 +16,8 @@ import rocking
 from rocking import pulses
 from rocking.errors import OptionError, RecordError
 from rocking.explorer import standalone
+from rocking.explorer.core import Explorer
+from rocking.explorer.launch import Server, start_listening
 from rocking.kernels import library, state
 from rocking.simulation.simulate import compute_response
 
@@ -145,9 +148,103 @@ def test_outcomes_are_those_of_the_package(opened):
     assert set(sensitive) <= {"ridgecrest-clc-090"} and len(sensitive) <= 0.03 * CASES
 
 
+@pytest.mark.browser
+def test_sines_rest_below_the_critical_amplitude(opened):
+    address = f"{SLENDER}&motion=sine:amplitude=2,frequency=0.63,cycles=2.5"
+    page = opened(address)
+    page.page.click("[data-panel=map]")
+    page.page.click("button[value=sines]")
+    page.until("document.body.dataset.map === 'complete'", "the map is computed")
+    values = np.array(page.js("Array.from(page.panels.map.values)")).reshape(96, 128)
+    omega = 0.5 * 16.0 ** ((np.arange(128) + 0.5) / 128)
+    a = 1.0 + 0.1 * (np.arange(96) + 0.5) / 96
+    critical = rocking.chattering.critical_amplitude(omega, 0.92)
+    rests = values == 0.0
+    assert (rests == (a[:, None] < critical)).all() and 3000 < rests.sum() < 5000
+    assert {0.0, 1.0, 2.0} == {*values.ravel().tolist()}
+
+
+@pytest.mark.browser
+def test_the_explorer_opens_on_the_page_and_both_share_the_case(built, browser):
+    server = start_listening(Explorer(), {})
+    server.run_in_background()
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    page = Watched(context.new_page())
+    page.page.goto(server.link(path="/block"))
+    page.until("document.body.dataset.settled", "computed")
+    page.until("!location.hash.includes('token')", "the token is redeemed")
+    assert page.text("#question") == "Will it fall?" and page.page.locator("#ask").is_visible()
+    page.js("location.hash = 'width=0.3&height=1.3&offset=0.02&motion=one-sine:amplitude=0.4g,frequency=1'")
+    page.until("document.getElementById('more').search.includes('width=0.3&')", "the link has the case")
+    page.page.click("#more")
+    page.until("document.body.innerText.includes('overturns')", "the explorer shows the case")
+    page.page.click("#to-block")
+    page.until("document.getElementById('headline')?.textContent.includes('It falls.')", "the page shows the case")
+    page.until("location.hash.includes('amplitude=3.92266,')", "the case is in the address")
+    assert numbers(page)["offset"] == 0.02 and page.complaints == []
+    server.server.should_exit = True
+    context.close()
+
+
+def test_without_webassembly_the_explorer_opens_itself(monkeypatch, run):
+    opened = []
+    monkeypatch.setattr(library, "read_manifest", lambda: {"page": None})
+    monkeypatch.setattr(Server, "announce", lambda self, *, open_browser, path="/": opened.append(path))
+    monkeypatch.setattr(Server, "run", lambda self: self.socket.close())
+    code, _, err = run("explore", "--no-open")
+    assert (code, opened) == (0, ["/"]) and "needs WebAssembly" in err
+
+
+def test_links_of_a_class_are_in_the_page_and_checked(built, tmp_path):
+    path = tmp_path / "links.txt"
+    first, second = "width=0.3&height=1.2&motion=one-sine:amplitude=0.35g,frequency=1.2&ask=1", "width=0.3&height=1.2"
+    path.write_text(f"# Week 3\n\nWill it fall? block.html#{first}\n{second}\n", "utf-8")
+    entries = standalone.read_exercises(path)
+    links = [{"words": "Will it fall?", "case": first}, {"words": second, "case": second}]
+    assert entries == [{"words": "Week 3"}, *links]
+    assert json.dumps(entries, separators=(",", ":")).replace("<", "\\u003c") in standalone.build_page([], path)
+
+
+@pytest.mark.parametrize(
+    ("link", "problem"),
+    [
+        ("width=0.3&height=tall", "height must be a length"),
+        ("width=0.3&heigh=1", "the page cannot show 'heigh'; it shows width"),
+        ("width=0.3&height=1&motion=nowhere&pga=2", "the page has no motion named 'nowhere'; it has sine, one-sine"),
+        ("width=0.3&height=1&motion=sine:amplitude=1", "frequency"),
+    ],
+)
+def test_a_wrong_link_of_a_class_is_refused_with_its_line(link, problem, tmp_path):
+    path = tmp_path / "links.txt"
+    path.write_text(f"\nA link  {link}\n", "utf-8")
+    with pytest.raises(OptionError, match=f"links.txt, line 2: .*{re.escape(problem)}"):
+        standalone.read_exercises(path)
+    with pytest.raises(OptionError, match="cannot be read"):
+        standalone.read_exercises(tmp_path / "none.txt")
+
+
+@pytest.mark.browser
+def test_a_class_opens_its_links(built, browser, tmp_path):
+    links, path = tmp_path / "links.txt", tmp_path / "block.html"
+    links.write_text(f"# Week 3\nDoes it fall?  #{FALLING}&ask=1\n", "utf-8")
+    path.write_text(standalone.build_page([], links), "utf-8")
+    context = browser.new_context()
+    page = Watched(context.new_page())
+    page.page.goto(path.as_uri())
+    page.until("document.body.dataset.settled", "computed")
+    assert page.page.locator("#tours").is_visible()
+    assert not any("record" in title for title in page.page.locator(".tours button").all_text_contents())
+    page.page.click("text=Does it fall?")
+    page.page.click("#yes")
+    page.says("headline", "You were right. It falls.")
+    context.close()
+
+
 @pytest.mark.thorough
 def test_the_file_is_small_whole_and_refuses_what_it_cannot_hold(html, monkeypatch):
     assert len(gzip.compress(html.encode())) <= standalone.MAX_SIZE
+    names = re.findall(r"^(?:async )?(?:const|let|function|class) (\w+)", html, re.MULTILINE)
+    assert len(names) == len({*names}) > 100
     assert not re.search(r"/\*[A-Z]+\*/|^(?:import|export) ", html, re.MULTILINE)
     assert not re.search(r"""(?:src|href)=["'](?!data:)""", html)
     with pytest.raises(RecordError, match="no shipped record is named 'nowhere'"):
@@ -202,6 +299,15 @@ def test_the_webassembly_imports_nothing(built):
     assert 2 not in sections  # imports
 
 
+def test_results_are_the_same_in_every_browser(html):
+    core = html[html.index('<script id="core">') :].partition("</script>")[0]
+    assert len(core) > 20_000
+    code = re.sub(r"/\*.*?\*/|//[^\n]*", "", core, flags=re.DOTALL)
+    exact = {"PI", "sqrt", "abs", "sign", "max", "min", "floor", "ceil", "round"}
+    assert {*re.findall(r"Math\.(\w+)", code)} <= exact  # others are approximated by each browser as it likes
+    assert "**" not in code
+
+
 def test_layouts_are_those_of_the_records(built):
     layouts = standalone.describe_computation([])["layouts"]
     assert layouts["state"]["size"] == state.STATE.itemsize
@@ -241,6 +347,7 @@ WORDS = """(() => {
   const count = (text) => text.match(/\\p{L}{2,}/gu)?.length ?? 0;
   return count(document.body.innerText) - count(document.getElementById("described").innerText);
 })()"""
+SLENDER = "width=0.730609&height=3.604203&restitution=0.92&model=linear"
 FALLING = "width=0.4&height=1.6&motion=one-sine:amplitude=3.1,frequency=1"
 
 
@@ -426,9 +533,24 @@ def test_a_case_in_the_address_is_shown_again(opened):
     page = opened(f"{FALLING}&ask=1")
     page.page.click("#yes")
     page.says("headline", "You were right. It falls.")
-    page = opened("width=nonsense&motion=unknown:amplitude=x&height=1e9")
+    page = opened("width=nonsense&motion=unknown:amplitude=x&height=1e9&p=2")
     page.until("document.body.dataset.settled", "computed")
-    assert numbers(page) == {"width": 0.4, "height": 50.0, "amplitude": 3.01, "frequency": 1.0}
+    page.says("headline", "This page cannot show all of the address: motion, width, amplitude, height, p.")
+    assert numbers(page) == {"width": 0.4, "height": 10.0, "amplitude": 3.01, "frequency": 1.0}
+
+
+@pytest.mark.browser
+def test_no_case_of_an_address_blocks_the_page(opened):
+    shapes = ["width=0.02&height=50", "width=0.4&height=1.6&restitution=1", "width=50&height=0.02&offset=9"]
+    motions = ["none&initial_rotation=0.1", "one-sine:amplitude=0.01,frequency=1", "ridgecrest-clc-090&pga=100"]
+    page = opened()
+    for case in (f"{shape}&motion={motion}" for shape in shapes for motion in motions):
+        took = page.js(
+            "(text) => { const began = performance.now(); page.show(text, false); return performance.now() - began; }",
+            case,
+        )
+        page.says("headline", "This page cannot show all of the address")
+        assert took < 5_000.0, case
 
 
 @pytest.mark.browser

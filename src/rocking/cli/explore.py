@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from rocking.cli.options import INTEGER
 from rocking.cli.output import OUTPUT, QuietOptions
+from rocking.core.progress import note
 from rocking.errors import OptionError
 from rocking.records.named import is_shipped
 
@@ -26,6 +27,8 @@ def explore(
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
     """Open an interactive page that shows how a block rocks, chatters, comes to rest and overturns.
+
+    Without a motion, the command opens the page of `rocking page`, which leads to the explorer.
 
     The command prints a link that opens the page once, in one browser. Press Ctrl-C to stop.
 
@@ -45,13 +48,17 @@ def explore(
 
     require_packages()
     from rocking.explorer.core import Explorer
+    from rocking.explorer.standalone import is_available
 
     explorer = Explorer()
     is_study = motion is not None and Path(motion).is_dir()
     study = _open_study(Path(motion)) if motion is not None and is_study else None
     texts = {"view": "map"} if is_study else {} if motion is None else _describe_initial_motion(explorer, motion)
     server = start_listening(explorer, texts, study, address=address, port=port)
-    server.announce(open_browser=not no_open)
+    path = "/block" if motion is None and is_available() else "/"
+    if motion is None and path == "/":
+        note("the page of the block needs WebAssembly, which was not built with this installation; the explorer opens")
+    server.announce(open_browser=not no_open, path=path)
     server.run()
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from cyclopts import Parameter
+
 from rocking.cli.output import OUTPUT, QuietOptions
 from rocking.core.tables import write_text
 
@@ -13,6 +15,7 @@ def page(
     *,
     out: Path = Path("block.html"),
     records: str | None = None,
+    class_links: Annotated[Path | None, Parameter("--class")] = None,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
     """Write a page with a rocking block that needs no server and no installation: one HTML file.
@@ -27,10 +30,13 @@ def page(
     records
         Names of the shipped records in the page, separated by commas, by default el-centro-meloland-270 and
         ridgecrest-clc-090.
+    class_links
+        Text file with links for a class, which the page lists above its tours: in each line words, and at its end the
+        address of a case.
     """
     from rocking.explorer.standalone import RECORDS, build_page
 
     names = RECORDS if records is None else [name.strip() for name in records.split(",") if name.strip()]
-    text = build_page(names)
+    text = build_page(names, class_links)
     write_text(out, text)
     print(f"written to {out}: {len(text.encode()) // 1000} kB; open it in a browser")

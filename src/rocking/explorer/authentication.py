@@ -122,7 +122,7 @@ class RequestAuthentication:
 def _is_public(scope: Scope) -> bool:
     """Whether a request only reads the page or one of its files."""
     path = scope["path"]
-    return scope["method"] in _READ_METHODS and (path == "/" or path.startswith(("/page/", "/library/")))
+    return scope["method"] in _READ_METHODS and (path in ("/", "/block") or path.startswith(("/page/", "/library/")))
 
 
 def _read_bearer(scope: Scope) -> bytes:

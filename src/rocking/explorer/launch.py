@@ -52,10 +52,10 @@ class Server:
     host: str
     port: int
 
-    def link(self, texts: Mapping[str, str] | None = None) -> str:
-        """Return a link that opens the page once, with the texts of a case."""
+    def link(self, texts: Mapping[str, str] | None = None, *, path: str = "/") -> str:
+        """Return a link that opens the page at a path once, with the texts of a case."""
         query = f"?{urlencode(texts)}" if texts else ""
-        return f"http://{self.host}:{self.port}/{query}#token={self.authentication.new_token()}"
+        return f"http://{self.host}:{self.port}{path}{query}#token={self.authentication.new_token()}"
 
     def run(self) -> None:
         """Serve until interrupted."""
@@ -66,9 +66,9 @@ class Server:
         """Serve in a thread that ends with the program."""
         threading.Thread(target=self.run, name="rocking-explorer", daemon=True).start()
 
-    def announce(self, *, open_browser: bool) -> None:
-        """Print the link, and open it in a browser once the server answers."""
-        link = self.link()
+    def announce(self, *, open_browser: bool, path: str = "/") -> None:
+        """Print the link to a path, and open it in a browser once the server answers."""
+        link = self.link(path=path)
         print(f"rocking explorer: {link} (once, in one browser; Ctrl-C ends it)", flush=True)
         if open_browser:
             threading.Thread(target=self._open_browser, args=(link,), daemon=True).start()

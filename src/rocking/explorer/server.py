@@ -9,7 +9,7 @@ import secrets
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
 from dataclasses import asdict
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import metadata, resources
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
@@ -31,6 +31,7 @@ from rocking.explorer.core import EXPORTS, Explorer
 from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.parameters import PARAMETERS, QUANTITIES, field_label, specification
 from rocking.explorer.payload import Payload, fill_page, pack, phrase
+from rocking.explorer.standalone import build_page, is_available
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import MAX_FILE_SIZE, TOO_LARGE_MESSAGE
 from rocking.inputs.quantities import read_number
@@ -194,6 +195,7 @@ class App:
         self.asgi = Starlette(
             routes=[
                 Route("/", self.send_page),
+                Route("/block", self.send_block),
                 Route("/page/{name}", self.send_file),
                 Route("/library/{name}", self.send_script),
                 *(Route(path, self._create_handler(compute)) for path, compute in computations.items()),
@@ -220,6 +222,12 @@ class App:
         )
         html = self.html.replace("NONCE", nonce)
         return Response(html, media_type="text/html", headers={**_NO_STORE, "content-security-policy": policy})
+
+    async def send_block(self, _: Request) -> Response:
+        """Return the standalone page, which leads to this one."""
+        html = await self._run_in_thread(_build_block_page)
+        headers = {**_NO_STORE, "content-security-policy": f"frame-ancestors {self.framed_by}"}
+        return Response(html, media_type="text/html", headers=headers)
 
     async def send_file(self, request: Request) -> Response:
         """Return one of the page's own files."""
@@ -253,6 +261,7 @@ class App:
             **specification(),
             "axes": [asdict(axis) | {"label": phrase(f"axis.{axis.name}")} for axis in maps.AXES.values()],
             "opening": self.opening,
+            "block_page": is_available(),
             "study": None if self.study is None else self.study.describe(),
         }
 
@@ -359,6 +368,11 @@ class App:
             return JSONResponse(await self._run_in_thread(lambda: store(name, bytes(data))), headers=_NO_STORE)
 
         return receive
+
+
+@cache
+def _build_block_page() -> str:
+    return build_page(served=True)
 
 
 class _Stream(NamedTuple):

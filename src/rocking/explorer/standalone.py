@@ -11,12 +11,13 @@ import gzip
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from importlib import resources
 from itertools import product
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any, Final
+from urllib.parse import parse_qsl
 
 import numpy as np
 
@@ -26,8 +27,10 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, VERSION
 from rocking.engine.schemes import Certified, VelocityThreshold
 from rocking.engine.tasks import BUDGET, BUDGET_PER_PIECE, SLICE, Setup
-from rocking.errors import KernelsError, OptionError
+from rocking.errors import KernelsError, OptionError, RockingError, escape_braces
+from rocking.explorer.inputs import read_case
 from rocking.explorer.simulated import MAX_DRAWN_PERIOD
+from rocking.explorer.uploads import UploadStore
 from rocking.kernels import compiled, ground, library, state
 from rocking.motion.motion import Motion
 from rocking.records.catalogue import info, load, read_differences
@@ -42,6 +45,11 @@ PULSES: Final = ("one-sine", "one-cosine", "half-sine", "rectangular", "triangul
 #: Largest size of the compressed file, bytes.
 MAX_SIZE: Final = 600_000
 
+#: Parts of an address that the page reads.
+_SHOWN: Final = (
+    "width", "height", "offset", "restitution", "motion", "pga", "initial_rotation", "chattering", "model", "ask",
+)  # fmt: skip
+
 #: Sampling step, s, and unit, m, of the displacement of a record, which is only drawn.
 _DRAWN_STEP: Final = 0.04
 _DRAWN_UNIT: Final = 1e-4
@@ -50,28 +58,88 @@ _KERNELS: Final = {"march": "march.march", "trace": "trace.trace", "write_pieces
 _IMPORT: Final = re.compile(r'^import \{[^}]*\} from "([^"]+)";\n', re.MULTILINE)
 
 
-def build_page(names: Sequence[str] = RECORDS) -> str:
-    """Create the page with these shipped records as HTML text.
+def build_page(names: Sequence[str] = RECORDS, exercises: Path | None = None, *, served: bool = False) -> str:
+    """Create the page with these shipped records, and the links of a class, as HTML text.
+
+    A page that the explorer's server sends (``served``) leads to the explorer, whose link it redeems.
 
     Raises
     ------
     OptionError
         If a record is unknown, the page would be too large, or this installation has no WebAssembly.
     """
-    html = _read("standalone/index.html")
+    data = describe_computation(names) | {
+        "tours": [tour for tour in json.loads(_read("standalone/tours.json")) if _uses_only(tour, names)],
+        "class": None if exercises is None else read_exercises(exercises, names),
+        "served": served,
+    }
     core, seen = _bundle("standalone/jobs.js", [])
     parts = {
         "STYLE": _read("colours.css") + _read("standalone/style.css"),
-        "DATA": json.dumps(describe_computation(names), separators=(",", ":")),
+        "DATA": json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         "CORE": core,
         "APP": _bundle("standalone/main.js", seen)[0],
+        "MORE": '<a id="more" href="/">Records and studies</a>' if served else "",
     }
-    page = re.sub(r"/\*(STYLE|DATA|CORE|APP)\*/", lambda match: parts[match[1]], html)
+    html = _read("standalone/index.html").replace("CONNECT", "'self'" if served else "'none'")
+    page = re.sub(r"/\*([A-Z]+)\*/", lambda match: parts[match[1]], html)
     size = len(gzip.compress(page.encode()))
     if size > MAX_SIZE:
         limit = f"at most {MAX_SIZE // 1000} kB compressed, but would have {size // 1000} kB"
         raise OptionError(f"the page must have {limit}; choose fewer or shorter {{}}", "records")
     return page
+
+
+def is_available() -> bool:
+    """Whether this installation has the WebAssembly of the page."""
+    return bool(library.read_manifest().get("page"))
+
+
+def read_exercises(path: Path, names: Sequence[str] = RECORDS) -> list[dict[str, str]]:
+    """Read the links of a class: in each line words, and at its end the address of a case; or a heading alone.
+
+    Raises
+    ------
+    OptionError
+        If the file cannot be read, or the page cannot show a case.
+    """
+    try:
+        lines = path.read_text("utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise OptionError(f"this list of links cannot be read ({error})", path=str(path)) from error
+    entries = []
+    for number, line in enumerate(lines, start=1):
+        words, link = line.split(), ""
+        if words and "=" in words[-1]:
+            link = words.pop()
+        try:
+            case = {"case": _check_case(link, names)} if link else {}
+        except RockingError as error:
+            raise OptionError(escape_braces(str(error)), path=str(path), line=number) from error
+        if words or case:
+            entries.append({"words": " ".join(words).lstrip("# ") or link, **case})
+    return entries
+
+
+def _check_case(link: str, names: Sequence[str]) -> str:
+    """Return the case of a link after checking that the page can show it."""
+    case = link.partition("#")[2] or link.rpartition("?")[2]
+    texts = dict(parse_qsl(case))
+    unknown = texts.keys() - _SHOWN
+    if unknown:
+        raise OptionError(f"the page cannot show {min(unknown)!r}; it shows {', '.join(_SHOWN)}")
+    texts.pop("ask", None)
+    motion = texts.get("motion", "none").partition(":")[0]
+    if motion not in ("none", "sine", *PULSES, *names):
+        raise OptionError(f"the page has no motion named {motion!r}; it has sine, {', '.join((*PULSES, *names))}")
+    read_case(texts, UploadStore())
+    return case
+
+
+def _uses_only(tour: Mapping[str, Any], names: Sequence[str]) -> bool:
+    """Whether the records of all cases of a tour are in the page."""
+    cases = (dict(parse_qsl(step.get("case", "")))["motion"] for step in tour["steps"] if "case" in step)
+    return all(":" in motion or motion in names for motion in cases)
 
 
 def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:

@@ -4,8 +4,6 @@ A step marks and counts the lanes in which an event may occur (always with NaN, 
 the others that have a block. Weights are in the ground's frame, divided by the weight at rest.
 """
 
-import numpy as np
-
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.series import (
     ValueAndSlope,
@@ -14,7 +12,7 @@ from rocking.kernels.series import (
     sum_forcing,
     weighted_velocity_terms,
 )
-from rocking.kernels.state import Record
+from rocking.kernels.state import Record, define_record
 
 #: Number of lanes that step together, a constant so that their loops have a fixed length.
 WIDTH = 32
@@ -29,28 +27,26 @@ _SIDES = ("f8", (2,))
 #: and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation; rotation of overturning;
 #: usual length of a sample; factor on the motion; with friction, the largest push without a slip at zero velocity, its
 #: decrease per squared velocity (`sliding.may_slip`), and twice the slenderness.
-GROUP = np.dtype(
-    [
-        (name, "i8", (WIDTH,))
-        for name in ("simulation", "row", "end_row", "increment", "event", "blocked", "truncated", "retry")
-    ]
-    + [
-        (name, *_LANES)
-        for name in (
+GROUP = define_record(
+    **dict.fromkeys(
+        ("simulation", "row", "end_row", "increment", "event", "blocked", "truncated", "retry"), ("i8", (WIDTH,))
+    ),
+    **dict.fromkeys(
+        (
             "length", "push_start", "push_slope", "lift_start", "lift_slope",
             "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine", "stiffness", "pull", "push",
             "first", "second", "third", "curve", "peak", "overturn_angle", "h", "factor",
             "sticking_push", "sticking_slope", "twice_slenderness",
-        )
-    ],
-    align=True,
+        ),
+        _LANES,
+    ),
 )  # fmt: skip
 
 #: Constants of a step of length h on each side. Linear: lam, gain threshold, side gain (u'' = lam u - pull - push a),
 #: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
 #: instead of its gain. ``curve`` max |u''| bounds the distance of the rotation above or below both ends of the step.
-STEP_CONSTANTS = np.dtype(
-    [(name, *_SIDES) for name in ("stiffness", "pull", "push", "first", "second", "third", "curve")], align=True
+STEP_CONSTANTS = define_record(
+    **dict.fromkeys(("stiffness", "pull", "push", "first", "second", "third", "curve"), _SIDES)
 )
 
 #: Largest bound on the next terms by the last ones, divided by the first two; the truncation is 1/100 of it.

@@ -27,7 +27,17 @@ from rocking.kernels.lane_steps import (
     step_weighted,
 )
 from rocking.kernels.march import march
-from rocking.kernels.state import TO_THE_END, Ending, Record, Records, expose_fields, new_record, new_records, new_table
+from rocking.kernels.state import (
+    TO_THE_END,
+    Ending,
+    Record,
+    Records,
+    define_record,
+    expose_fields,
+    new_record,
+    new_records,
+    new_table,
+)
 
 #: Largest sqrt(|lam W|) h in lanes, where W is the weight divided by the weight at rest: of a step, of a substep of the
 #: nonlinear model, and of a substep of the linear model under varying weight.
@@ -39,7 +49,7 @@ MAX_WEIGHTED_SUBSTEP = 0.125
 EMPTY_ROTATION = 1e-300
 
 #: Numbers of lanes in use and of simulations that have started.
-COUNTS = np.dtype([("active", "i8"), ("started", "i8")], align=True)
+COUNTS = define_record(active="i8", started="i8")
 
 
 class Pool(NamedTuple):

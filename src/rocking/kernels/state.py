@@ -3,6 +3,7 @@
 Compiled code passes records by pointer, reads fields by name, and treats codes as plain integers.
 """
 
+import math
 from enum import IntEnum
 from typing import Any
 
@@ -101,11 +102,21 @@ class Ending(IntEnum):
     LOST = 8
 
 
-def _define_record(**fields: Any) -> np.dtype[np.void]:
-    """Return the type of a record with these fields, at the offsets of a C struct."""
-    return np.dtype(
-        [(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, kind in fields.items()], align=True
-    )
+def define_record(**fields: Any) -> np.dtype[np.void]:
+    """Return the type of a record with these fields, at the same offsets on every platform.
+
+    They are those of a C struct whose numbers are aligned to their sizes. Some 32-bit platforms align numbers of eight
+    bytes to four.
+    """
+    types = [np.dtype(kind) for kind in fields.values()]
+    offsets, end = [], 0
+    for kind in types:
+        alignment = 8 if kind.names else kind.base.itemsize
+        offsets.append(math.ceil(end / alignment) * alignment)
+        end = offsets[-1] + kind.itemsize
+    size = math.ceil(end / 8) * 8
+    layout: Any = {"names": [*fields], "formats": types, "offsets": offsets, "itemsize": size}
+    return np.dtype(layout, align=True)
 
 
 _SIDES = ("f8", (2,))
@@ -113,7 +124,7 @@ _SERIES = ("f8", (ORDER + 2,))
 
 #: Body. Fields of two numbers refer to side + and side -; accelerations are in units of g. In all records the most used
 #: fields come first, so that fewer cache lines are read.
-BLOCK = _define_record(
+BLOCK = define_record(
     stiffness=_SIDES,  # lambda in u'' = lambda u - ..., 1/s^2
     threshold_slope=_SIDES,  # restoring acceleration at zero rotation per acceleration above the threshold
     threshold=_SIDES,  # ground acceleration at uplift without restraints
@@ -159,7 +170,7 @@ BLOCK = _define_record(
 )
 
 #: Settings of the computation.
-SETTINGS = _define_record(
+SETTINGS = define_record(
     nonlinear="?",  # whether the model is nonlinear
     rest_rule="i8",  # `RestRule` that ends chattering
     tolerance="f8",  # largest accepted width of a bracket on the time of rest, s
@@ -169,7 +180,7 @@ SETTINGS = _define_record(
 )
 
 #: State of a march.
-STATE = _define_record(
+STATE = define_record(
     piece="i8",  # present piece of the motion
     offset="f8",  # time since the start of the piece, s
     side="i8",  # 0 for side +, 1 for side -; negative at rest
@@ -209,25 +220,25 @@ STATE = _define_record(
 )
 
 #: Step of a response: state at its start (see `STATE`) and time, for `expand_arc`.
-NODE_ROW = _define_record(
+NODE_ROW = define_record(
     time="f8", piece="i8", offset="f8", side="i4", law="i4", u="f8", v="f8", slip="f8", slip_rate="f8", direction="i8"
 )
 
 #: Impact: time, side entered (+1 or -1), speeds before and after.
-IMPACT_ROW = _define_record(time="f8", side="i8", speed_before="f8", speed_after="f8")
+IMPACT_ROW = define_record(time="f8", side="i8", speed_before="f8", speed_after="f8")
 
 #: Event: time, `EventKind`, side (+1 or -1; 0 at rest).
-EVENT_ROW = _define_record(time="f8", kind="i8", side="i8")
+EVENT_ROW = define_record(time="f8", kind="i8", side="i8")
 
 #: Chattering sequence: time since which it is proven, time of rest with bounds, number of impacts in between.
-SEQUENCE_ROW = _define_record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
+SEQUENCE_ROW = define_record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
 
 #: Row k contains the k-th node, impact, event and chattering sequence of a march: one array, because kernels pass
 #: arrays by value.
-TABLE = _define_record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
+TABLE = define_record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
 
 #: Scratch space: series of one step about its start.
-SCRATCH = _define_record(
+SCRATCH = define_record(
     rotation=_SERIES,  # u
     ground=_SERIES,  # push: acceleration of the ground in the frame of the side, in units of g
     weight=_SERIES,  # weight divided by the weight at rest
@@ -245,7 +256,7 @@ SCRATCH = _define_record(
 )
 
 #: Scratch space of a variation: series of the stiffness, the forcing and the variation itself.
-VARIATION = _define_record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
+VARIATION = define_record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
 
 
 def new_records(count: int, kind: np.dtype[np.void]) -> Records:

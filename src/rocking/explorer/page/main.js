@@ -116,6 +116,8 @@ async function compute() {
     // It was chosen for a longer response; where two are compared, the other may be longer.
     if (state.view !== "compare" && state.window && state.window[0] >= found.header.duration) state.window = null;
     accepted(state, {texts, window: state.window});
+    one("to-block").hidden = !specification.block_page;
+    /** @type {HTMLAnchorElement} */ (one("to-block")).href = `/block#${new URLSearchParams(texts)}`;
     draw();
     counted("drawn");
   } catch (error) {

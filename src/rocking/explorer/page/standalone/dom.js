@@ -13,19 +13,16 @@ export function put(element, given) {
   return element;
 }
 
-/** @param {string} name @param {Record<string, any>} [given] @param {(Node | string)[]} [inside] @returns {any} */
-export function make(name, given = {}, inside = []) {
-  const made = put(document.createElement(name), given);
-  made.append(...inside);
-  return made;
+/** @param {Element} element @param {Record<string, any>} given @param {(Node | string)[]} inside @returns {any} */
+function fill(element, given, inside) {
+  put(element, given).append(...inside);
+  return element;
 }
 
-/** @param {string} name @param {Record<string, any>} [given] @param {(Node | string)[]} [inside] @returns {any} */
-export function draw(name, given = {}, inside = []) {
-  const made = put(document.createElementNS("http://www.w3.org/2000/svg", name), given);
-  made.append(...inside);
-  return made;
-}
+/** @param {string} name @param {Record<string, any>} [given] @param {(Node | string)[]} [inside] */
+export const make = (name, given = {}, inside = []) => fill(document.createElement(name), given, inside);
+/** @param {string} name @param {Record<string, any>} [given] @param {(Node | string)[]} [inside] */
+export const draw = (name, given = {}, inside = []) => fill(document.createElementNS("http://www.w3.org/2000/svg", name), given, inside);
 
 /** Drag with the pointer: `begin` returns what is needed while it moves, or nothing to let it pass.
  * @template T @param {Element} element @param {(event: PointerEvent) => T | undefined} begin @param {(event: PointerEvent, context: T) => void} move @param {(context: T) => void} [end] */
@@ -38,14 +35,11 @@ export function dragged(element, begin, move, end) {
     element.setPointerCapture(down.pointerId);
     const onMove = (/** @type {Event} */ each) => move(/** @type {PointerEvent} */ (each), context);
     const onEnd = () => {
-      element.removeEventListener("pointermove", onMove);
-      element.removeEventListener("pointerup", onEnd);
-      element.removeEventListener("pointercancel", onEnd);
+      for (const [name, act] of handlers) element.removeEventListener(name, act);
       end?.(context);
     };
-    element.addEventListener("pointermove", onMove);
-    element.addEventListener("pointerup", onEnd);
-    element.addEventListener("pointercancel", onEnd);
+    const handlers = /** @type {[string, any][]} */ ([["pointermove", onMove], ["pointerup", onEnd], ["pointercancel", onEnd]]);
+    for (const [name, act] of handlers) element.addEventListener(name, act);
   });
 }
 

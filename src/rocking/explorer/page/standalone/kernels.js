@@ -152,7 +152,7 @@ export class Kernels {
     const number = (/** @type {string} */ name) => this.get("state", state, name);
     const outcome = {
       ending, overturned: ending === DATA.endings.OVERTURNED, peak: number("peak"), peakTime: number("peak_time"), impacts: number("impacts"),
-      uplifts: number("uplifts"), rests: number("rests"), end: number("end_time"), firstUplift: number("first_uplift"), lastRest: number("last_rest_time"),
+      uplifts: number("uplifts"), rests: number("rests"), end: number("end_time"), firstUplift: number("first_uplift"), firstRest: number("first_rest"), lastRest: number("last_rest_time"),
     };
     if (!recorded) return {...outcome, events: [], impactTimes: new Float64Array(0), nodes: new Uint8Array(0)};
     const row = (/** @type {number} */ k, /** @type {string} */ name) => this.get("table", table + k * size, name);

@@ -7,16 +7,16 @@ import {Numbers} from "./fields.js";
 import {Phase} from "./phase.js";
 import {Tours} from "./tours.js";
 import {Workers} from "./workers.js";
-import {openKernels} from "./kernels.js";
-import {limited, readCase, writeCase} from "./case.js";
+import {DATA, openKernels} from "./kernels.js";
+import {limited, readAddress, writeCase} from "./case.js";
 import {respond, upliftOf} from "./response.js";
 import {groundAt} from "./motions.js";
 import {described, headline, margin, reasons} from "./sentences.js";
 import {one, put} from "./dom.js";
 import {fixed} from "../numbers.js";
 
-/** An address that asks for the outcome first. */
-const ASKED = /[#&]ask=1\b/;
+/** An address that asks for the outcome first, or that the explorer has printed. */
+const ASKED = /[#&](ask=1\b|token=)/;
 /** Pause before the address changes and slow parts are computed again, ms. */
 const SETTLED = 200;
 /** What is said before the first answer. */
@@ -27,10 +27,12 @@ class Page {
   /** @param {import("./kernels.js").Kernels} kernels */
   constructor(kernels) {
     this.kernels = kernels;
-    this.given = readCase(location.hash.slice(1));
+    const {given, wrong} = readAddress(location.hash.slice(1));
+    this.given = given;
+    this.wrong = wrong;
+    this.answered = location.hash.length > 1 && !ASKED.test(location.hash);
     this.time = 0;
     this.playing = false;
-    this.answered = location.hash.length > 1 && !ASKED.test(location.hash);
     /** @type {any} */
     this.shown = null;
     /** @type {import("./motions.js").Case | null} */
@@ -52,9 +54,11 @@ class Page {
     }
     one("close").addEventListener("click", () => this.leave());
     addEventListener("keydown", (event) => this.key(event));
-    addEventListener("hashchange", () => { if (location.hash.slice(1) !== this.written) this.show(readCase(location.hash.slice(1))); });
+    addEventListener("hashchange", () => { if (location.hash.slice(1) !== this.written) this.show(location.hash, ASKED.test(location.hash)); });
     this.compute();
     this.settle();
+    if (DATA.served) redeem().catch(() => {}); // the explorer says what is missing
+    if (DATA.class && !this.answered) this.open("tours");
     document.body.dataset.ready = "1";
   }
 
@@ -72,6 +76,7 @@ class Page {
   change(patch) {
     this.pending = limited({...(this.pending ?? this.given), ...patch});
     this.answered = true;
+    this.wrong = [];
     if (this.frame) return;
     this.frame = requestAnimationFrame(() => {
       this.frame = 0;
@@ -81,12 +86,10 @@ class Page {
     });
   }
 
-  /** Show another case from its start. @param {import("./motions.js").Case} given @param {boolean} [asked] whether its outcome is asked first */
-  show(given, asked = false) {
+  /** Show the case of an address from its start. @param {string} address @param {boolean} asked whether its outcome is asked first */
+  show(address, asked) {
     this.stop();
-    this.given = limited(given);
-    this.pending = null;
-    this.answered = !asked;
+    Object.assign(this, readAddress(address.replace(/^#/, "")), {pending: null, answered: !asked});
     this.guess = undefined;
     this.time = 0;
     this.compute();
@@ -115,6 +118,7 @@ class Page {
     if (this.pending) return;
     const {given} = this;
     this.written = writeCase(given);
+    if (DATA.served) put(one("more"), {href: `/?${this.written}`});
     if (this.answered) history.replaceState(null, "", `#${this.written}`);
     this.panels[this.panel ?? ""]?.settle?.();
     const critical = given.tilt || given.motion === "still" ? null : await this.workers.ask({kind: "critical", given});
@@ -136,7 +140,7 @@ class Page {
     const strong = document.createElement("strong");
     strong.textContent = `${judged}${verdict}`;
     strong.className = this.shown.falling ? "over" : "";
-    one("headline").replaceChildren(strong, ` ${margin(this.shown, this.critical)}`);
+    one("headline").replaceChildren(strong, ` ${margin(this.shown, this.critical)}${this.wrong.length ? ` This page cannot show all of the address: ${this.wrong.join(", ")}.` : ""}`);
     one("why").replaceChildren(...linked(reasons(this.shown), (time) => { this.stop(); this.seek(time); }));
   }
 
@@ -218,6 +222,16 @@ class Page {
   }
 }
 
-openKernels().then((kernels) => new Page(kernels)).catch((/** @type {Error} */ error) => {
+/** Exchange the token of the explorer's link for its secret, which the storage of this origin keeps for the explorer. */
+async function redeem() {
+  const given = new URLSearchParams(location.hash.slice(1)), token = given.get("token");
+  if (!token) return;
+  given.delete("token");
+  history.replaceState(null, "", location.pathname + (given.size ? `#${given}` : ""));
+  const response = await fetch("/api/secret", {method: "POST", headers: {authorization: `Bearer ${token}`}});
+  if (response.ok) localStorage.setItem("rocking-secret", await response.text());
+}
+
+openKernels().then((kernels) => { Object.assign(globalThis, {page: new Page(kernels)}); }).catch((/** @type {Error} */ error) => {
   one("headline").textContent = `This browser cannot run the kernels (${error.message}). Use a current version of Chromium, Firefox or Safari.`;
 });

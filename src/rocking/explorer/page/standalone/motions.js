@@ -41,9 +41,11 @@ function pulse(name, rate, cycles) {
     breaks = Array.from({length: count + 1}, (_, k) => k / pieces.length);
     rows = Array.from({length: count}, (_, k) => pieces[k % pieces.length]);
   }
+  const powers = [1]; // the operator of powers differs between browsers
+  while (powers.length < rows[0].length) powers.push(powers[powers.length - 1] * speed);
   return {
     breaks: breaks.map((/** @type {number} */ time) => time / speed), error: unit.error,
-    rows: rows.map((/** @type {number[]} */ row) => row.map((each, k) => each * speed ** k)),
+    rows: rows.map((/** @type {number[]} */ row) => row.map((each, k) => each * powers[k])),
   };
 }
 

@@ -11,8 +11,8 @@ const POINTS = 900;
 const AFTERWARDS = 0.5, BEFORE = 2;
 /** Ratio of the amplitudes that are tried, and the largest one in units of that of uplift. */
 const LEVEL = 1.005, MOST_UPLIFTS = 20;
-/** Steps of a search before it is refined, and halvings. */
-const STEPS = 80, HALVINGS = 30;
+/** Halvings of a search. */
+const HALVINGS = 30;
 
 /** @typedef {import("./motions.js").Case} Case */
 /** @typedef {{time: number, kind: "lift" | "peak" | "balance" | "gone" | "flat" | "rest"}} Moment */
@@ -49,7 +49,13 @@ function windowOf({motion, tilt}, {pieces}, {overturned, uplifts, end, firstUpli
 
 /** State at one moment. @param {import("./kernels.js").Kernels} kernels @param {any} body @param {any} shaking @param {any} response @param {number} time */
 function stateAt(kernels, body, shaking, response, time) {
-  const [rotation, velocity] = kernels.trace(body, shaking, response, [time]), sign = rotation < 0 || (rotation === 0 && velocity < 0) ? -1 : 1;
+  const [rotation, velocity] = kernels.trace(body, shaking, response, [time]);
+  return stateOf(rotation, velocity);
+}
+
+/** Side, rotation and velocity in its frame. @param {number} rotation @param {number} velocity */
+function stateOf(rotation, velocity) {
+  const sign = rotation < 0 || (rotation === 0 && velocity < 0) ? -1 : 1;
   return {side: sign > 0 ? 0 : 1, u: sign * rotation, v: sign * velocity};
 }
 
@@ -64,9 +70,9 @@ function last(low, high, holds) {
 
 /** The moments that decide, in order of time. @param {import("./kernels.js").Kernels} kernels @param {any} body @param {any} shaking
  * @param {ReturnType<import("./kernels.js").Kernels["march"]>} response @param {any} picture @returns {Moment[]} */
-function momentsOf(kernels, body, shaking, response, {times, rotation}) {
+function momentsOf(kernels, body, shaking, response, picture) {
   /** @type {Moment[]} */
-  const moments = [], {UPLIFT, REST} = DATA.events, lifted = response.events.find(({kind}) => kind === UPLIFT);
+  const moments = [], {times, rotation} = picture, {UPLIFT, REST} = DATA.events, lifted = response.events.find(({kind}) => kind === UPLIFT);
   if (lifted && lifted.time > 0) moments.push({time: lifted.time, kind: "lift"});
   const rest = response.events.findLast(({kind}) => kind === REST);
   if (rest) moments.push({time: rest.time, kind: "rest"});
@@ -78,23 +84,33 @@ function momentsOf(kernels, body, shaking, response, {times, rotation}) {
   const beyond = times.findLastIndex((/** @type {number} */ _, /** @type {number} */ k) => (side ? -rotation[k] : rotation[k]) < alpha);
   const inside = (/** @type {number} */ at) => { const state = stateAt(kernels, body, shaking, response, at); return state.side !== side || state.u < alpha; };
   if (beyond >= 0 && beyond + 1 < times.length) moments.push({time: last(times[beyond], times[beyond + 1], inside), kind: "balance"});
-  const gone = noReturn(kernels, body, shaking, response);
+  const gone = noReturn(kernels, body, shaking, response, picture);
   if (gone > 0) moments.push({time: gone, kind: "gone"});
   moments.push({time: response.end, kind: "flat"});
   return moments.sort((one, other) => one.time - other.time);
 }
 
-/** The last moment at which the block would not have fallen, if the ground had stopped then; 0 if there is none.
- * @param {import("./kernels.js").Kernels} kernels @param {any} body @param {any} shaking @param {any} response */
-function noReturn(kernels, body, shaking, response) {
-  if (!shaking.pieces) return 0;
-  const stands = (/** @type {number} */ time) => !kernels.march(body, {pieces: null, factor: 1}, stateAt(kernels, body, shaking, response, time)).overturned;
-  const first = response.firstUplift;
-  for (let k = STEPS - 1; k >= 0; k -= 1) {
-    const time = first + ((response.end - first) * k) / STEPS;
-    if (stands(time)) return last(time, first + ((response.end - first) * (k + 1)) / STEPS, stands);
+/** Whether a block falls on ground that stops: its energy suffices to pass over a balance, now or after impacts.
+ * @param {import("./kernels.js").Body} body @param {import("./kernels.js").Start} start @param {any} libm */
+function fallsAlone({sides, model}, {side, u, v}, libm) {
+  const energies = sides.map(({p, alpha}) => (/** @type {number} */ turned) => p * p * (model === "linear" ? turned * (alpha - turned / 2) : 2 * libm.sin(turned / 2) * libm.sin(alpha - turned / 2)));
+  const barriers = sides.map(({alpha}, k) => energies[k](alpha));
+  let energy = energies[side](u) + (v * v) / 2, now = side;
+  if (u >= sides[side].alpha && (v >= 0 || energy < barriers[side])) return true;
+  for (let outward = v >= 0; energy > Math.min(...barriers); outward = true) {
+    if (outward && energy > barriers[now]) return true;
+    energy *= sides[now].restitution * sides[now].restitution;
+    now = 1 - now;
   }
-  return 0;
+  return false;
+}
+
+/** The last moment at which the block would not have fallen, if the ground had stopped then; 0 if there is none.
+ * @param {import("./kernels.js").Kernels} kernels @param {any} body @param {any} shaking @param {any} response @param {any} picture */
+function noReturn(kernels, body, shaking, response, {times, rotation, velocity}) {
+  if (!shaking.pieces) return 0;
+  const k = times.findLastIndex((/** @type {number} */ time, /** @type {number} */ at) => time < response.end && !fallsAlone(body, stateOf(rotation[at], velocity[at]), kernels.exports));
+  return k < 0 ? 0 : last(times[k], Math.min(times[k + 1], response.end), (time) => !fallsAlone(body, stateAt(kernels, body, shaking, response, time), kernels.exports));
 }
 
 /** Smallest amplitude that overturns the block, m/s², among levels of half a per cent and that of the case, up to 20 times

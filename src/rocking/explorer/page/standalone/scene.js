@@ -11,6 +11,8 @@ const BELOW = 46, SHARE_BELOW = 0.18, ABOVE = 22;
 const HANDLE = 8, TOUCH = 24;
 /** Length of the arrow of a push of 1 g in block heights. */
 const PUSH = 0.5;
+/** Share of the slenderness up to which a largest rotation is drawn enlarged. */
+const LEAST = 0.1;
 /** Tilts that count as none, rad. */
 const UPRIGHT = 0.02;
 
@@ -45,9 +47,12 @@ export class Scene {
     this.moving = draw("rect", {class: "moving"});
     this.needed = draw("path", {class: "needed"});
     this.barText = draw("text", {class: "small", "text-anchor": "middle"}, ["energy"]);
-    this.bars.append(draw("rect", {class: "frame"}), this.stored, this.moving, this.needed, this.barText);
-    this.svg.append(this.grid, this.earth, this.hatch, this.scaleText, this.whole, this.push, this.pivot, this.bars);
+    this.needText = draw("text", {class: "small", "text-anchor": "end"}, ["to fall"]);
+    this.pushText = draw("text", {class: "small", "text-anchor": "middle"}, ["push"]);
+    this.bars.append(draw("rect", {class: "frame"}), this.stored, this.moving, this.needed, this.barText, this.needText);
+    this.svg.append(this.grid, this.earth, this.hatch, this.scaleText, this.whole, this.push, this.pushText, this.pivot, this.bars);
     this.scale = 0;
+    this.enlarged = 1;
     dragged(this.top, (event) => this.hold(event), (event, held) => this.page.change({height: held.height + (held.y - event.clientY) / this.scale}), () => this.settle());
     dragged(this.side, (event) => this.hold(event), (event, held) => this.page.change({width: held.width + (2 * (event.clientX - held.x)) / this.scale}), () => this.settle());
     dragged(this.mass, (event) => this.hold(event), (event, held) => {
@@ -107,14 +112,16 @@ export class Scene {
     this.begin = begin;
     const {given, shown} = this.page;
     if (!state || !shown || !this.scale) return;
-    const {scale, floor} = this, {width, height, offset} = given;
+    const {scale, floor} = this, {width, height, offset} = given, share = shown.peak / Math.max(...shown.body.sides.map((/** @type {any} */ side) => side.alpha));
+    this.enlarged = share > 0 && share < LEAST ? stepOf(LEAST / share, 1) : 1;
+    const rotation = this.enlarged * state.rotation;
     const moved = still.matches ? 0 : this.displacement(state.displacement), free = Math.max(0, this.width / 2 - scale * Math.hypot(width, height) * 0.9);
     const shift = Math.max(-free, Math.min(free, scale * moved));
     const wide = scale * width, tall = scale * height, outside = Math.max(0, tall + wide / 2 + 12 + Math.abs(shift) - this.width / 2); // of what lies beside it
-    const pan = -Math.sin(state.rotation) * outside;
+    const pan = -Math.sin(rotation) * outside;
     this.middle = this.width / 2 + shift + pan;
     this.background(scale * moved - shift - pan);
-    const pivot = ((state.rotation >= 0 ? 1 : -1) * wide) / 2, angle = (state.rotation * 180) / Math.PI;
+    const pivot = ((state.rotation >= 0 ? 1 : -1) * wide) / 2, angle = (rotation * 180) / Math.PI;
     put(this.body, {x: -wide / 2, y: -tall, width: wide, height: tall});
     put(this.whole, {transform: `translate(${this.middle + pivot} ${floor}) rotate(${angle}) translate(${-pivot} 0)`});
     const place = scale * offset;
@@ -124,7 +131,7 @@ export class Scene {
     put(this.side, {transform: `translate(${wide / 2} ${-tall * 0.72})`});
     this.svg.classList.toggle("begin", Boolean(begin));
     put(this.pivot, {cx: this.middle + pivot, cy: floor, visibility: state.rotation === 0 ? "hidden" : "visible"});
-    this.arrow(state, pivot, place, tall);
+    this.arrow({...state, rotation}, pivot, place, tall);
     this.energy(state);
   }
 
@@ -133,6 +140,7 @@ export class Scene {
     const cos = Math.cos(rotation), sin = Math.sin(rotation), dx = place - pivot, dy = -tall / 2;
     const x = this.middle + pivot + dx * cos - dy * sin, y = this.floor + dx * sin + dy * cos;
     const length = (-acceleration / GRAVITY) * PUSH * tall, tip = Math.sign(length) * Math.min(9, Math.abs(length));
+    put(this.pushText, {x: x + length / 2, y: y - 10, visibility: Math.abs(length) < 24 ? "hidden" : "visible"});
     put(this.push, {d: Math.abs(length) < 3 ? "" : `M${x} ${y}h${length}m${-tip} ${-0.7 * Math.abs(tip)}l${tip} ${0.7 * Math.abs(tip)}l${-tip} ${0.7 * Math.abs(tip)}`});
   }
 
@@ -147,6 +155,7 @@ export class Scene {
     put(this.moving, {x: x - 9, y: y - of(Math.max(0, stored) + moving), width: 18, height: of(Math.max(0, stored) + moving) - of(stored)});
     put(this.needed, {d: `M${x - 15} ${y - unit}h30`});
     put(this.barText, {x, y: y + 15});
+    put(this.needText, {x: x - 20, y: y - unit + 4});
   }
 
   /** Displacement of the ground as it is drawn: that of records without their drift. @param {number} computed */
@@ -170,7 +179,7 @@ export class Scene {
     let hatch = `M0 ${floor}H${width}`;
     for (let x = (((middle % 18) + 18) % 18) - 18; x < width + 18; x += 18) hatch += `M${(x + 9).toFixed(1)} ${floor + 3}l-9 11`;
     put(this.hatch, {d: hatch});
-    put(this.scaleText, {x: width - 10, y: floor + this.below - 7});
-    this.scaleText.textContent = this.below < 34 ? "" : `grid ${short(step)} m`;
+    put(this.scaleText, {x: width - 10, y: this.below < 34 ? floor - 7 : floor + this.below - 7});
+    this.scaleText.textContent = `${this.enlarged > 1 ? `rotation drawn ${short(this.enlarged)} times larger, ` : ""}grid ${short(step)} m`;
   }
 }

@@ -31,7 +31,7 @@ export function reasons({moments, overturned, uplift, given, peak, body, impacts
   if (given.tilt) list.push({time: 0, words: `It is let go at a tilt of ${short((100 * Math.abs(given.tilt)) / alpha, 3)} % of its balance.`});
   if (!overturned) {
     const top = found("peak"), rest = found("rest");
-    if (top && !given.tilt) list.push({time: top.time, words: `It turns the most: ${fixed((100 * peak) / alpha, 1)} % of the way to its balance.`});
+    if (top && !given.tilt) list.push({time: top.time, words: `It turns the most: ${short((100 * peak) / alpha)} % of the way to its balance.`});
     if (rest) list.push({time: rest.time, words: given.threshold === null
       ? `It rests again. ${impacts} impacts were computed one by one; the others follow in a time that is proven to be finite.` : `It rests again after ${impacts} impacts, because it is slower than the threshold.`});
     return list;

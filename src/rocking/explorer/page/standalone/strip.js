@@ -19,7 +19,7 @@ export class Strip {
   constructor(page) {
     this.page = page;
     this.width = this.height = this.span = this.from = this.unit = this.upper = this.middle = this.tall = this.knobTime = this.most = 0;
-    this.sign = 1;
+    this.sign = this.share = 1;
     this.held = false;
     /** @type {SVGSVGElement} */
     this.svg = one("strip");
@@ -47,12 +47,12 @@ export class Strip {
     this.page.rewind();
     this.held = true;
     const {given} = this.page;
-    return {x: event.clientX, y: event.clientY, given, length: isRecord(given.motion) ? 1 : lengthOf(given), time: this.knobTime};
+    return {x: event.clientX, y: event.clientY, given, share: this.share, length: isRecord(given.motion) ? 1 : lengthOf(given), time: this.knobTime};
   }
 
   /** @param {PointerEvent} event @param {any} held */
   reshape(event, held) {
-    const {given} = held, amplitude = given.amplitude + ((held.y - event.clientY) / this.unit) * this.sign;
+    const {given} = held, amplitude = given.amplitude + ((held.y - event.clientY) / this.unit / held.share) * this.sign;
     if (isRecord(given.motion)) { this.page.change({amplitude}); return; }
     const time = Math.max(held.time * 0.1, held.time + ((event.clientX - held.x) / (this.width - LEFT - RIGHT)) * this.span);
     this.page.change({amplitude, rate: rateFor(given, held.length * (held.time > 0 ? time / held.time : 1))});
@@ -85,7 +85,8 @@ export class Strip {
     const {shown, given} = this.page;
     if (!this.width || !shown) return;
     const {times, rotation, ground: {times: corners, acceleration}} = shown.picture, alpha = Math.max(...shown.body.sides.map((/** @type {any} */ side) => side.alpha));
-    const span = shown.overturned ? 1.35 : 1.15, visible = (/** @type {number} */ each) => Math.max(-span, Math.min(span, each));
+    const share = shown.peak / alpha, span = shown.overturned ? 1.35 : share > 0.2 || !share ? 1.15 : 1.15 * share, mark = stepOf(span, 1.8); // a small rotation fills the picture
+    const visible = (/** @type {number} */ each) => Math.max(-span, Math.min(span, each));
     const x = times.map((/** @type {number} */ time) => this.x(time));
     const y = (/** @type {number} */ turned) => this.middle - (visible(turned / alpha) / span) * this.tall;
     const stillGround = !shown.shaking.pieces;
@@ -95,7 +96,7 @@ export class Strip {
     put(this.band, {x: LEFT, y: y(plus), width: right - LEFT, height: y(-minus) - y(plus)});
     const {uplift} = shown;
     put(this.limits, {d: `M${LEFT} ${this.upper - uplift * this.unit}H${right}M${LEFT} ${this.upper + uplift * this.unit}H${right}`});
-    this.axis(stillGround, y, plus, minus);
+    this.axis(stillGround, y, span > 1 ? [[plus, "balance"], [-minus, "balance"]] : [1, -1].map((sign) => [sign * mark * alpha, `${short(100 * sign * mark)} %`]));
     let peak = 0;
     acceleration.forEach((/** @type {number} */ each, /** @type {number} */ k) => { if (Math.abs(each) > Math.abs(acceleration[peak])) peak = k; });
     if (!isRecord(given.motion)) { // the first time at which the peak is reached
@@ -104,13 +105,14 @@ export class Strip {
       this.knobTime = given.motion === "rectangular" ? lengthOf(given) : corners[peak];
     } else this.knobTime = corners[peak];
     this.sign = Math.sign(acceleration[peak]) || 1;
-    put(this.knob, {transform: `translate(${this.x(this.knobTime)} ${this.upper - this.sign * given.amplitude * this.unit})`, visibility: stillGround ? "hidden" : "visible"});
+    this.share = isRecord(given.motion) ? Math.abs(acceleration[peak]) / given.amplitude || 1 : 1; // the part that is shown may lack the peak
+    put(this.knob, {transform: `translate(${this.x(this.knobTime)} ${this.upper - this.sign * given.amplitude * this.share * this.unit})`, visibility: stillGround ? "hidden" : "visible"});
     this.moments(shown, y);
     this.follow();
   }
 
-  /** @param {boolean} stillGround @param {(turned: number) => number} y @param {number} plus @param {number} minus */
-  axis(stillGround, y, plus, minus) {
+  /** @param {boolean} stillGround @param {(turned: number) => number} y @param {any[]} turns rotations and their texts */
+  axis(stillGround, y, turns) {
     const text = (/** @type {number} */ x, /** @type {number} */ top, /** @type {string} */ words, anchor = "end", kind = "") => draw("text", {x, y: top, "text-anchor": anchor, class: kind}, [words]);
     const step = stepOf(this.span, Math.max(3, this.width / 110)), first = Math.ceil(this.from / step - 1e-9);
     const ticks = Array.from({length: Math.floor((this.from + this.span) / step + 1e-9) - first + 1}, (_, k) => (first + k) * step);
@@ -120,7 +122,7 @@ export class Strip {
       draw("path", {d: `M${LEFT} ${this.upper}H${right}M${LEFT} ${this.middle}H${right}${ticks.map((each) => `M${this.x(each)} ${foot - 4}v4`).join("")}`}),
       text(LEFT, 11, stillGround ? "the ground is at rest while the block is tilted" : "ground, g", "start"), text(LEFT, TOP + (this.height - TOP - GAP - BOTTOM) * UPPER + 14, "rotation", "start"),
       text(LEFT - 6, this.upper - uplift * this.unit + 4, short(uplift / GRAVITY, 2)), text(LEFT - 6, this.upper + 4, uplift * this.unit > 12 ? "0" : ""),
-      text(LEFT - 6, y(plus) + 4, "balance"), text(LEFT - 6, y(-minus) + 4, "balance"), text(LEFT - 6, this.middle + 4, "0"),
+      ...turns.map(([turned, words]) => text(LEFT - 6, y(turned) + 4, words)), text(LEFT - 6, this.middle + 4, "0"),
       ...ticks.map((each, k) => text(this.x(each), foot + 14, k === ticks.length - 1 ? `${texts[k]} s` : texts[k], "middle")),
     );
   }

@@ -12,7 +12,7 @@ export class Workers {
   constructor() {
     const text = `self.TEXT = ${JSON.stringify(document.getElementById("data")?.textContent)};\n${document.getElementById("core")?.textContent}\nserve();`;
     this.address = URL.createObjectURL(new Blob([text], {type: "text/javascript"}));
-    /** Workers, each with what it computes. @type {{worker: Worker, ready: boolean, doing: Waiting | null}[]} */
+    /** Workers, each with what it computes. @type {{worker: Worker, doing: Waiting | null}[]} */
     this.workers = [];
     /** @type {Waiting[]} */
     this.queue = [];
@@ -51,23 +51,20 @@ export class Workers {
 
   next() {
     while (this.queue.length) {
-      let free = this.workers.find(({doing}) => !doing);
-      if (!free && this.workers.length < this.most) free = this.hire();
+      const free = this.workers.find(({doing}) => !doing) ?? (this.workers.length < this.most ? this.hire() : undefined);
       if (!free) return;
       free.doing = this.queue.shift() ?? null;
-      if (free.ready) free.worker.postMessage({id: 1, job: free.doing?.job});
+      free.worker.postMessage(free.doing?.job);
     }
   }
 
-  /** Start another worker, which says when it is ready. */
+  /** Start another worker. */
   hire() {
     try {
-      const worker = new Worker(this.address), hired = {worker, ready: false, doing: /** @type {Waiting | null} */ (null)};
+      const worker = new Worker(this.address), hired = {worker, doing: /** @type {Waiting | null} */ (null)};
       worker.onerror = () => this.resign();
-      worker.onmessage = ({data: {id, result}}) => {
-        hired.ready = true;
-        if (id !== 1) { worker.postMessage({id: 1, job: hired.doing?.job}); return; }
-        hired.doing?.give(result);
+      worker.onmessage = ({data}) => {
+        hired.doing?.give(data);
         hired.doing = null;
         this.next();
       };
