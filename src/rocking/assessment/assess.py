@@ -265,10 +265,10 @@ def assess(
     motions: Motions,
     *,
     hazard: HazardCurve | None = None,
-    measure: IntensityName | Measure | None = None,
+    measure: IntensityName | Measure = "pga",
     levels: int | ArrayLike = 20,
     friction: Friction | None = None,
-    polarity: Polarity = "both",
+    polarity: Polarity = "+",
     clusters: ArrayLike | None = None,
     model: Model = "nonlinear",
     confidence: float = 0.9,
@@ -290,15 +290,16 @@ def assess(
         Ground motions.
     hazard : HazardCurve, optional
         Hazard curve of the site, for annual rates.
-    measure : str or Measure, optional
-        Intensity measure, as for `fragility`. By default of the hazard curve, or else PGA.
+    measure : str or Measure
+        Intensity measure, as for `fragility`, which must be that of the hazard curve.
     levels : int or array_like
         Number of levels for each object, from below its first overturning until 90 % of the motions overturn it, or
         levels for all objects (SI units).
     friction : float or pair, optional
         Coefficient of friction of objects without this label. By default objects do not slide.
     polarity : {"+", "-", "both"}
-        Original motions, reversed motions, or both. A symmetric block responds equally to both, which count once.
+        Original motions, reversed motions, or both (as in the command). A symmetric block responds equally to both,
+        which count once.
     clusters, model, confidence : optional
         As for `fragility`.
     years : float
@@ -338,7 +339,9 @@ def assess(
     checks.fraction(confidence, "confidence", OptionError)
     checks.positive(years, "years", OptionError)
     checks.integer(samples, "samples", OptionError, 2)
-    intensity = _choose_measure(measure, hazard)
+    intensity = Measure.parse(measure)
+    if hazard is not None:
+        check_measure(hazard, intensity)
     if isinstance(levels, int):
         checks.integer(levels, "levels", OptionError, 2)
     failed = dict(failures)
@@ -363,14 +366,6 @@ def assess(
     ranked = [objects[k] for k in order]
     data = _create_dataset(ranked, usable, study)
     return Assessment(tuple(ranked), usable, intensity, hazard, failed, years, confidence, model, data)
-
-
-def _choose_measure(measure: IntensityName | Measure | None, hazard: HazardCurve | None) -> Measure:
-    """Return the intensity measure: by default of the hazard curve, or else PGA."""
-    chosen = Measure.parse(measure or (Measure("pga") if hazard is None else hazard.measure))
-    if hazard is not None:
-        check_measure(hazard, chosen)
-    return chosen
 
 
 def _select_motions(motions: Mapping[str, Motion], measure: Measure, failed: dict[str, str]) -> dict[str, Motion]:
