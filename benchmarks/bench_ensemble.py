@@ -99,7 +99,7 @@ def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     states = state.new_states(len(blocks), state.TO_THE_END)
     index, factors = np.zeros(len(blocks), dtype=np.int64), np.ones(len(blocks))
     pool = lanes.build_pool(group.grounds, index, factors, records, states, math.inf, 0)
-    lanes.march_blocks(build_settings(blocks, model, scheme, None, record=False), state.new_scratch(), pool)
+    lanes.march_blocks(build_settings(blocks, model, scheme, None, writes_tables=False), state.new_scratch(), pool)
 
 
 def report_analyses(model: Model) -> None:

@@ -383,7 +383,7 @@ def held(*restraints: Any, **options: Any) -> list[Any]:
     """A column and a lopsided body with the same restraints, the latter's smaller as it is lighter."""
 
     def lighter(each: Any) -> Any:
-        names = {field.name for field in dataclasses.fields(each)} - {"offset", "height", "follows"}
+        names = {field.name for field in dataclasses.fields(each)} - {"offset", "height", "moves_with_block"}
         return dataclasses.replace(each, **{name: 0.2 * getattr(each, name) for name in names})
 
     bodies = ((COLUMN, restraints), (LOPSIDED, map(lighter, restraints)))
@@ -396,7 +396,8 @@ HELD: Final = {
     "tendon": held(rocking.Tendon(2e5, prestress=2e3)),
     "yielding": held(rocking.Tendon(2e5, prestress=2e3, strength=2e4)),
     "thrust": held(rocking.Thrust(500.0, height=1.5)),
-    "load": held(rocking.Load(500.0, height=2.0)) + held(rocking.Load(500.0, height=2.0, offset=0.05, follows=False)),
+    "load": held(rocking.Load(500.0, height=2.0))
+    + held(rocking.Load(500.0, height=2.0, offset=0.05, moves_with_block=False)),
     "several": held(rocking.Tendon(1e5, prestress=1e3, offset=0.05), rocking.Damper(200.0), rocking.Spring(500.0))
     + held(rocking.Tendon(1e5, prestress=1e3, strength=8e3), rocking.Damper(200.0), one_sided=True, restitution=0.5),
 }  # fmt: skip
@@ -545,7 +546,7 @@ def measures_of_records() -> Iterator[Item]:
     motions.append(motions[0].processed(trim=(10.0, 30.0), baseline=1, band_pass=(0.1, 20.0)))
     motions.append(record().processed(resample=0.02).scaled_to(3.0, "pgv"))
     motions.append(record().rotated(record("el-centro-meloland-360"), 30.0, recorded=(270.0, 0.0)))
-    motions.append(record().floor(0.3))
+    motions.append(record().on_floor(0.3))
     for motion in motions:
         yield motion.name, [motion.measures((0.3, 1.0, 3.0)), motion.significant_duration(), motion.history]
         yield "spectrum", motion.spectral_acceleration([0.05, 0.2, 0.7, 2.0], 0.02)
@@ -893,7 +894,7 @@ def tables_of_responses() -> Iterator[Item]:
 
 @group(digits=6)
 def surveys() -> Iterator[Item]:
-    found = rocking.survey(STATUE, {"one": record(), "two": lobes(4.0, 0.8)}, friction=0.4, **QUIET)
+    found = rocking.survey(STATUE, {"one": record(), "two": lobes(4.0, 0.8)}, available_friction=0.4, **QUIET)
     yield from of_result(found)
 
 

@@ -81,7 +81,7 @@ def rules_for(
     rest_rule: int = state.RestRule.CERTIFIED,
     tolerance: float = 1e-12,
     stop: float = math.inf,
-    record: bool = True,
+    writes_tables: bool = True,
 ) -> Record:
     return state.new_record(
         state.SETTINGS,
@@ -90,7 +90,7 @@ def rules_for(
         tolerance=tolerance,
         stop=stop,
         no_end_time=stop == math.inf,
-        record=record,
+        writes_tables=writes_tables,
     )
 
 

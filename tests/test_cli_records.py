@@ -361,12 +361,12 @@ def test_notes_go_to_those_who_want_them(capsys):
 
 @pytest.mark.thorough
 def test_a_coefficient_of_friction_is_put_to_the_test(run):
-    out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--friction", 0.24)[1]
+    out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--available-friction", 0.24)[1]
     assert re.search(r"friction 0.24 +is not enough: the block slides, first at 23\d\.\d{4} s", out)
-    out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--friction", 0.3)[1]
+    out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--available-friction", 0.3)[1]
     assert re.search(r"friction 0.3 +is enough: the block does not slide", out)
     both = "ridgecrest-clc-090", "el-centro-meloland-270"
-    out = run("simulate", *both, "--width", 0.24, "--height", 1.1, "--friction", 0.24, "--json")[1]
+    out = run("simulate", *both, "--width", 0.24, "--height", 1.1, "--available-friction", 0.24, "--json")[1]
     times = [row["sliding_time_s"] for row in json.loads(out)["records"]]
     assert 230.0 < times[0] < 240.0
-    assert run("simulate", both[0], "--width", 0.24, "--height", 1.1, "--friction", -1)[0] == 2
+    assert run("simulate", both[0], "--width", 0.24, "--height", 1.1, "--available-friction", -1)[0] == 2

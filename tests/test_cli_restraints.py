@@ -28,8 +28,8 @@ FACADE = ["--one-sided", "--thrust", "force=500,height=3"]
             RestrainedBlock(BLOCK, Spring(1e3), Damper(50.0), lean=-math.radians(1.0)),
         ),
         (
-            ["--load", "mass=250,height=3,follows=no,offset=0.05", "--load", "mass=100,height=4"],
-            RestrainedBlock(BLOCK, Load(250.0, 3.0, 0.05, follows=False), Load(100.0, 4.0)),
+            ["--load", "mass=250,height=3,moves_with_block=no,offset=0.05", "--load", "mass=100,height=4"],
+            RestrainedBlock(BLOCK, Load(250.0, 3.0, 0.05, moves_with_block=False), Load(100.0, 4.0)),
         ),
     ],
     ids=["facade", "wall", "tendons", "couples", "loads"],

@@ -47,7 +47,7 @@ simulate {P} {W} --tendon stiffnes=1 | --tendon has no stiffnes; did you mean st
 simulate {P} {W} --tendon prestress=1 | --tendon also requires stiffness
 simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon must be NAME=VALUE pairs separated by commas
 simulate {P} {W} --tendon stiffness=-1 | --tendon: stiffness of a tendon must be at least 0 N/m, not -1
-simulate {P} {W} --load mass=1,height=2,follows=maybe | --load must contain follows=yes or follows=no; got 'maybe'
+simulate {P} {W} --load mass=1,height=2,moves_with_block=so | moves_with_block=yes or moves_with_block=no; got 'so'
 simulate {P} {W} --lean 40deg | --lean must be between -0.1244 and 0.1244 rad
 spectrum {R} --p 1 | a spectrum requires --alpha, or the --ensemble of a calibration
 spectrum {R} --alpha 0.2 | give either --p

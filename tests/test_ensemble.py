@@ -106,7 +106,7 @@ def test_the_result_can_be_written_and_says_what_it_is(records, tmp_path):
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        ({"levels": 1.0, "measure": "pga_ratio"}, "measure must be one of factor, pga, pgv, sa"),
+        ({"levels": 1.0, "measure": "pga_ratio"}, "measure must be one of factor, pga, pgv, pgd, sa"),
         ({"levels": 1.0, "measure": "sa"}, r"use rocking\.Measure\(.sa., period=1\.0\)"),
         ({"measure": "pga"}, "levels"),
         ({"polarity": "up"}, "polarity"),

@@ -483,7 +483,7 @@ def test_what_cannot_be_told_is_left_out_with_its_reason():
     assert "2 motions cannot tell how far motions differ; give 3 or more" in two.summary()
     assert "0 to infinity" in two.summary()
     assert math.isnan(two.curves[0].goodness.p_value)
-    assert "no p of fit" in two.summary()
+    assert "no p-value of the fit" in two.summary()
     assert "one polarity only" in two.summary()
     assert two.to_dict()["notes"] == list(two.notes)
     assert (two.curves[0].median_interval, two.curves[0].dispersion_interval) == ((0.0, math.inf), (0.0, math.inf))

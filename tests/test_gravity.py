@@ -16,7 +16,7 @@ BODIES = {
     "spring": lambda k: (Spring(4e3 * k * k),),
     "damper": lambda k: (Damper(3e3 * k * k),),
     "thrust": lambda k: (Thrust(900.0 * k, height=3.0 * k),),
-    "load": lambda k: (Load(400.0, 3.0 * k, offset=0.1 * k, follows=False),),
+    "load": lambda k: (Load(400.0, 3.0 * k, offset=0.1 * k, moves_with_block=False),),
     "load that follows": lambda k: (Load(400.0, 3.0 * k, offset=0.1 * k),),
 }
 

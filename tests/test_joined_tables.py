@@ -78,7 +78,7 @@ def test_the_tables_of_all_commands_join_by_record_and_by_motion(run, folder, tm
 
 def test_a_table_of_many_records_names_block_friction_and_what_was_skipped(run, folder, tmp_path):
     out = tmp_path / "out"
-    code, text, _ = run("simulate", folder, *SIZES, "--keep-going", "--friction", "0.3", "--out", out)
+    code, text, _ = run("simulate", folder, *SIZES, "--keep-going", "--available-friction", "0.3", "--out", out)
     assert code == 0
     assert "1 record skipped" in text
     summary = table(out / "summary.csv").set_index("record")
@@ -86,11 +86,11 @@ def test_a_table_of_many_records_names_block_friction_and_what_was_skipped(run, 
     assert skipped.verdict.startswith("skipped: ")
     assert pd.isna(skipped.overturned) and pd.isna(skipped.rests)
     block = rocking.Block(width=0.24, height=1.1)
-    assert (read.block, read.friction) == ("rectangular block, 0.24 m x 1.1 m", 0.3)
+    assert (read.block, read.available_friction) == ("rectangular block, 0.24 m x 1.1 m", 0.3)
     assert (read.p_rad_s, read.alpha_rad, read.restitution) == pytest.approx((block.p, block.alpha, block.restitution))
     counts = table(out / "summary.csv", dtype=str).set_index("record")
     assert counts.rests[str(folder / "NIS000.AT2")].isdecimal()
-    assert json.loads((out / "summary.json").read_text())["friction"] == 0.3
+    assert json.loads((out / "summary.json").read_text())["available_friction"] == 0.3
     pytest.importorskip("openpyxl")
     sheet = pd.read_excel(out / "summary.xlsx", index_col="record")
     assert [*sheet.columns] == [*summary.columns]

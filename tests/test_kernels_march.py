@@ -84,7 +84,7 @@ def run(
 ) -> Run:
     if block is None:
         block = rocking_block(p, alpha, e, nonlinear=nonlinear, limit=limit)
-    rules = rules_for(nonlinear=nonlinear, rest_rule=rest_rule, stop=stop, record=keep)
+    rules = rules_for(nonlinear=nonlinear, rest_rule=rest_rule, stop=stop, writes_tables=keep)
     table, at, scratch = state.new_table(rows), started(rotation, velocity), new_scratch()
     ending = march(ground, block, rules, table, scratch, at)
     while ending == state.Ending.FULL and len(table) < 200_000:

@@ -49,8 +49,10 @@ def turning(body, response):
         if linear:
             own = of["alpha"] - u + of["sine"] * (math.sin(of["alpha"]) - math.cos(of["alpha"]) * u)
             own += of["cosine"] * (math.cos(of["alpha"]) + math.sin(of["alpha"]) * u)
-        stretch = of["opening"] * (u if linear else 2.0 * math.sin(0.5 * u)) - plastic - of["slack"]
-        pull = of["prestress"] + of["stiffness"] * min(max(stretch, 0.0), of["yields"] - of["slack"])
+        stretch = of["lever_arm"] * (u if linear else 2.0 * math.sin(0.5 * u)) - plastic - of["slack_elongation"]
+        pull = of["prestress"] + of["stiffness"] * min(
+            max(stretch, 0.0), of["yield_elongation"] - of["slack_elongation"]
+        )
         return of["p"] ** 2 * (own + pull * (1.0 if linear else math.cos(0.5 * u)) + of["spring"] * u)
 
     return moment

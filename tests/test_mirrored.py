@@ -16,7 +16,7 @@ BODIES = {
     "yielding tendon": lambda way: ((Tendon(1e5, prestress=1e3, strength=2.5e3),), 0.0),
     "spring and damper": lambda way: ((Spring(4e3), Damper(3e3)), 0.0),
     "thrust": lambda way: ((Thrust(900.0 * way, height=3.0),), 0.0),
-    "load": lambda way: ((Load(400.0, 3.0, offset=0.1 * way, follows=False),), 0.0),
+    "load": lambda way: ((Load(400.0, 3.0, offset=0.1 * way, moves_with_block=False),), 0.0),
     "load that follows": lambda way: ((Load(400.0, 3.0, offset=0.1 * way),), 0.0),
 }
 

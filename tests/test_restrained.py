@@ -24,7 +24,7 @@ def test_the_linear_model_is_the_equation_to_first_order(kind):
     _, body, *_ = case(kind, 1, 2)
     body.damper = 0.0
     restraints = [Tendon(*each) for each in body.tendons] + [Thrust(*each) for each in body.thrusts]
-    restraints += [Load(*each, follows=False) for each in body.loads]
+    restraints += [Load(*each, moves_with_block=False) for each in body.loads]
     restraints += [Spring(body.spring)] if body.spring > 0.0 else []
     block = Block.from_pivots(body.distances, body.height, body.gyration, mass=body.mass, gravity=9.81, restitution=0.8)
     ours = RestrainedBlock(block, *restraints, lean=body.lean)
@@ -129,7 +129,7 @@ def test_restraints_stay_where_they_are_on_the_block_when_a_load_that_follows_mo
     block = Block.from_pivots((right, left), up, 0.9, mass=mass)
     carried, thrust, pressing, tendon = (8e2, 3.0, 0.2), (5e2, 2.0, -0.1), (3e2, 2.8, -0.05), (0.0, 4e3, 0.1)
     body = RestrainedBlock(
-        block, Load(*carried), Thrust(*thrust), Load(*pressing, follows=False), Tendon(*tendon), lean=lean
+        block, Load(*carried), Thrust(*thrust), Load(*pressing, moves_with_block=False), Tendon(*tendon), lean=lean
     )
     for sign, pivot, found in zip((1.0, -1.0), (right, -left), body.uplift_thresholds(), strict=True):
 

@@ -122,7 +122,7 @@ def test_a_survey_is_of_walls_too():
 
 
 def test_columns_are_one_where_sides_are_equal_and_two_where_they_differ():
-    assert {"p", "one_sided", "yields"} <= body_coordinates(FACADE.as_bodies()).keys()
+    assert {"p", "one_sided", "yield_elongation"} <= body_coordinates(FACADE.as_bodies()).keys()
     assert not FACADE.as_bodies().is_symmetric
     assert {"alpha_plus", "alpha_minus"} <= body_coordinates(LEANING.as_bodies()).keys()
     oscillator = dynamics.ImpactOscillator(1.0, 0.8).as_bodies()
@@ -149,7 +149,7 @@ def test_what_a_study_of_walls_computes_another_process_resumes_and_reads(tmp_pa
     results = read.results()
     for name in ("overturned", "peak_rotation", "impacts"):
         np.testing.assert_array_equal(results[name].values, whole[name].values)
-    assert {"one_sided_plus", "slack_minus"} <= set(results.coords)
+    assert {"one_sided_plus", "slack_elongation_minus"} <= set(results.coords)
     shares = read.spectrum().data.overturned_share.values
     np.testing.assert_array_equal(shares, whole.overturned.mean(["motion", "polarity"]).values)
 

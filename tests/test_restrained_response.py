@@ -19,7 +19,7 @@ def body_of(which, lean=0.0):
     restraints = {
         "tendon": [Tendon(2e5, prestress=4e3, offset=0.05)],
         "thrust": [Thrust(3e2, height=2.0, offset=0.1)],
-        "load": [Load(3e2, height=3.0, offset=-0.05, follows=False)],
+        "load": [Load(3e2, height=3.0, offset=-0.05, moves_with_block=False)],
         "couples": [Spring(1e3), Damper(4e2)],
     }
     chosen = [each for name, some in restraints.items() for each in some if which in (name, "all")]
@@ -71,7 +71,9 @@ def test_forces_of_the_ground_and_of_restraints_turn_the_block_about_its_centre_
 
 
 def test_a_block_that_restraints_hold_at_rest_presses_on_the_ground_with_all_their_forces():
-    body = RestrainedBlock(COLUMN, Tendon(2e5, prestress=4e3), Thrust(3e2, height=1.0), Load(3e2, 2.0, follows=False))
+    body = RestrainedBlock(
+        COLUMN, Tendon(2e5, prestress=4e3), Thrust(3e2, height=1.0), Load(3e2, 2.0, moves_with_block=False)
+    )
     response = rocking.simulate(body, rocking.pulses.one_sine(0.1, 1.0))
     assert len(response.events) == 0
     assert response.normal_force(0.0) == pytest.approx(1.0 + (4e3 + 3e2 * G) / (MASS * G))

@@ -257,7 +257,7 @@ HEADERS = {
     (
         "ResistanceRose",
         "rose",
-    ): "azimuth_deg,acceleration_g,alpha_rad,p_rad_s,restitution,radius_m,rise_m,coupling,aside_m,gap_m",
+    ): "azimuth_deg,acceleration_g,alpha_rad,p_rad_s,restitution,radius_m,rise_m,coupling,lateral_offset_m,gap_m",
     ("ResistanceRose", "support"): "east_m,north_m",
     ("ResponseRose", "responses"): "pair,level,azimuth_deg,overturned,peak_over_slenderness",
     ("ResponseRose", "shares"): "level,azimuth_deg,overturned_share",

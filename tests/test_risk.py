@@ -244,7 +244,7 @@ DAMAGED = "#,,imt='{}',investigation_time={}\nlon,lat,poe-{},poe-0.2\n0,0,0.5,0.
         *[("pga_g,annual_rate\n0.1,0.9\n0.2,0.5\n", {"site": site}, "site") for site in (1, -1, math.nan, "x")],
         ("pga_g,annual_rate\n0.1,0.9\n0.2,0.5\n", {"period": 1.0}, "period applies only .* of this curve is pga"),
         ("pga_g,annual_rate\n0.1,inf\n0.2,0.1\n", {}, "got inf at point 1"),
-        ("#,\"investigation_time=50.0, imt='IA'\"\nlon,lat,poe-0.1\n1,2,0.5\n", {}, "IA"),
+        ("#,\"investigation_time=50.0, imt='MMI'\"\nlon,lat,poe-0.1\n1,2,0.5\n", {}, "MMI"),
         (DAMAGED.format("SA(x)", 50.0, 0.1), {}, "could not convert"),
         (DAMAGED.format("SA", 50.0, 0.1), {}, "could not convert"),
         (DAMAGED.format("PGA", 50.0, "0.."), {}, "could not convert"),
@@ -265,7 +265,7 @@ def test_a_missing_file_and_another_measure_are_refused(tmp_path: Path) -> None:
         HazardCurve.read(tmp_path / "none.csv")
     with pytest.raises(OptionError, match="must have the same measure"):
         fragility_with(3.0, 0.4).annual_rate(HazardCurve([0.1, 1.0], [1e-2, 1e-3], Measure("pgv")))
-    with pytest.raises(OptionError, match="do not depend on a block"):
+    with pytest.raises(OptionError, match="does not depend on a block"):
         HazardCurve([0.1, 1.0], [1e-2, 1e-3], "pga_ratio")
 
 

@@ -10,7 +10,7 @@ BLOCK = rocking.Block.from_pivots((1.0, 1.2), 3.5, 2.3, mass=2e3, restitution=(0
 
 BODIES = {
     "free": RestrainedBlock(BLOCK),
-    "load": RestrainedBlock(BLOCK, Load(400.0, 3.0, offset=0.1, follows=False)),
+    "load": RestrainedBlock(BLOCK, Load(400.0, 3.0, offset=0.1, moves_with_block=False)),
     "load that follows": RestrainedBlock(BLOCK, Load(400.0, 3.0, offset=0.1)),
     "prestressed tendon": RestrainedBlock(BLOCK, Tendon(1e5, prestress=2e3, offset=-0.1)),
     "yielding tendon": RestrainedBlock(BLOCK, Tendon(1e5, prestress=1e3, strength=2.5e3)),
@@ -20,7 +20,12 @@ BODIES = {
     "lean": RestrainedBlock(BLOCK, lean=0.03),
     "falling restitution": RestrainedBlock(BLOCK, restitution=Restitution(0.85, 0.3, slope=0.4)),
     "everything": RestrainedBlock(
-        BLOCK, Load(200.0, 3.0, follows=False), Tendon(3e4, prestress=1e3), Spring(1e3), Damper(800.0), lean=0.01
+        BLOCK,
+        Load(200.0, 3.0, moves_with_block=False),
+        Tendon(3e4, prestress=1e3),
+        Spring(1e3),
+        Damper(800.0),
+        lean=0.01,
     ),
     "one side": rocking.Block.one_sided(Spring(1e3), width=1.2, height=4.0, mass=2e3, restitution=0.5),
 }

@@ -233,7 +233,7 @@ def bracket_by_kernel(case: Sequence) -> tuple[float, float] | None:
     """The proven bracket on the end of the impacts, from the time of the first on."""
     bodies = case.block.as_bodies()
     setup = Setup(bodies, case.model, Certified(), friction=resolve_friction(case.friction))
-    run = setup.prepare(None, record=True)
+    run = setup.prepare(None, writes_tables=True)
     start, table = run.states[0], state.new_table(4096)
     start["side"], start["v"], start["direction"] = case.side, case.speed, case.direction
     start["slip_rate"], start["peak"], start["budget"] = 2.0 * case.direction, math.inf, 100_000
@@ -309,6 +309,34 @@ def test_derivatives_through_a_slip_are_refused() -> None:
     with pytest.raises(OptionError, match="slips"):
         _ = response.sensitivity
     assert response.slips and not response.ambiguous
+
+
+def test_a_block_that_only_slides_is_not_ambiguous() -> None:
+    """Each slide starts on the cone of friction, where rounding may neither end nor repeat it."""
+    record = rocking.records.load("ridgecrest-clc-090").scaled(1.5)
+    for mu in (0.2, 0.15):
+        response = rocking.simulate(rocking.Block(width=0.5, height=1.0), record, friction=mu)
+        assert response.peak_rotation == 0.0 and len(response.events) > 100
+        starts, ends = response.events["time"].reshape(-1, 2).T
+        assert np.all(ends - starts > 1e-6)
+        assert not response.ambiguous
+        assert response.perturbed(1e-10, 3).event_spreads.max() < 1e-9
+
+
+def test_a_block_that_slips_on_the_brink_of_overturning_is_ambiguous() -> None:
+    block = rocking.Block(width=0.5, height=1.5)
+
+    def respond(amplitude: float) -> rocking.Response:
+        motion = rocking.pulses.one_sine(amplitude=amplitude, frequency=1.0)
+        return rocking.simulate(block, motion, friction=0.3, initial_rotation=0.05)
+
+    low, high = 3.5, 4.0
+    assert not respond(low).overturned and respond(high).overturned
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (low, middle) if respond(middle).overturned else (middle, high)
+    assert respond(low).slips and respond(high).slips
+    assert "touch" in respond(high).ambiguities and respond(low).ambiguous
+    assert not respond(low * (1.0 - 1e-9)).ambiguous
 
 
 def test_many_blocks_slip_as_single_ones() -> None:
@@ -389,7 +417,7 @@ def test_outputs_contain_the_slip(tmp_path: Any, run: Any) -> None:
     record = tmp_path / "record.csv"
     record.write_text("\n".join(f"{5.0 * math.sin(4.0 * math.pi * 0.01 * k)}" for k in range(51)))
     sizes = ("--width", 0.5, "--height", 1.8, "--restitution", 0.85)
-    code, text, _ = run("simulate", record, "--dt", 0.01, "--units", "m/s2", *sizes, "--sliding", "0.3,0.28")
+    code, text, _ = run("simulate", record, "--dt", 0.01, "--units", "m/s2", *sizes, "--friction", "0.3,0.28")
     assert code == 0 and "slide-rock" in text and "mm at most" in text
 
 

@@ -65,8 +65,9 @@ def test_values_of_another_program(shared: Path) -> None:
             entry = expected[name]
             if name == "peak_time" and expected["peak_rotation"]["value"] == 0.0:
                 continue
-            if name == "first_slide" and response.rests_by_rounding:
-                continue  # the other program ends a sequence of alternating slip and stick with a slide of 1e-11 m/s
+            if name == "first_slide" and value is None and response.rests_by_rounding:
+                # The other program ends alternating slip and stick with a slide of 1e-11 m/s, this one with a rest.
+                value = first(response, "rest") if entry is not None else None
             if entry is None:
                 assert value is None, (case["id"], name)
                 continue

@@ -450,7 +450,7 @@ def test_what_planar_rocking_leaves_out_is_measured():
     assert even.data.coupling.values[0] == pytest.approx(0.0, abs=1e-12)
     # At 30 deg the corner at (0.3, 0.2) is the pivot: on the right of the direction, and the other one on its left.
     aside = abs(0.3 * math.cos(math.radians(30.0)) - 0.2 * math.sin(math.radians(30.0)))
-    np.testing.assert_allclose(even.data.aside.values, [0.0, aside], atol=1e-12)
+    np.testing.assert_allclose(even.data.lateral_offset.values, [0.0, aside], atol=1e-12)
     np.testing.assert_allclose(even.data.gap.values, [0.0, 2.0 * aside], atol=1e-12)
 
 

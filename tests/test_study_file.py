@@ -52,7 +52,7 @@ height = 3
 [[blocks.loads]]
 mass = 100
 height = 4
-follows = false
+moves_with_block = false
 
 [[blocks.tendons]]
 stiffness = 1e5
@@ -164,7 +164,7 @@ one_sided = true -> one_sided = 1 | 5 | one_sided must be true or false
 force = [300, 600] -> forze = 300 | 11 | [[blocks.thrusts]] has no forze; did you mean force
 force = [300, 600] -> force = 9e5 | 1 | does not stand
 force = [300, 600]\n ->  | 10 | [[blocks.thrusts]] also requires force
-follows = false -> follows = "no" | 17 | follows must be a number
+moves_with_block = false -> moves_with_block = "no" | 17 | moves_with_block must be a number
 offset = -0.1 -> offset = -0.5 | 1 | is beyond the pivot
 """
 
@@ -363,7 +363,7 @@ def test_a_file_may_describe_walls_and_restraints(walls):
         rocking.RestrainedBlock(
             rocking.Block(width=width, height=4.0, mass=5e3, restitution=0.4),
             rocking.Spring(2e3), rocking.Tendon(1e5, offset=-0.1), rocking.Thrust(force, 3.0),
-            rocking.Load(100.0, 4.0, follows=False), one_sided=True, lean=np.deg2rad(lean), restitution=0.4,
+            rocking.Load(100.0, 4.0, moves_with_block=False), one_sided=True, lean=np.deg2rad(lean), restitution=0.4,
         )
         for width in (0.5, 0.6) for lean in (0.0, 0.5) for force in (300.0, 600.0)
     ]  # fmt: skip

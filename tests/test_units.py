@@ -70,6 +70,8 @@ HEADED = {
     "pga_g": ("PGA (g)", 1.0 / G), "pga_percent_g": ("PGA (%g)", 100.0 / G), "pga_m_s2": ("PGA (m/s²)", 1.0),
     "pgv_m_s": ("PGV (m/s)", 1.0), "pgv_cm_s": ("PGV (cm/s)", 100.0),
     "sa_g": ("Sa (g)", 1.0 / G), "sa_percent_g": ("Sa (% g)", 100.0 / G), "sa_m_s2": ("SA [m/s^2]", 1.0),
+    "pgd_m": ("PGD (m)", 1.0), "pgd_cm": ("PGD [cm]", 100.0), "arias_m_s": ("Arias (m/s)", 1.0),
+    "cav_m_s": ("CAV (m/s)", 1.0), "cav_g_s": ("CAV (g s)", 1.0 / G),
 }  # fmt: skip
 
 
@@ -88,7 +90,9 @@ def test_an_intensity_is_the_same_in_every_column_of_hazard_curves_and_outcomes(
         assert observed["measure"] == measure and observed["intensity"] == pytest.approx(levels, rel=1e-14)
 
 
-@pytest.mark.parametrize(("kind", "factor"), [("PGA", G), ("PGV", 0.01), ("SA(0.3)", G)])
+@pytest.mark.parametrize(
+    ("kind", "factor"), [("PGA", G), ("PGV", 0.01), ("SA(0.3)", G), ("PGD", 0.01), ("IA", 1.0), ("CAV", G)]
+)
 def test_an_intensity_of_openquake_is_in_its_own_units(kind, factor, tmp_path):
     path = tmp_path / "hazard.csv"
     path.write_text(
@@ -96,7 +100,9 @@ def test_an_intensity_of_openquake_is_in_its_own_units(kind, factor, tmp_path):
         "lon,lat,depth,poe-0.1,poe-0.2,poe-0.3\n10.0,45.0,0.0,0.5,0.3,0.2\n"
     )
     hazard = HazardCurve.read(path)
-    assert hazard.measure == (Measure("sa", 0.3) if kind.startswith("SA") else Measure(kind.lower()))
+    assert hazard.measure == (
+        Measure("sa", 0.3) if kind.startswith("SA") else Measure({"IA": "arias"}.get(kind, kind.lower()))
+    )
     assert hazard.intensity == pytest.approx(factor * np.array([0.1, 0.2, 0.3]), rel=1e-14)
 
 

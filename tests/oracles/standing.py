@@ -119,7 +119,11 @@ def _pushed(rng: Drawn, held: Held, weight: float, size: float) -> Made:
     least = min(held.distances)
     held.thrusts.append((rng.uniform(-0.3, 0.3) * weight * least / size, rng.uniform(0.5, 2.0) * size, 0.0))
     held.loads.append((held.mass * rng.uniform(0.05, 1.0), 2.0 * size, rng.uniform(-0.3, 0.3) * least))
-    return [Thrust(*held.thrusts[0]), Load(*held.loads[0], follows=False)], None, rng.uniform(-0.2, 0.2) * least / size
+    return (
+        [Thrust(*held.thrusts[0]), Load(*held.loads[0], moves_with_block=False)],
+        None,
+        rng.uniform(-0.2, 0.2) * least / size,
+    )
 
 
 def _yielding(rng: Drawn, held: Held, weight: float, size: float) -> Made:
@@ -348,7 +352,7 @@ def case(kind: str, seed: int, number: int) -> tuple[RestrainedBlock, Held, Moti
         up = rocking.pulses.sine(rng.uniform(0.5, 6.0), frequency * rng.uniform(1.0, 3.0), cycles=cycles)
         motion = motion.with_vertical(up)
     tendon = ours._terms[0]
-    near = min(0.3 * min(*ours.balance, 0.5), 0.1, 0.8 * tendon.yields / max(tendon.opening, 1e-9))
+    near = min(0.3 * min(*ours.balance, 0.5), 0.1, 0.8 * tendon.yield_elongation / max(tendon.lever_arm, 1e-9))
     return ours, held, motion, 1.2 * motion.end + 0.5, near if number % 2 else 0.0
 
 

@@ -374,10 +374,20 @@ def convert_to_openquake_measure(measure: Measure, block: Body | None, model: Mo
     if measure.has_block_units and block is None:
         raise OptionError(f"{measure.name} is in units of the block; give {{}} to convert it to PGA or PGV", "block")
     unit = 1.0 if block is None else float(compute_units(block.as_bodies(), measure, model)[0])
-    if measure.motion_measure_name == "pgv":
-        return "PGV", 100.0 * unit
+    name = measure.motion_measure_name
+    factors = {
+        "pgv": ("PGV", 100.0),
+        "pgd": ("PGD", 100.0),
+        "arias": ("IA", 1.0),
+        "cav": ("CAV", 1.0 / STANDARD_GRAVITY),
+    }
+    if name in factors:
+        return factors[name][0], factors[name][1] * unit
+    if name not in ("pga", "sa"):
+        known = ", ".join(["pga", "sa", *factors])
+        raise OptionError(f"OpenQuake requires one of the measures {known}; got {name}", "measure", value=name)
     if (damping := measure.damping) != DAMPING:
         message = f"the {{}} of a spectral acceleration must be {DAMPING:g} of critical for OpenQuake; got {damping:g}"
         correction = "fit the fragility against a measure with this damping"
         raise OptionError(f"{message}; {correction}", "damping", value=damping)
-    return "PGA" if measure.motion_measure_name == "pga" else f"SA({measure.period:g})", unit / STANDARD_GRAVITY
+    return "PGA" if name == "pga" else f"SA({measure.period:g})", unit / STANDARD_GRAVITY

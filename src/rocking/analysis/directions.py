@@ -62,9 +62,9 @@ def response_rose(
         mirrored.
     levels : array_like, optional
         Levels to which every pair is scaled. By default pairs are not scaled.
-    measure : {"factor", "pga", "pgv"} or Measure
-        Measure of the levels, in SI units: geometric mean of both components as recorded. Both are scaled by one
-        factor.
+    measure : str or Measure
+        Measure of the levels, in SI units, of the pair as recorded: the geometric mean of both components unless the
+        measure has another component, for example RotD50. Both are scaled by one factor.
     recorded : pair of float, optional
         Azimuths of the first and the second component of every pair. The default is read from the records.
     restitution : float or pair, optional
@@ -124,6 +124,7 @@ def response_rose(
     worst_peak = np.where(overturned.any(axis=2), np.inf, peak.max(axis=2))
     share, share_anywhere = compute_overturned_share(peak), compute_overturned_share(worst_peak)
     dims, unit = ("pair", "level", "azimuth"), scales.attributes["units"]
+    component = scales.attributes.get("component", "geometric mean").replace("_", " ")
     peak_meaning = "largest rotation over the smaller slenderness; inf: overturns, NaN: not finished"
     dataset = xr.Dataset(
         {
@@ -134,7 +135,7 @@ def response_rose(
         },
         {
             "pair": [*named_pairs],
-            "level": variable("level", scales.values, "of the geometric mean of both components", unit),
+            "level": variable("level", scales.values, f"of the {component} of both components", unit),
             "azimuth": variable("azimuth", angles, "clockwise from north", "deg"),
         },
         {"description": solid.description, "model": model, "measure": (scales.measure or FACTOR).quantity},
@@ -248,5 +249,9 @@ def _compute_pair_factors(scales: Scales, pair: Pair) -> Any:
     """Compute factors that scale the geometric mean of the measures of both components to the levels."""
     if scales.measure is None:
         return scales.values
-    first, second = (scales.measure.require_positive_value(motion, motion.name) for motion in pair)
-    return scales.values / np.sqrt(first * second)
+    measure = scales.measure
+    if measure.component == "own":
+        first, second = (measure.require_positive_value(motion, motion.name) for motion in pair)
+        return measure.find_factor(scales.values, np.sqrt(first * second))
+    first_motion = pair[0].with_orthogonal(pair[1])
+    return measure.find_factor(scales.values, measure.require_positive_value(first_motion, first_motion.name))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -28,7 +28,7 @@ from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.errors import OptionError
-from rocking.motion.scaling import Measure
+from rocking.motion.scaling import ComponentName, IntensityName, Measure
 from rocking.records.named import Motions, list_motions
 
 if TYPE_CHECKING:
@@ -44,6 +44,8 @@ def compare_measures(
     *,
     periods: ArrayLike = (0.5, 1.0, 2.0),
     damping: float = 0.05,
+    also: Sequence[IntensityName | Measure] = (),
+    component: ComponentName = "own",
     model: Model = "nonlinear",
     weights: ArrayLike | None = None,
     clusters: object = None,
@@ -59,6 +61,10 @@ def compare_measures(
         Periods of spectral accelerations, s.
     damping : float
         Fraction of critical damping of the spectral accelerations.
+    also : sequence of str or Measure
+        Further measures, for example ``["arias", "cav"]``.
+    component : str
+        Component of all measures but those in `also` that state another, as for `Measure`.
     model : {"nonlinear", "linear"}
         Equation of motion.
     weights, clusters : optional
@@ -69,7 +75,7 @@ def compare_measures(
     Returns
     -------
     MeasureComparison
-        Comparison of PGA, PGV, each spectral acceleration, and PGA and PGV in a block's own units.
+        Comparison of PGA, PGV, each spectral acceleration, further measures, and PGA and PGV in a block's own units.
 
     Raises
     ------
@@ -110,15 +116,25 @@ def compare_measures(
         raise OptionError("{} must contain at least two motions for a comparison of measures; got one", "motions")
     period_values = checks.positive_numbers(periods, "periods", OptionError)
     spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
-    measures = [Measure("pga"), Measure("pgv"), *spectral_measures, Measure("pga_ratio"), Measure("pgv_ratio")]
+    further = [Measure.parse(name) for name in checks.items(also, "also", OptionError)]
+    measures = [
+        Measure("pga"),
+        Measure("pgv"),
+        *spectral_measures,
+        *further,
+        Measure("pga_ratio"),
+        Measure("pgv_ratio"),
+    ]
+    measures = [replace(each, component=component) if each.component == "own" else each for each in measures]
     cluster_numbers = assign_clusters(motions, clusters)
     _check_sample_size(len(np.unique(cluster_numbers)), clusters)
-    analysis = incremental_dynamic_analysis(bodies, motions, measure="pga_ratio", model=model, rtol=rtol)
+    analysis = incremental_dynamic_analysis(bodies, motions, measure=measures[-2], model=model, rtol=rtol)
     levels = analysis.data.overturning_level.transpose("motion", "block").values
     values = [compute_intensities(motions, measure)[:, None] for measure in measures]
     units = [compute_units(bodies, measure, model) for measure in measures]
     factors = levels * units[-2] / values[0]  # on the motions; levels are of pga_ratio
-    intensity = np.array([factors * value / unit for value, unit in zip(values, units, strict=True)])
+    rows = zip(measures, values, units, strict=True)
+    intensity = np.array([factors**measure.exponent * value / unit for measure, value, unit in rows])
     families = assign_families(motions, reversed_too=bodies.is_symmetric)
     is_first = np.isin(np.arange(len(motions)), np.unique(families, return_index=True)[1])
     is_counted = is_first[:, None] & np.isfinite(levels)

@@ -38,6 +38,7 @@ from rocking.analysis.levels import (
     describe_pool,
     describe_sample,
     describe_undecided,
+    find_larger_responses,
     find_single_block,
     normalise_positive_weights,
     simulate_levels,
@@ -141,7 +142,9 @@ class Fragility(Result):
             for curve in self.curves
         ]
         heading = f"{100 * self.curves[0].confidence:g} % between"
-        table = format_table(["limit state", "exceeded", "median", heading, "dispersion", heading, "p of fit"], rows)
+        table = format_table(
+            ["limit state", "exceeded", "median", heading, "dispersion", heading, "p-value of fit"], rows
+        )
         notes = [f"note: {sentence}" for sentence in self.notes]
         return "\n".join([f"{self.description}; intensity: {self.measure.label}", "", table, *notes])
 
@@ -165,9 +168,9 @@ class Fragility(Result):
         ]
         if not independent:
             reason = f"the test takes all outcomes for independent, and those of one {self.source} belong together"
-            notes.append(f"there is no p of fit: {reason}")
+            notes.append(f"no p-value of the fit: {reason}")
         elif self.curves[0].goodness.degrees_of_freedom < 1:
-            notes.append("there is no p of fit: the test needs three groups of outcomes, of five or so each")
+            notes.append("no p-value of the fit: the test needs three groups of outcomes, of five or so each")
         return tuple(notes)
 
     @property
@@ -341,6 +344,7 @@ def fragility(
     polarity: Polarity = "+",
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
+    larger: bool = False,
     confidence: float = 0.9,
 ) -> Fragility:
     """Simulate blocks under motions and fit the probability of exceedance against the intensity.
@@ -352,7 +356,7 @@ def fragility(
         (`Calibration.fragility`).
     motions : optional
         As for `simulate_many`: m motions.
-    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
+    measure : str or Measure
         Intensity measure, as for `incremental_dynamic_analysis`.
     levels : array_like, optional
         Levels to which every motion is scaled (stripes). By default the motions are not scaled (cloud).
@@ -368,7 +372,11 @@ def fragility(
         Weights of the blocks' outcomes, equal by default. Blocks of weight 0 are simulated but not used in the fit.
     clusters : "station" or array_like of labels, shape (m,), optional
         Labels of dependent motions, for intervals. By default only multiples of one another are dependent. "station"
-        combines components of one station and earthquake by their file names.
+        combines components of one station and earthquake by their file names. Components of a pair are always
+        dependent.
+    larger : bool
+        Whether only the larger response counts: of both polarities (if simulated) and both components of each pair.
+        Pairs (`records.load_pairs`) require a measure of the pair, for example ``Measure("pga", component="rotd50")``.
     confidence : float
         Probability of the intervals and bands, between 0 and 1.
 
@@ -431,18 +439,22 @@ def fragility(
     )
     if weights is not None:
         outcomes["weight"] = trials
+    counted = np.arange(ratio.size)
+    if checks.boolean(larger, "larger", OptionError):
+        counted = find_larger_responses(ratio, motions, measure).ravel()
+        outcomes = outcomes.iloc[counted].reset_index(drop=True)
     # Abandoned simulations and blocks of weight 0 are reported, but excluded from the fit.
-    is_counted = (trials > 0.0) & ~missing.ravel()
-    x, trials, trial_clusters = x[is_counted], trials[is_counted], trial_clusters[is_counted]
+    counted = counted[(trials > 0.0)[counted] & ~missing.ravel()[counted]]
+    x, trials, trial_clusters = x[counted], trials[counted], trial_clusters[counted]
     curves = []
     try:
         for name, limit in states.items():
-            data = x, trials * compute_exceedances(ratio, limit, name).ravel()[is_counted], trials
+            data = x, trials * compute_exceedances(ratio, limit, name).ravel()[counted], trials
             curves.append(fit_curve(name, data, trial_clusters, confidence, measure, limit))
     except FitError as error:
         error.outcomes = outcomes
         raise
-    scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
+    scales = 1.0 if stripes is None else measure.find_factor(stripes[:, None, None] * units, values[:, None])
     factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
     setup = Setup(bodies, model, chattering_scheme(chattering), friction=resolve_friction(friction))
     kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
@@ -450,7 +462,9 @@ def fragility(
     return Fragility(
         curves=tuple(curves),
         measure=measure,
-        description=text + describe_polarities(polarity, is_symmetric=bodies.is_symmetric),
+        description=text
+        + describe_polarities(polarity, is_symmetric=bodies.is_symmetric)
+        + ", the larger response" * larger,
         block=find_single_block(blocks),
         model=model,
         outcomes=outcomes,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,7 +19,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Result
 from rocking.core.tables import format_table, read_csv_rows
 from rocking.errors import OptionError
-from rocking.motion.scaling import IntensityName, Measure, check_intensities
+from rocking.motion.scaling import ComponentName, IntensityName, Measure, check_intensities
 
 if TYPE_CHECKING:
     from rocking.plot.curves import HazardLine
@@ -34,6 +34,11 @@ HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
     "sa_g": ("sa", STANDARD_GRAVITY),
     "sa_percent_g": ("sa", 0.01 * STANDARD_GRAVITY),
     "sa_m_s2": ("sa", 1.0),
+    "pgd_m": ("pgd", 1.0),
+    "pgd_cm": ("pgd", 0.01),
+    "arias_m_s": ("arias", 1.0),
+    "cav_m_s": ("cav", 1.0),
+    "cav_g_s": ("cav", STANDARD_GRAVITY),
 }
 
 #: OpenQuake's names of intensities: measure and factor to SI units.
@@ -41,6 +46,9 @@ _OPENQUAKE_MEASURES: Final[dict[str, tuple[IntensityName, float]]] = {
     "PGA": ("pga", STANDARD_GRAVITY),
     "PGV": ("pgv", 0.01),
     "SA": ("sa", STANDARD_GRAVITY),
+    "PGD": ("pgd", 0.01),
+    "IA": ("arias", 1.0),
+    "CAV": ("cav", STANDARD_GRAVITY),
 }
 
 
@@ -61,7 +69,7 @@ class HazardCurve(Result):
     rate : array_like, shape (n,)
         Decreasing numbers of exceedances per year.
     measure : Measure or str
-        Intensity measure: "pga", "pgv", or `Measure("sa", period)`.
+        Intensity measure, for example "pga", `Measure("sa", period)` or `Measure("pga", component="rotd50")`.
     name : str
         Short name for tables and figures.
 
@@ -100,14 +108,16 @@ class HazardCurve(Result):
         measure_input: Any = self.measure
         measure = Measure.parse(measure_input)
         if measure.units == "1":
-            message = "a hazard curve must be of pga, pgv or sa, which do not depend on a block"
+            message = "a hazard curve must be of a measure that does not depend on a block, as pga, pgv or sa"
             raise OptionError(f"{message}; got {measure.name}")
         for name, value in (("intensity", intensity), ("rate", rate), ("measure", measure)):
             object.__setattr__(self, name, value)
         intensity.flags.writeable = rate.flags.writeable = False
 
     @classmethod
-    def read(cls, path: str | Path, *, site: int = 0, period: float | None = None) -> HazardCurve:
+    def read(
+        cls, path: str | Path, *, site: int = 0, period: float | None = None, component: ComponentName = "own"
+    ) -> HazardCurve:
         """Read a hazard curve from a table of two columns or an OpenQuake export.
 
         Parameters
@@ -122,6 +132,9 @@ class HazardCurve(Result):
             Row of OpenQuake's file. A table has only one site.
         period : float, optional
             Period of a table's spectral acceleration, s.
+        component : str
+            Component of the ground motion to which the curve refers, as for `Measure`. Files do not state it. Many
+            hazard curves refer to "rotd50" or "geometric_mean".
 
         Returns
         -------
@@ -144,10 +157,12 @@ class HazardCurve(Result):
             raise OptionError(f"the file cannot be read: {message}", path=str(file)) from error
         try:
             if lines and "investigation_time" in lines[0]:
-                return cls(*_parse_openquake(lines, site, period), file.stem)
-            if site:
+                intensity, rate, measure = _parse_openquake(lines, site, period)
+            elif site:
                 raise OptionError("a table of two columns contains only one site; omit {}", "site")
-            return cls(*_parse_table(lines, period), file.stem)
+            else:
+                intensity, rate, measure = _parse_table(lines, period)
+            return cls(intensity, rate, replace(measure, component=component), file.stem)
         except OptionError as error:
             error.path = str(file)
             raise

@@ -68,10 +68,9 @@ def incremental_dynamic_analysis(
     ----------
     blocks, motions : optional
         As for `simulate_many`: n blocks, m motions.
-    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
-        Intensity measure to which motions are scaled: peak acceleration (m/s^2), peak velocity (m/s), PGA or p PGV
-        normalised by each block's uplift acceleration, or spectral acceleration (m/s^2), for example
-        ``rocking.Measure("sa", period=1.0)``.
+    measure : str or Measure
+        Intensity measure to which motions are scaled, by a name of `Measure` ("pga", "pgv", "pga_ratio", ...), or for
+        example ``rocking.Measure("sa", period=1.0)``.
     levels : array_like, optional
         Increasing levels of the measure. By default from the lowest that lifts a block, in steps of 5 %, to three times
         the level by which every motion has overturned every block, at most 490 times the first.
@@ -136,14 +135,15 @@ def incremental_dynamic_analysis(
     else:
         level_values = checks.increasing_numbers(levels, "levels", OptionError)
         table = simulate_levels(bodies, motion_list, measure, level_values, **options)
-    factors = compute_units(bodies, measure, model)[None, :] / values[:, None]
+    units = compute_units(bodies, measure, model)
     # The scheme of the levels determines how often the restitution is drawn.
     setup = Setup(bodies, model, Certified(), friction=coefficients)
 
     def simulate_overturned(column: Integers, level: Floats) -> Integers:
         is_overturned = np.empty(column.size, dtype=np.int64)
         motion, block = np.divmod(column, len(bodies))
-        for k, outcomes in simulate_each(setup, motion_list, block, motion, level * factors[motion, block]):
+        factors = measure.find_factor(level * units[block], values[motion])
+        for k, outcomes in simulate_each(setup, motion_list, block, motion, factors):
             is_overturned[k] = outcomes["overturned"]
         return is_overturned
 
@@ -151,7 +151,7 @@ def incremental_dynamic_analysis(
     flat_grid = grid.reshape(len(grid), -1).astype(np.int64)
     brackets = find_boundaries(table.level.values, flat_grid, simulate_overturned, rtol=relative_width)
     dataset = _combine_bands(table, flat_grid, brackets, slenderness, measure)
-    scales = table.level.values[:, None, None] * factors
+    scales = measure.find_factor(table.level.values[:, None, None] * units, values[:, None])
     undecided = describe_undecided(setup, motion_list, scales[..., None], grid[..., None])
     sides_differ, block_text = int(not bodies.is_symmetric), describe_blocks(blocks)
     attributes = {"blocks": block_text, "lowest_uplift": lowest_uplift, "sides_differ": sides_differ}
@@ -242,7 +242,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
             "blocks": data.blocks,
             "model": data.model,
             "measure": data.level.long_name,
-            **{name: data.level.attrs[name] for name in ("period", "damping") if name in data.level.attrs},
+            **{name: data.level.attrs[name] for name in ("period", "damping", "component") if name in data.level.attrs},
             add_unit("level", units): data.level.values,
             add_unit("lowest_uplift", units): data.lowest_uplift,
             "undecided": data.undecided,
@@ -290,7 +290,8 @@ def compute_lowest_uplift(
     """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""
     (thresholds, weight_thresholds), gravity = compute_thresholds(blocks, model), blocks.gravity
     factors = [compute_uplift_factors(motion, thresholds, gravity, weight_thresholds) for motion in motions]
-    lowest = float(np.min(np.array(factors) * values[:, None] / compute_units(blocks, measure, model)))
+    intensity = np.array(factors) ** measure.exponent * values[:, None] / compute_units(blocks, measure, model)
+    lowest = float(np.min(intensity))
     if math.isinf(lowest):
         message = "no motion lifts a block at any level, because of direction or vertical component"
         raise OptionError(f"{message}; use other motions")
@@ -352,7 +353,7 @@ class _LevelDescription:
 
     def __init__(self, level: xr.DataArray) -> None:
         self.scale, self.values = level.scale, level.scale * level.values
-        self.unit = {"m/s^2": " g", "m/s": " m/s", "1": ""}[level.units]
+        self.unit = {"m/s^2": " g", "1": ""}.get(level.units, f" {level.units}")
         low, high = (f"{end:.5g}" for end in self.values[[0, -1]])
         self.range = f"{low}{self.unit}" if low == high else f"{low} to {high}{self.unit}"
 

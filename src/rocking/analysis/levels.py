@@ -20,7 +20,7 @@ from rocking.core.progress import Progress, note
 from rocking.core.tables import format_count
 from rocking.engine.problem import gather_bodies
 from rocking.engine.tasks import Setup, describe_missing, simulate_each
-from rocking.errors import Message, OptionError
+from rocking.errors import Message, OptionError, escape_braces
 from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, create_label
 from rocking.motion.motion import Motion
@@ -139,7 +139,8 @@ def compute_intensities(motions: Sequence[Motion], measure: Measure) -> Floats:
 
 def assign_clusters(motions: Sequence[Motion], labels: object = None) -> Integers:
     """Assign numbers to clusters of motions with equal labels ("station": of one record) or equal up to a factor."""
-    families, origins = assign_families(motions), [motion.description.origin or Origin() for motion in motions]
+    families = _join_groups(assign_families(motions), assign_pairs(motions))
+    origins = [motion.description.origin or Origin() for motion in motions]
     stations = [f"{origin.event}, {origin.station}" if origin.station else "" for origin in origins]
     if labels is None:
         stations_by_family = {family: station for family, station in zip(families, stations, strict=True) if station}
@@ -152,13 +153,57 @@ def assign_clusters(motions: Sequence[Motion], labels: object = None) -> Integer
         if not any(stations):
             message = f"{{}} {BY_STATION} requires records that name their station; give a label for each motion"
             raise OptionError(message, "clusters")
+    return _join_groups(families, assign_groups(labels, "clusters", len(motions), "motion"))
+
+
+def _join_groups(first: Integers, second: Integers) -> Integers:
+    """Join groups that have a common member, and number them in the order of their first members."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    count = len(motions)
-    label_numbers = assign_groups(labels, "clusters", count, "motion")
-    links = coo_array((np.ones(count), (families, count + label_numbers)), shape=(2 * count, 2 * count))
-    return assign_numbers(connected_components(links, directed=False)[1][families].tolist())
+    count = len(first)
+    links = coo_array((np.ones(count), (first, count + second)), shape=(2 * count, 2 * count))
+    return assign_numbers(connected_components(links, directed=False)[1][first].tolist())
+
+
+def assign_pairs(motions: Sequence[Motion]) -> Integers:
+    """Assign one number to both components of each pair and to their reversals, and another to each other motion."""
+    parts = [[part for part in (motion, motion.orthogonal) if part is not None] for motion in motions]
+    keys = [
+        frozenset((part.breakpoints.tobytes(), np.abs(part.coefficients).tobytes()) for part in row) for row in parts
+    ]
+    return assign_numbers(keys)
+
+
+def find_larger_responses(ratio: Floats, motions: Sequence[Motion], measure: Measure) -> Integers:
+    """Find the simulation with the larger response for each level, pair (or single motion) and block.
+
+    Ratios are over (level, motion, block, polarity), NaN if unknown. The result contains positions in the flattened
+    array, shape (level, pair, block).
+    """
+    pairs = assign_pairs(motions)
+    if any(motion.orthogonal for motion in motions):
+        alone = [motions[group[0]].name for k in range(pairs.max() + 1) if len(group := np.flatnonzero(pairs == k)) < 2
+                 and motions[group[0]].orthogonal is not None]  # fmt: skip
+        if alone:
+            message = (
+                f"{{}} requires both components of each pair; the other one of {escape_braces(alone[0])} is missing"
+            )
+            raise OptionError(message, "larger")
+        if measure.component == "own":
+            message = '{} requires a measure of the pair, which is the same for both components; use {} "rotd50"'
+            raise OptionError(message, "larger", "component")
+    # An unknown response is larger than all known ones except overturning.
+    rank = np.where(np.isnan(ratio), np.finfo(float).max, ratio)
+    positions = np.arange(ratio.size).reshape(ratio.shape)
+    columns = []
+    for k in range(pairs.max() + 1):
+        ranks, places = (
+            np.moveaxis(array[:, pairs == k], 2, 1).reshape(len(ratio), ratio.shape[2], -1)
+            for array in (rank, positions)
+        )
+        columns.append(np.take_along_axis(places, ranks.argmax(axis=2)[..., None], axis=2)[..., 0])
+    return np.stack(columns, axis=1)
 
 
 def describe_sample(clusters: Integers, labels: object) -> str:

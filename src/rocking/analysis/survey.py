@@ -16,7 +16,6 @@ import numpy as np
 
 from rocking.analysis.levels import MIRROR_NOTE
 from rocking.block.body import Body
-from rocking.block.friction import Friction
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.progress import Progress
 from rocking.core.result import Result
@@ -26,7 +25,7 @@ from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
 from rocking.response import Response
-from rocking.response.mechanics import check_friction
+from rocking.response.mechanics import check_available_friction
 from rocking.response.perturbed import MOTION_PRECISION, choose_steps
 from rocking.response.summary import format_brief_outcome, format_ratio, round_ratio
 from rocking.simulation.ensemble import body_coordinates, list_labels, motion_coordinates
@@ -118,7 +117,7 @@ class Survey(BlocksUnderRecords):
 
     Attributes
     ----------
-    friction, precision : float
+    available_friction, precision : float
         As for `survey`.
     block, records, responses, skipped
         One body or several, names of the motions and their responses (for each body in turn), and reasons why records
@@ -138,14 +137,16 @@ class Survey(BlocksUnderRecords):
     [False, True]
     """
 
-    friction: float | None = None
+    available_friction: float | None = None
     precision: float = MOTION_PRECISION
 
     def rows(self) -> list[dict[str, Any]]:
-        friction, rows = self.friction, []
+        friction, rows = self.available_friction, []
         for label, response in zip(self._create_labels(), self.responses, strict=True):
-            sliding = {} if friction is None else {"friction": friction, _SLIDING_TIME: response.sliding_time(friction)}
-            rows.append(label | _create_row(response, self.precision) | sliding)
+            row = label | _create_row(response, self.precision)
+            if friction is not None:
+                row |= {"available_friction": friction, _SLIDING_TIME: response.sliding_time(friction)}
+            rows.append(row)
         return rows
 
     def summary(self) -> str:
@@ -154,8 +155,8 @@ class Survey(BlocksUnderRecords):
         rows = [row | ratio_column for row, ratio_column in zip(self.rows(), ratio_columns, strict=True)]
         titles = self._list_label_titles()
         titles |= {name.format(limit): title.format(limit) for name, title in _TABLE_COLUMNS.items()}
-        if self.friction is not None:
-            titles |= {_SLIDING_TIME: f"with friction {self.friction:g} slides at, s"}
+        if self.available_friction is not None:
+            titles |= {_SLIDING_TIME: f"with friction {self.available_friction:g} slides at, s"}
         if any(row["processing"] for row in rows):
             titles = titles | {"processing": "done to the record"}
         table = format_table(list(titles.values()), [[row[name] for name in titles] for row in rows])
@@ -174,7 +175,7 @@ class Survey(BlocksUnderRecords):
             numbers = {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters}
             blocks.append({"description": body.description, **getattr(body, "labels", {}), **numbers})
         entry: dict[str, Any] = {"block": blocks[0]} if len(blocks) == 1 else {"blocks": blocks}
-        friction = {} if self.friction is None else {"friction": self.friction}
+        friction = {} if self.available_friction is None else {"available_friction": self.available_friction}
         return {**entry, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
 
 
@@ -290,9 +291,8 @@ def survey(
     block: Body | Sequence[Body],
     motions: Motions,
     *,
-    friction: float | None = None,
+    available_friction: float | None = None,
     precision: float = MOTION_PRECISION,
-    sliding: Friction | None = None,
     **options: Any,
 ) -> Survey:
     """Simulate a block, or each of several blocks, under many motions.
@@ -302,14 +302,12 @@ def survey(
     block, motions : optional
         As for `simulate_many`: one or more blocks, m motions. The table shows the keys of a mapping, or otherwise the
         names of the motions.
-    friction : float, optional
-        Coefficient of friction for the detection of sliding.
+    available_friction : float, optional
+        Coefficient of friction, to report when a block that never slips would slide.
     precision : float
         Relative precision of the motions, from 1e-6 to 0.1. Outcomes are also counted within this precision.
-    sliding : float or pair, optional
-        Coefficients of friction with which slip is simulated, as `friction` of `rocking.simulate`.
     **options : object
-        As for `rocking.simulate`: model, chattering, duration, ...
+        As for `rocking.simulate`: model, chattering, duration, friction, ...
 
     Returns
     -------
@@ -342,16 +340,16 @@ def survey(
         if not require_body(body).coordinate.limit:
             message = "a survey requires a Block, because only a block has an unstable equilibrium"
             raise OptionError(f"{message}; got {type(body).__name__}")
-    if friction is not None:
-        check_friction(friction)
+    if available_friction is not None:
+        check_available_friction(available_friction)
     responses = []
     with Progress("simulating", total=len(bodies) * len(named_motions)) as bar:
         for body, motion in itertools.product(bodies, named_motions.values()):
-            responses.append(simulate(body, motion, friction=sliding, **options))
+            responses.append(simulate(body, motion, **options))
             # The response caches the expensive results while the progress bar is shown.
             _create_row(responses[-1], precision)
             bar.advance()
-    return Survey(block, tuple(named_motions) * len(bodies), tuple(responses), friction, precision)
+    return Survey(block, tuple(named_motions) * len(bodies), tuple(responses), available_friction, precision)
 
 
 def create_folder_names(records: Sequence[str], responses: Sequence[Response] = ()) -> list[str]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.block.body import BODIES_TYPES
 from rocking.block.restrained import RestrainedBlock
-from rocking.block.restraints import Terms
+from rocking.block.restraints import RestraintTerms
 from rocking.block.sides import check_gravity, check_sides, compute_rigid_bodies, describe_missing_body
 from rocking.block.single import Block, require_block
 from rocking.core import checks
@@ -25,15 +25,16 @@ from rocking.kernels import state
 _FIELDS: Final = ("p", "alpha", "restitution")
 
 #: Terms of restraints on each side with their default values, and `one_sided`.
-_TERMS: Final = {**Terms()._asdict(), "one_sided": 0.0}
+_TERMS: Final = {**RestraintTerms()._asdict(), "one_sided": 0.0}
 _UNITS: Final = {
-    "p": "rad/s", "alpha": "rad", "damping": "1/s", "opening": "m", "stiffness": "1/m", "yields": "m", "slack": "m",
-    "restitution_slope": "s/rad",
+    "p": "rad/s", "alpha": "rad", "damping": "1/s", "lever_arm": "m", "stiffness": "1/m", "yield_elongation": "m",
+    "slack_elongation": "m", "restitution_slope": "s/rad",
 }  # fmt: skip
 
 #: Exponents of the factor on p in the terms of a resized block; other terms do not change.
 _EXPONENTS: Final = {
-    "damping": 1, "stiffness": 2, "opening": -2, "yields": -2, "slack": -2, "restitution_slope": -1,
+    "damping": 1, "stiffness": 2, "lever_arm": -2, "yield_elongation": -2, "slack_elongation": -2,
+    "restitution_slope": -1,
 }  # fmt: skip
 
 
@@ -53,12 +54,12 @@ class Blocks:
     gravity : float
         Acceleration of gravity, m/s^2.
     **terms : array_like
-        Terms of restraints by name, as returned by `parameters` of restrained blocks.
+        RestraintTerms of restraints by name, as returned by `parameters` of restrained blocks.
 
     Attributes
     ----------
     terms : dict of str to ndarray
-        Terms of blocks with restraints, a lean or a single side; empty for free blocks. For a one-sided block
+        RestraintTerms of blocks with restraints, a lean or a single side; empty for free blocks. For a one-sided block
         `one_sided` is 1, and both columns of all parameters contain the values of side +.
     axes : dict of str to ndarray, or None
         Axes of a grid: p (rad/s), alpha (rad) and restitution if it was an argument. The last one varies fastest.
@@ -340,7 +341,7 @@ class Blocks:
         is_one_sided = terms["one_sided"] > 0.0
         records["next_side"][is_one_sided] = 0
         records["threshold"][:, 1] = np.where(is_one_sided[:, 1], math.inf, records["threshold"][:, 1])
-        records["min_restitution"] = terms["restitution_least"]
+        records["min_restitution"] = terms["min_restitution"]
         records["restitution_slope"] = terms["restitution_slope"]
         records["seed"] = terms["restitution_seed"][:, 0]
         records["variable_restitution"] = (records["seed"] >= 0) | np.any(records["restitution_slope"] > 0.0, axis=1)
@@ -361,9 +362,15 @@ class Blocks:
             for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
                 records[f"base_{name.removeprefix('added_')}"] = records[name]
             records["tendon_stiffness"] = p * p * terms["stiffness"]
-            records["lever_arm"] = terms["opening"]
-            records["yield_elongation"], records["slack_elongation"] = terms["yields"][:, 0], terms["slack"][:, 0]
-            tendon_moment, slack_moment = terms["stiffness"] * terms["opening"], -terms["stiffness"] * terms["slack"]
+            records["lever_arm"] = terms["lever_arm"]
+            records["yield_elongation"], records["slack_elongation"] = (
+                terms["yield_elongation"][:, 0],
+                terms["slack_elongation"][:, 0],
+            )
+            tendon_moment, slack_moment = (
+                terms["stiffness"] * terms["lever_arm"],
+                -terms["stiffness"] * terms["slack_elongation"],
+            )
             records["tendon_weight"] = -tendon_moment * (1.0 if model == "linear" else cosine)
             records["tendon_push"] = tendon_moment * (self.alpha if model == "linear" else sine)
             records["added_weight"] += records["tendon_weight"]
@@ -401,12 +408,15 @@ class Blocks:
             raise BlockError(message)
         p, alpha, e = (tuple(array[index]) for array in (self.p, self.alpha, self.restitution))
         block = Block.from_parameters(p, alpha, e, gravity=self.gravity)
-        terms, is_one_sided = [Terms(), Terms()], False
+        terms, is_one_sided = [RestraintTerms(), RestraintTerms()], False
         if self.terms:
-            terms = [Terms(*(float(self.terms[name][index, side]) for name in Terms._fields)) for side in range(2)]
+            terms = [
+                RestraintTerms(*(float(self.terms[name][index, side]) for name in RestraintTerms._fields))
+                for side in range(2)
+            ]
             is_one_sided = bool(self.terms["one_sided"][index, 0])
         labels = {name: values[index].item() for name, values in self.labels.items()}
-        if not is_one_sided and terms == [Terms(), Terms()]:
+        if not is_one_sided and terms == [RestraintTerms(), RestraintTerms()]:
             return block.with_labels(**labels) if labels else block
         text = "block with restraints" + ", rocking one way" * is_one_sided
         restrained = RestrainedBlock.__new__(RestrainedBlock)._fill(block, terms, text, is_one_sided=is_one_sided)

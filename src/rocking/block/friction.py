@@ -21,7 +21,7 @@ from rocking.kernels.state import Records
 Friction = float | Sequence[float]
 
 #: Largest relative difference between sizes of a body that follow from its two sides.
-_ROUNDING: Final = 1e-6
+_SIZE_TOLERANCE: Final = 1e-6
 
 
 def resolve_friction(friction: Friction | None) -> tuple[float, float] | None:
@@ -92,7 +92,7 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
         )
     gain = (inertia[:, ::-1] * bodies.restitution - height**2) ** 2 - (square + base**2) * limit
     _refuse(
-        gain > _ROUNDING * limit**2,
+        gain > _SIZE_TOLERANCE * limit**2,
         "this restitution would gain energy in a slip, so that {} requires another one; omit the restitution",
     )
     records["has_friction"], records["static_friction"], records["kinetic_friction"] = True, static, kinetic
@@ -101,7 +101,7 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
     s, c = (bodies.alpha, 1.0) if is_linear else (records["sine"], records["cosine"])
     lost = 0.0 if is_linear else ratio * s
     per_push = 1.0 - ratio * c * c + static * lost
-    records["sticking_push"] = (1.0 - _ROUNDING) * (static * (1.0 - lost * s) - ratio * s) / per_push
+    records["sticking_push"] = (1.0 - _SIZE_TOLERANCE) * (static * (1.0 - lost * s) - ratio * s) / per_push
     records["sticking_slope"] = 0.0 if is_linear else arm / g * (s + static) / per_push
 
 
@@ -132,7 +132,7 @@ def _find_radii(blocks: Blocks) -> Floats:
     heights = radii * np.cos(blocks.alpha)
     squares = blocks.gravity * radii / blocks.p**2 - radii**2
     for sizes in (heights, squares):
-        _refuse(np.abs(sizes[:, 0] - sizes[:, 1]) > _ROUNDING * np.abs(sizes[:, 0]), _MISSING)
+        _refuse(np.abs(sizes[:, 0] - sizes[:, 1]) > _SIZE_TOLERANCE * np.abs(sizes[:, 0]), _MISSING)
     return radii
 
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from rocking.block.body import SINGLE_BODY_TYPES, ContactLaw, Coordinate
-from rocking.block.restraints import Load, Pivot, Pivots, Restitution, Restraint, Tendon, Terms
+from rocking.block.restraints import Load, Pivot, Pivots, Restitution, Restraint, RestraintTerms, Tendon
 from rocking.block.sides import Side, check_pair, check_parameter, one_sided_restitution
 from rocking.block.single import Block, Rocking, require_block
 from rocking.core import checks
@@ -77,7 +77,7 @@ class RestrainedBlock(Rocking):
     coordinate: ClassVar[Coordinate] = _ROTATION
 
     block: Block
-    _terms: tuple[Terms, Terms]
+    _terms: tuple[RestraintTerms, RestraintTerms]
     is_one_sided: bool
     description: str
     restraints: tuple[Restraint, ...] | None
@@ -116,7 +116,9 @@ class RestrainedBlock(Rocking):
         pivots = _create_pivots(standing_block, tilt, restraints)
         terms = []
         for side, pivot in enumerate(pivots):
-            total = functools.reduce(Terms.add, (restraint._compute_terms(pivot) for restraint in restraints), Terms())
+            total = functools.reduce(
+                RestraintTerms.add, (restraint._compute_terms(pivot) for restraint in restraints), RestraintTerms()
+            )
             terms.append(total._replace(**(law._compute_terms(side) if law else {})))
         description = ", ".join([free_block.description, *_describe_restraints(restraints), *details])
         self._fill(standing_block, terms, description, restraints, tilt, is_one_sided=is_one_sided)
@@ -128,7 +130,7 @@ class RestrainedBlock(Rocking):
     def _fill(
         self,
         block: Block,
-        terms: Sequence[Terms],
+        terms: Sequence[RestraintTerms],
         description: str,
         restraints: tuple[Restraint, ...] | None = None,
         lean: float = 0.0,
@@ -143,7 +145,7 @@ class RestrainedBlock(Rocking):
     def _create_rows(self) -> list[tuple[float, ...]]:
         """Return parameters and, unless free, terms of both sides as stored in `Blocks`."""
         rows = self.block._create_rows()
-        if not self.is_one_sided and self._terms == (Terms(), Terms()):
+        if not self.is_one_sided and self._terms == (RestraintTerms(), RestraintTerms()):
             return rows
         rows = [(*row, *terms, float(self.is_one_sided)) for row, terms in zip(rows, self._terms, strict=True)]
         return rows[:1] * 2 if self.is_one_sided else rows
@@ -273,7 +275,7 @@ def _tilt(block: Block, lean: float) -> Block:
 
 def _find_following_loads(restraints: Sequence[Restraint]) -> list[Load]:
     """Return the loads that follow the block."""
-    return [restraint for restraint in restraints if isinstance(restraint, Load) and restraint.follows]
+    return [restraint for restraint in restraints if isinstance(restraint, Load) and restraint.moves_with_block]
 
 
 def _create_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) -> Pivots:
@@ -290,17 +292,17 @@ def _create_pivots(block: Block, lean: float, restraints: Sequence[Restraint]) -
     return plus, minus
 
 
-def _compute_balance(side: Side, terms: Terms) -> float:
+def _compute_balance(side: Side, terms: RestraintTerms) -> float:
     """Return the first rotation without restoring moment or ground motion, rad.
 
     For a yielding tendon, the first yield is considered.
     """
-    if terms[:-3] == Terms()[:-3]:
+    if terms[:-3] == RestraintTerms()[:-3]:
         return side.alpha
 
     def moment(u: float) -> float:
         weight_moment = (1.0 + terms.sine) * math.sin(side.alpha - u) + terms.cosine * math.cos(side.alpha - u)
-        elongation = min(2.0 * terms.opening * math.sin(0.5 * u), terms.yields) - terms.slack
+        elongation = min(2.0 * terms.lever_arm * math.sin(0.5 * u), terms.yield_elongation) - terms.slack_elongation
         return weight_moment + (terms.prestress + terms.stiffness * elongation) * math.cos(0.5 * u) + terms.spring * u
 
     rotations = np.linspace(0.0, 0.5 * math.pi, _N_SAMPLES)

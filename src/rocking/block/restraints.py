@@ -22,8 +22,8 @@ Force = tuple[Floats | float, Floats | float]
 _LARGEST_SEED: Final = 2**53
 
 
-class Terms(NamedTuple):
-    """Terms of restraints and of a law of restitution on one side, at a rotation u and a rate u'.
+class RestraintTerms(NamedTuple):
+    """RestraintTerms of restraints and of a law of restitution on one side, at a rotation u and a rate u'.
 
     The moment of the restraints about the pivot, positive if it restores the block, divided by weight times R, is
 
@@ -37,19 +37,19 @@ class Terms(NamedTuple):
     prestress: float = 0.0
     spring: float = 0.0
     damping: float = 0.0  # 1/s
-    opening: float = 0.0  # distance of the yielding tendon's duct from the pivot, m
+    lever_arm: float = 0.0  # distance of the yielding tendon's duct from the pivot, m
     stiffness: float = 0.0  # its stiffness times that distance, divided by weight times R, 1/m
-    yields: float = math.inf  # elongation beyond the plastic one at which it yields, m
-    slack: float = 0.0  # elongation above which it is taut, m
-    restitution_least: float = 0.0  # lower bound of a varying restitution
+    yield_elongation: float = math.inf  # elongation beyond the plastic one at which it yields, m
+    slack_elongation: float = 0.0  # elongation above which it is taut, m
+    min_restitution: float = 0.0  # lower bound of a varying restitution
     restitution_slope: float = 0.0  # decrease per angular speed of the impact, s/rad
     restitution_seed: float = -1.0  # seed of a random restitution; -1 if not random
 
-    def add(self, other: Terms) -> Terms:
+    def add(self, other: RestraintTerms) -> RestraintTerms:
         """Return the sum, of which one operand may have a yielding tendon, and only `self` a law of restitution."""
-        tendon = self if other.yields == math.inf else other
+        tendon = self if other.yield_elongation == math.inf else other
         sums = (a + b for a, b in zip(self[:5], other[:5], strict=True))
-        return Terms._make((*sums, *tendon[5:9], *self[9:]))
+        return RestraintTerms._make((*sums, *tendon[5:9], *self[9:]))
 
 
 class Pivot(NamedTuple):
@@ -101,7 +101,7 @@ class Restraint(ABC):
     """
 
     @abstractmethod
-    def _compute_terms(self, pivot: Pivot) -> Terms:
+    def _compute_terms(self, pivot: Pivot) -> RestraintTerms:
         """Compute the terms while the block leans to one side."""
 
     def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
@@ -182,13 +182,20 @@ class Tendon(Restraint):
         if stiffness == 0.0 and self.strength < math.inf:
             raise BlockError("a yielding tendon requires a {}, N/m", "stiffness")
 
-    def _compute_terms(self, pivot: Pivot) -> Terms:
+    def _compute_terms(self, pivot: Pivot) -> RestraintTerms:
         x = self._compute_lever(pivot)
         if self.strength < math.inf:
             yields, slack = (self.strength - self.prestress) / self.stiffness, -self.prestress / self.stiffness
-            return Terms(opening=x, stiffness=self.stiffness * x / pivot.moment, yields=yields, slack=slack)
+            return RestraintTerms(
+                lever_arm=x,
+                stiffness=self.stiffness * x / pivot.moment,
+                yield_elongation=yields,
+                slack_elongation=slack,
+            )
         factor = self.stiffness * x * x / pivot.moment
-        return Terms(-factor * math.cos(pivot.alpha), factor * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
+        return RestraintTerms(
+            -factor * math.cos(pivot.alpha), factor * math.sin(pivot.alpha), self.prestress * x / pivot.moment
+        )
 
     def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         """Compute the force of the tendon, along the chord between its ends."""
@@ -251,8 +258,8 @@ class Spring(Restraint):
     def __post_init__(self) -> None:
         self._set_positive("stiffness", "N m/rad")
 
-    def _compute_terms(self, pivot: Pivot) -> Terms:
-        return Terms(spring=self.stiffness / pivot.moment)
+    def _compute_terms(self, pivot: Pivot) -> RestraintTerms:
+        return RestraintTerms(spring=self.stiffness / pivot.moment)
 
     def __str__(self) -> str:
         return f"spring of {_format_si(self.stiffness, 'N m/rad')}"
@@ -282,8 +289,8 @@ class Damper(Restraint):
     def __post_init__(self) -> None:
         self._set_positive("coefficient", "N m s/rad")
 
-    def _compute_terms(self, pivot: Pivot) -> Terms:
-        return Terms(damping=self.coefficient * pivot.p**2 / pivot.moment)
+    def _compute_terms(self, pivot: Pivot) -> RestraintTerms:
+        return RestraintTerms(damping=self.coefficient * pivot.p**2 / pivot.moment)
 
     def __str__(self) -> str:
         return f"damper of {_format_si(self.coefficient, 'N m s/rad')}"
@@ -326,10 +333,10 @@ class Thrust(Restraint):
             raise BlockError("{} of a thrust must not be zero", "force", value=self.force)
         self._set_positive("height", "m")
 
-    def _compute_terms(self, pivot: Pivot) -> Terms:
+    def _compute_terms(self, pivot: Pivot) -> RestraintTerms:
         rho_sin, rho_cos = pivot.rotate(*pivot.compute_arms(self.height, self.offset))
         force = pivot.sign * self.force / pivot.moment
-        return Terms(force * rho_sin, -force * rho_cos)
+        return RestraintTerms(force * rho_sin, -force * rho_cos)
 
     def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         return self.force, 0.0
@@ -351,7 +358,7 @@ class Load(Restraint):
         Height of the point of support above the base, m.
     offset : float
         Distance of this point from the centre of mass of the block without loads, m, positive to side +.
-    follows : bool
+    moves_with_block : bool
         Whether the load moves with the block. Otherwise it presses with its static weight, without inertia.
 
     Raises
@@ -366,33 +373,35 @@ class Load(Restraint):
 
     Examples
     --------
-    >>> Load(250.0, height=3.0, follows=False)
-    Load(mass=250.0, height=3.0, offset=0.0, follows=False)
+    >>> Load(250.0, height=3.0, moves_with_block=False)
+    Load(mass=250.0, height=3.0, offset=0.0, moves_with_block=False)
     """
 
     mass: float
     height: float
     offset: float = 0.0
-    follows: bool = True
+    moves_with_block: bool = True
 
     def __post_init__(self) -> None:
         self._set_positive("mass", "kg")
         self._set_positive("height", "m")
         self._set_finite("offset")
-        object.__setattr__(self, "follows", checks.boolean(self.follows, "follows", BlockError))
+        object.__setattr__(
+            self, "moves_with_block", checks.boolean(self.moves_with_block, "moves_with_block", BlockError)
+        )
 
-    def _compute_terms(self, pivot: Pivot) -> Terms:
-        if self.follows:  # part of the block
-            return Terms()
+    def _compute_terms(self, pivot: Pivot) -> RestraintTerms:
+        if self.moves_with_block:  # part of the block
+            return RestraintTerms()
         rho_sin, rho_cos = pivot.rotate(*pivot.compute_arms(self.height, self.offset))
         weight = self.mass * pivot.gravity / pivot.moment
-        return Terms(weight * rho_cos, weight * rho_sin)
+        return RestraintTerms(weight * rho_cos, weight * rho_sin)
 
     def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
-        return 0.0, 0.0 if self.follows else -self.mass * pivots[0].gravity
+        return 0.0, 0.0 if self.moves_with_block else -self.mass * pivots[0].gravity
 
     def __str__(self) -> str:
-        behaviour = "that follows" if self.follows else "that only presses"
+        behaviour = "that moves with it" if self.moves_with_block else "that only presses"
         position = f"at a height of {self.height:.5g} m{_describe_offset(self.offset)}"
         return f"load of {self.mass:.5g} kg {behaviour} {position}"
 
@@ -464,10 +473,10 @@ class Restitution:
                 raise BlockError("a law of restitution has either a {} or a {}, not both", "slope", "seed")
 
     def _compute_terms(self, side: int) -> dict[str, float]:
-        """Return the law on leaving a side as fields of `Terms`, without the largest factor."""
+        """Return the law on leaving a side as fields of `RestraintTerms`, without the largest factor."""
         minimum, slope = (check_pair(getattr(self, name), name)[side] for name in ("minimum", "slope"))
         seed = -1.0 if self.seed is None else float(self.seed)
-        return {"restitution_least": minimum, "restitution_slope": slope, "restitution_seed": seed}
+        return {"min_restitution": minimum, "restitution_slope": slope, "restitution_seed": seed}
 
     def __str__(self) -> str:
         if self.seed is None:

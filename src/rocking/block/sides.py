@@ -301,7 +301,7 @@ def choose_restitutions(restitution: object, conserved: Sequence[float]) -> tupl
 
 
 #: Largest relative difference between parameters of sides that count as equal.
-_ROUNDING: Final = 1e-9
+_EQUALITY_TOLERANCE: Final = 1e-9
 
 
 def compute_rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
@@ -321,7 +321,9 @@ def compute_rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
         depth = slope / tangent.sum(axis=1)
     difference, bound = _compare_sides(p, cosine)
     factors[difference >= bound] = np.nan
-    equal = np.all([abs(values[:, 0] - values[:, 1]) <= _ROUNDING * values[:, 0] for values in (p, alpha)], axis=0)
+    equal = np.all(
+        [abs(values[:, 0] - values[:, 1]) <= _EQUALITY_TOLERANCE * values[:, 0] for values in (p, alpha)], axis=0
+    )
     factors[equal] = 1.0 - 1.5 * np.sin(alpha[equal]) ** 2
     depth[equal] = np.nan
     return factors, depth

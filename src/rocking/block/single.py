@@ -36,7 +36,7 @@ from rocking.errors import BlockError, OptionError, UnequalSidesError
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
 
 #: Relative rounding error of a length.
-_ROUNDING: Final = 1e-12
+_LENGTH_ROUNDING: Final = 1e-12
 #: Largest difference of a restitution from the value of a rigid body that counts as equal.
 _RESTITUTION_TOLERANCE: Final = 1e-9
 _MAX_MASS_RATIO: Final = 1e12
@@ -176,7 +176,7 @@ class Block(Rocking):
         g = check_gravity(gravity)
         description = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
         s = checks.finite(offset, "offset", BlockError)
-        if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
+        if abs(s) > 0.5 * b * (1.0 + _LENGTH_ROUNDING):
             message = f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}"
             hint = "for a larger one, give the pivots and the radius of gyration"
             raise BlockError(f"{message}; {hint}", "offset", value=offset)

@@ -271,7 +271,10 @@ def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[
     if measure.name not in ("pga", kind):  # "pga" is the default
         message = f"{{}} is {measure.name}, but the intensities of the outcomes are {kind}; omit it"
         raise OptionError(message, "measure", path=str(table.path))
-    return {"intensity": factor * table.numbers(heading), "measure": measure if kind == "sa" else Measure(kind)}
+    return {
+        "intensity": factor * table.numbers(heading),
+        "measure": measure if kind == "sa" else Measure(kind, component=measure.component),
+    }
 
 
 def _pair_with_motions(table: _Table, measure: Measure, **metadata: Any) -> dict[str, Any]:

@@ -46,7 +46,7 @@ _PAPER_IMPACTS: Final = 60
 _PAPER_RESTITUTION: Final = 0.92
 
 #: Relative rounding error of the bounds of the time of rest (two ulp).
-_ROUNDING: Final = 2.0**-51
+_BOUND_ROUNDING: Final = 2.0**-51
 
 _MAX_CAPACITY: Final = 1 << 23
 
@@ -306,7 +306,11 @@ def _resolve_sequence(
     impacts["side"] = np.where(np.arange(count) % 2 == 0, 1, -1)
     impacts["speed_before"] = table["before"] / omega
     impacts["speed_after"] = table["after"] / omega
-    return status, impacts, (rest / omega, lower / omega * (1.0 - _ROUNDING), upper / omega * (1.0 + _ROUNDING))
+    return (
+        status,
+        impacts,
+        (rest / omega, lower / omega * (1.0 - _BOUND_ROUNDING), upper / omega * (1.0 + _BOUND_ROUNDING)),
+    )
 
 
 def _compute_exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:

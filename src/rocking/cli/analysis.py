@@ -187,7 +187,9 @@ def ida(
     with output.folder() as folder:
         loaded = motion.read_all(names)
         motions = [*loaded.motions.values()]
-        result = incremental_dynamic_analysis(body, motions, **measure.arguments(), **model.arguments(), rtol=rtol)
+        result = incremental_dynamic_analysis(
+            body, motions, **measure.arguments(motion.component), **model.arguments(), rtol=rtol
+        )
         blocks = list_block_names(result.data) if isinstance(body, Sequence) else []
         _write_and_print(result, "ida", loaded, folder=folder, as_json=output.as_json, blocks=blocks)
 
@@ -196,6 +198,7 @@ def measures(
     *names: Names,
     periods: str = "0.5,1,2",
     damping: float = 0.05,
+    also: str | None = None,
     clusters: str | None = None,
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
@@ -214,6 +217,8 @@ def measures(
         Periods of spectral accelerations, s: 0.5,1,2 or 0.2:4:10:log.
     damping
         Fraction of critical damping of the spectral accelerations.
+    also
+        Further measures, separated by commas: pgd, arias, cav, incremental_velocity, duration.
     clusters
         Groups of records, each of which counts as one in the intervals: station groups the components of one station
         in one earthquake, as named in the files; or a label for each record, separated by commas. By default each
@@ -223,7 +228,9 @@ def measures(
     with output.folder() as folder:
         loaded = motion.read_all(names)
         settings |= {"periods": read_array(periods, "periods"), "clusters": parse_labels(clusters)}
-        result = compare_measures(motions=[*loaded.motions.values()], damping=damping, **settings)
+        further = [] if also is None else [name.strip() for name in also.split(",")]
+        settings |= {"damping": damping, "component": motion.component, "also": further}
+        result = compare_measures(motions=[*loaded.motions.values()], **settings)
         _write_and_print(result, "measures", loaded, folder=folder, as_json=output.as_json)
 
 

@@ -80,8 +80,8 @@ def assess(
     confidence
         Probability of the intervals.
     """
-    curve = read_hazard(hazard, site, years, measure.period)
-    settings: dict[str, Any] = measure.arguments() | model.arguments()
+    curve = read_hazard(hazard, site, years, measure.periods, motion.component)
+    settings: dict[str, Any] = measure.arguments(motion.component) | model.arguments()
     settings["levels"] = count if settings["levels"] is None else settings["levels"]
     if curve is not None:
         settings["measure"] = curve.measure

@@ -36,7 +36,7 @@ from rocking.core.progress import note
 from rocking.core.tables import write_csv
 from rocking.errors import FitError, OptionError
 from rocking.inputs.notes import hazard_notes
-from rocking.motion.scaling import Measure
+from rocking.motion.scaling import ComponentName, Measure
 from rocking.simulation.ensemble import Polarity
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ def fragility(
     limit_states: str = "overturning",
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "+",
     clusters: str | None = None,
+    larger: Annotated[bool, Parameter(negative="")] = False,
     confidence: float = 0.9,
     taxonomy: str = "rocking-block",
     hazard: Path | None = None,
@@ -85,6 +86,8 @@ def fragility(
     clusters
         Groups of records for the intervals: station groups the components of one station in one earthquake, as named
         in the files; or a label for each record, separated by commas. By default each record is a group.
+    larger
+        Count only the larger response of both components of each pair (--component), and of both polarities.
     confidence
         Probability of the intervals and bands.
     taxonomy
@@ -103,7 +106,8 @@ def fragility(
     if outcomes is not None:
         conflicting = {
             "records": names, "levels": measure.levels, "ensemble": block.ensemble, "clusters": clusters,
-            "limit_states": limit_states != "overturning", "polarity": polarity != "+", "model": model.equation,
+            "larger": larger, "limit_states": limit_states != "overturning",
+            "polarity": polarity != "+", "model": model.equation,
             "chattering": model.chattering != "certified", **block.supplied(),
             **motion.supplied("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
         }  # fmt: skip
@@ -112,8 +116,8 @@ def fragility(
             raise OptionError(message, "outcomes", option)
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", OptionError)
-    curve = read_hazard(hazard, site, years, measure.period)
-    states = parse_limit_states(limit_states)
+    curve = read_hazard(hazard, site, years, measure.periods, motion.component)
+    states, intensity_measure = parse_limit_states(limit_states), measure.create_measure(motion.component)
     if output.out is not None:
         check_nrml_names("taxonomy", taxonomy)
         check_nrml_names("a limit state", *states)
@@ -124,14 +128,19 @@ def fragility(
     with output.folder() as folder:
         records: dict[str, Any] = {}
         if outcomes is not None:
-            observed = read_observed(outcomes, measure.intensity_measure, **motion.metadata(), **motion.corrections())
+            observed = read_observed(outcomes, intensity_measure, **motion.metadata(), **motion.corrections())
             _check_hazard(curve, observed["measure"])
             fitted = fit_fragility(**observed, confidence=confidence)
         else:
-            _check_hazard(curve, measure.intensity_measure)
+            _check_hazard(curve, intensity_measure)
             loaded = motion.read_all(names)
-            records, settings = loaded.to_dict(), measure.arguments() | model.arguments() | bodies
-            settings |= {"polarity": polarity, "clusters": parse_labels(clusters), "limit_states": states}
+            records, settings = loaded.to_dict(), measure.arguments(motion.component) | model.arguments() | bodies
+            settings |= {
+                "polarity": polarity,
+                "clusters": parse_labels(clusters),
+                "limit_states": states,
+                "larger": larger,
+            }
             with _save_outcomes_on_failure(folder):
                 fitted = fit_simulated(motions=[*loaded.motions.values()], **settings, confidence=confidence)
         result, texts = fitted.to_dict() | records, [fitted.summary()]
@@ -188,14 +197,16 @@ def _save_outcomes_on_failure(folder: Path | None) -> Iterator[None]:
         raise
 
 
-def read_hazard(file: Path | None, site: int, years: float, period: float | None) -> HazardCurve | None:
+def read_hazard(
+    file: Path | None, site: int, years: float, period: Any, component: ComponentName
+) -> HazardCurve | None:
     """Read a hazard curve, if any, with notes."""
     if file is None:
         for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
             if is_given:
                 raise OptionError("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
         return None
-    curve = HazardCurve.read(file, site=site, period=period)
+    curve = HazardCurve.read(file, site=site, period=period, component=component)
     for sentence in hazard_notes(curve.intensity, curve.measure):
         note(f"{file}: {sentence}")
     return curve

@@ -6,9 +6,9 @@ import functools
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, make_dataclass
+from dataclasses import dataclass, fields, make_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, TypeVar, cast
 
 from cyclopts import Group, Parameter, Token
 
@@ -26,11 +26,21 @@ from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.inventory import read_inventory
 from rocking.inputs.notes import motion_notes, vertical_notes
 from rocking.inputs.pulses import named_pulse
-from rocking.inputs.quantities import Quantity, read_acceleration, read_array, read_number, read_scaling, read_velocity
+from rocking.inputs.quantities import (
+    NumberReader,
+    read_acceleration,
+    read_array,
+    read_duration,
+    read_length,
+    read_number,
+    read_scaling,
+    read_velocity,
+)
 from rocking.inputs.texts import write_option_name
 from rocking.motion.motion import Motion
-from rocking.motion.scaling import IntensityName, Measure
-from rocking.records.named import expand_record_names, load_motion, load_vertical
+from rocking.motion.scaling import ComponentName, IntensityName, Measure
+from rocking.records.components import load_pairs
+from rocking.records.named import OWN, expand_record_names, list_motion_names, load_motion, load_vertical
 
 if TYPE_CHECKING:
     from rocking.block import Block
@@ -241,6 +251,10 @@ class FileOptions(InputOptions):
         else:
             options = self.metadata() | self.corrections()
             motion = load_motion(name, **options, vertical=vertical, several=several)
+        return self._scale(name, motion, target)
+
+    def _scale(self, name: str, motion: Motion, target: tuple[float, Measure] | None) -> Motion:
+        """Return the scaled motion, with notes."""
         notes = motion_notes(motion)
         for sentence in (*notes, *vertical_notes(motion)):
             note(f"{name}: {sentence}")
@@ -305,6 +319,13 @@ def read_records(
     return results, messages
 
 
+_COMPONENT_HELP: Final = (
+    "Component to which intensity measures and levels refer: own, or for pairs of horizontal components, which are "
+    "grouped by station and event, geometric_mean, larger, rotd50 or rotd100. With pairs, --vertical own adds the "
+    "vertical component of the station."
+)
+
+
 @dataclass(frozen=True)
 class _RecordOptions(FileOptions):
     """Several records and pulses."""
@@ -312,6 +333,8 @@ class _RecordOptions(FileOptions):
     keep_going: Annotated[
         bool, Parameter(name="--keep-going", negative="", help="Skip records that cannot be read, and list them.")
     ] = False
+    component: Annotated[ComponentName, Parameter(help=_COMPONENT_HELP)] = "own"
+    reversed: Annotated[bool, Parameter(negative="", help="Also use every motion reversed (x -1).")] = False
 
     def read_all(self, names: Sequence[str]) -> LoadedRecords:
         """Return the motions by name."""
@@ -319,6 +342,8 @@ class _RecordOptions(FileOptions):
         if not records and not pulses:
             message = "at least one record is required: file, folder, or name of a shipped record, or {}"
             raise OptionError(message, "pulse")
+        if self.component != "own":
+            return self._read_pairs(records, pulses)
         pulse_motions = self.pulses()
         read = functools.partial(self.motion, several=len(records) > 1)
         motions, skipped = read_records(records, read, keep_going=self.keep_going)
@@ -328,7 +353,26 @@ class _RecordOptions(FileOptions):
         for message in messages:
             note(f"skipped: {message}")
         motions |= pulse_motions
-        return LoadedRecords(motions, skipped, [*motions] == [*names, *pulses] and len(motions) == 1)
+        is_single = [*motions] == [*names, *pulses] and len(motions) == 1 and not self.reversed
+        return LoadedRecords(self._add_reversed(motions), skipped, is_single)
+
+    def _read_pairs(self, records: Sequence[str], pulses: Sequence[str]) -> LoadedRecords:
+        """Return both horizontal components of each station, scaled by one factor."""
+        supplied = self.supplied()
+        if pulses or "channel" in supplied or supplied.get("vertical", OWN) != OWN:
+            message = f"{{}} {self.component} requires records: omit {{}} and {{}}, and use {{}} {OWN} or omit it"
+            raise OptionError(message, "component", "pulse", "channel", "vertical")
+        target = read_scaling({k: v for k, v in supplied.items() if k in declared.SCALINGS}, read_positive_acceleration)
+        if target is not None and target[1].name != "factor":
+            target = target[0], replace(target[1], component=self.component)
+        options = self.read_values("dt", "units") | self.corrections()
+        pairs = load_pairs(records, vertical="vertical" in supplied, keep_going=self.keep_going, **options)
+        named = dict(zip(list_motion_names(pairs), pairs, strict=True))
+        return LoadedRecords(self._add_reversed({k: self._scale(k, m, target) for k, m in named.items()}), {}, False)
+
+    def _add_reversed(self, motions: dict[str, Motion]) -> dict[str, Motion]:
+        """Add the reversed motions if required."""
+        return motions | {f"{name} x -1": -motion for name, motion in motions.items()} if self.reversed else motions
 
 
 @_with_inputs("vertical", "pulse")
@@ -342,7 +386,9 @@ class MotionOptions(_RecordOptions):
 
 
 _MEASURE_HELP: Final = (
-    "Intensity: PGA, PGV, spectral acceleration, or PGA and p PGV divided by the uplift acceleration of the block."
+    "Intensity: PGA, PGV, PGD, spectral acceleration at a period or its mean over several, Arias intensity, cumulative "
+    "absolute velocity, incremental velocity, significant duration, or PGA and p PGV divided by the block's uplift "
+    "acceleration."
 )
 _LEVELS_HELP: Final = (
     "Levels to scale every motion to, as 0.1g,0.2g or 0.1g:1g:10 (velocities as 0.4 (m/s) or 40cm/s, ratios as plain "
@@ -355,13 +401,22 @@ class IntensityOptions:
     """Intensity measure of motions."""
 
     measure: Annotated[IntensityName, Parameter(help=_MEASURE_HELP)] = "pga"
-    period: Annotated[float | None, Parameter(help="Period of the spectral acceleration, s.")] = None
+    period: Annotated[
+        str | None, Parameter(help="Period of the spectral acceleration, s, or periods of sa_average, as 0.5,1,2.")
+    ] = None
     damping: Annotated[float, Parameter(help="Fraction of critical damping of the spectral acceleration.")] = 0.05
 
     @property
-    def intensity_measure(self) -> Measure:
-        """Return the intensity measure."""
-        return Measure(self.measure, self.period, self.damping)
+    def periods(self) -> float | tuple[float, ...] | None:
+        """Return the period or periods."""
+        if self.period is None:
+            return None
+        periods = read_array(self.period, "period").tolist()
+        return periods[0] if len(periods) == 1 and self.measure != "sa_average" else tuple(periods)
+
+    def create_measure(self, component: ComponentName = "own") -> Measure:
+        """Return the intensity measure of a component."""
+        return Measure(self.measure, self.periods, self.damping, component)
 
 
 @dataclass(frozen=True)
@@ -370,13 +425,13 @@ class MeasureOptions(IntensityOptions):
 
     levels: Annotated[str | None, Parameter(help=_LEVELS_HELP, allow_leading_hyphen=True)] = None
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self, component: ComponentName = "own") -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        acceleration: Quantity = read_positive_acceleration
-        readers = {"pga": acceleration, "sa": acceleration, "pgv": read_velocity}
-        reader = readers.get(self.measure, _read_ratio)
+        measure, acceleration = self.create_measure(component), cast(NumberReader, read_positive_acceleration)
+        readers = {"m/s^2": acceleration, "m/s": read_velocity, "m": read_length, "s": read_duration}
+        reader = readers.get(measure.units, _read_ratio)
         levels = None if self.levels is None else read_array(self.levels, "levels", reader)
-        return {"measure": self.intensity_measure, "levels": levels}
+        return {"measure": measure, "levels": levels}
 
 
 @dataclass(frozen=True)

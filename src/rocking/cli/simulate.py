@@ -20,10 +20,9 @@ from rocking.cli.options import (
     MotionOptions,
     Names,
     ObjectOptions,
-    SchemeOptions,
     SlipOptions,
+    SlipSchemeOptions,
     StartOptions,
-    read_friction,
     read_records,
 )
 from rocking.cli.output import (
@@ -50,7 +49,7 @@ from rocking.records.named import (
     shipped,
 )
 from rocking.response import Response
-from rocking.response.mechanics import check_friction
+from rocking.response.mechanics import check_available_friction
 from rocking.response.perturbed import MOTION_PRECISION, choose_steps
 from rocking.rules import compare_rules
 from rocking.simulation.simulate import simulate as run_simulation
@@ -60,14 +59,9 @@ from rocking.simulation.simulate import simulate as run_simulation
 class _ResponseOptions(StartOptions):
     """Start and end of a simulation, and optional results."""
 
-    friction: Annotated[
-        float | None, Parameter(help="Coefficient of friction, to report whether and when the block would slide.")
-    ] = None
-    sliding: Annotated[
-        str | None,
-        Parameter(
-            help="Coefficient of friction with which slip is simulated, or the static and the kinetic one, as 0.3,0.25."
-        ),
+    available_friction: Annotated[
+        float | None,
+        Parameter(help="Coefficient of friction, to report whether and when a block that never slips would slide."),
     ] = None
     precision: Annotated[
         float, Parameter(help="Relative precision of the record; 11 motions within it are also simulated.")
@@ -81,7 +75,7 @@ def simulate(
     start: Annotated[_ResponseOptions, MODEL] = _ResponseOptions(),
     block: Annotated[ObjectOptions, BLOCK] = ObjectOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SchemeOptions, MODEL] = SchemeOptions(),
+    model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Simulate a block under a record and describe its response; for several of either, print one line for each pair.
@@ -100,29 +94,25 @@ def simulate(
     energy
         Also draw the phase plane (phase-plane.png, .pdf) and the energy against time (energy.png, .pdf) into --out.
     """
-    if start.friction is not None:
-        check_friction(start.friction)  # checked before the simulation
+    if start.available_friction is not None:
+        check_available_friction(start.available_friction)  # checked before the simulation
     choose_steps(start.precision)
-    summary_options: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
+    summary_options: dict[str, Any] = {name: getattr(start, name) for name in ("available_friction", "precision")}
     body = block.bodies()
     options: dict[str, Any] = {**model.arguments(), **start.read_values()}
-    slip = read_friction(start.sliding)
     for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
         raise OptionError("{} writes files; set their folder with {}", name, "out")
     with output.folder() as folder:
         loaded = motion.read_all(names)
         if loaded.is_single and not isinstance(body, Sequence):
             ((record, base_motion),) = loaded.motions.items()
-            response = run_simulation(body, base_motion, **options, **slip)
+            response = run_simulation(body, base_motion, **options)
             result = _write_response(response, record, summary_options, folder, energy)
             text = response.summary(**summary_options)
         else:
             if energy and not each:
                 raise OptionError("{} draws single responses; with several of them also use {}", "energy", "each")
-            sliding = slip.get("friction")
-            results = replace(
-                survey(body, loaded.motions, sliding=sliding, **summary_options, **options), skipped=loaded.skipped
-            )
+            results = replace(survey(body, loaded.motions, **summary_options, **options), skipped=loaded.skipped)
             if folder is not None:
                 results.to_csv(folder / "summary.csv")
                 results.to_json(folder / "summary.json")

@@ -27,6 +27,7 @@ from rocking.core.tables import format_count, write_text
 from rocking.core.threads import set_options
 from rocking.errors import FitError, OptionError, OutputError, StudyError
 from rocking.inputs.quantities import read_array
+from rocking.motion.scaling import ComponentName
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.results import StudyOutcome, check_fractiles
 from rocking.studies.study import Study, open_or_create
@@ -193,6 +194,8 @@ def report(
     together: Annotated[bool, Parameter(negative="")] = False,
     confidence: float = 0.9,
     fractiles: str = "0.16,0.5,0.84",
+    component: ComponentName = "own",
+    larger: Annotated[bool, Parameter(negative="")] = False,
     measure: Annotated[IntensityOptions, MEASURE] = IntensityOptions(),
     output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
 ) -> None:
@@ -212,15 +215,21 @@ def report(
         Probability of the intervals.
     fractiles
         Fractions of the motions that stay below the fractiles of the spectrum.
+    component
+        Component to which the intensity refers; for a study of pairs also geometric_mean, larger, rotd50 or rotd100.
+    larger
+        Count only the larger response of both components of each pair, and of both polarities.
     """
-    intensity_measure, limits = measure.intensity_measure, parse_limit_states(limit_states)
+    intensity_measure, limits = measure.create_measure(component), parse_limit_states(limit_states)
     fractions = check_fractiles(read_array(fractiles, "fractiles").tolist())
     checks.fraction(confidence, "confidence", OptionError)
     study, results = Study(folder), dict[str, Result]()
     fit = study.fragility if together else study.block_fragilities
     with open_output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
         with skip_on_error("fragility", FitError):
-            results["fragility"] = fit(measure=intensity_measure, limit_states=limits, confidence=confidence)
+            results["fragility"] = fit(
+                measure=intensity_measure, limit_states=limits, confidence=confidence, larger=larger
+            )
         results["spectrum"] = study.spectrum(fractions.tolist())
         for name, analysis in results.items():
             analysis.to_csv(target / f"{name}.csv")

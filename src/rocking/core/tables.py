@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _WIDTH: Final = 100_000
 
 #: Relative rounding error after a few operations.
-_ROUNDING: Final = 2.0**-50
+_DECIMAL_ROUNDING: Final = 2.0**-50
 
 #: Number of letters that make the name of a temporary file unique.
 _SUFFIX_LENGTH: Final = 8
@@ -145,7 +145,7 @@ def escape_dollars(text: str) -> str:
 def round_decimal(value: float) -> float:
     """Return a number without the rounding in its last digit, for display."""
     rounded = float(f"{value:.12g}")
-    return rounded if abs(rounded - value) <= _ROUNDING * abs(value) else value
+    return rounded if abs(rounded - value) <= _DECIMAL_ROUNDING * abs(value) else value
 
 
 def columns_to_frame(columns: Iterable[Column]) -> pd.DataFrame:

@@ -82,7 +82,7 @@ class PeriodicForcing:
 
     def _copy_settings(self, *, stores_nodes: bool) -> state.Record:
         settings = self._settings.copy()
-        settings["record"] = stores_nodes
+        settings["writes_tables"] = stores_nodes
         return settings
 
     def _create_problem(self) -> PeriodicProblem:

@@ -204,7 +204,7 @@ def never_rests(bodies: Bodies) -> bool:
 
 
 def build_settings(
-    bodies: Bodies, model: Model, scheme: ChatteringScheme, duration: float | None, *, record: bool
+    bodies: Bodies, model: Model, scheme: ChatteringScheme, duration: float | None, *, writes_tables: bool
 ) -> state.Record:
     """Check and return the settings of a simulation; a duration is required if nothing comes to rest."""
     checks.choice(model, "model", OptionError, MODELS)
@@ -216,7 +216,7 @@ def build_settings(
     else:
         duration = checks.positive(duration, "duration", OptionError, "s")
     stop = math.inf if duration is None else duration
-    fields = (model == "nonlinear", scheme.code, scheme.bracket, stop, duration is None, record)
+    fields = (model == "nonlinear", scheme.code, scheme.bracket, stop, duration is None, writes_tables)
     return state.expose_fields(np.array([fields], dtype=state.SETTINGS))[0]
 
 

@@ -90,14 +90,14 @@ class Setup:
         motion: Motion | None,
         factor: float = 1.0,
         *,
-        record: bool = False,
+        writes_tables: bool = False,
         ground: Ground | None = None,
         name: str | None = None,
     ) -> Run:
         """Return the arguments of the kernels for the bodies under a scaled motion, after checking all arguments."""
         bodies = self.bodies
         check_components(bodies, motion)
-        settings = build_settings(bodies, self.model, self.chattering, self.duration, record=record)
+        settings = build_settings(bodies, self.model, self.chattering, self.duration, writes_tables=writes_tables)
         records = bodies.kernel_records(self.model, self.chattering.thresholds(bodies, motion, self.model, factor))
         if self.friction is not None:
             add_friction(records, bodies, self.model, self.friction)
@@ -212,7 +212,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
         check_components(bodies, ground_motion)
     motion = np.zeros(len(bodies), dtype=np.int64) if task.motion is None else task.motion
     factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(bodies)).copy()
-    settings = build_settings(bodies, setup.model, setup.chattering, setup.duration, record=False)
+    settings = build_settings(bodies, setup.model, setup.chattering, setup.duration, writes_tables=False)
     records = bodies.kernel_records(setup.model, _compute_thresholds(setup, bodies, task.motions, motion, factors))
     if setup.friction is not None:
         add_friction(records, bodies, setup.model, setup.friction)

@@ -25,7 +25,7 @@ from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import read_number
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.response.mechanics import check_friction
+from rocking.response.mechanics import check_available_friction
 from rocking.rules import apply_rules, overturning_velocity
 from rocking.simulation.simulate import simulate
 
@@ -109,7 +109,9 @@ def read_assessment(case: Case, texts: Texts, uploads: UploadStore) -> Assessmen
     low, high = chosen_ends.get("level_from", default_range[0]), chosen_ends.get("level_to", default_range[1])
     if not 0.0 < low < high < math.inf:
         raise OptionError("{} must be positive, and below the last of the levels", "level_from")
-    friction = check_friction(read_number(nonempty["friction"], "friction")) if "friction" in nonempty else None
+    friction = None
+    if "friction" in nonempty:
+        friction = check_available_friction(read_number(nonempty["friction"], "friction"), "friction")
     return Assessment(
         case, entries, number_stations(entries, uploads), uploads, measure, np.linspace(low, high, int(count)), friction
     )

@@ -81,7 +81,8 @@ def describe_body(body: MeshBody, azimuth: float) -> Payload:
     support = solid.support - solid.centre[:2]
     parts = [region.name for region in solid.regions]
     data = solid.rose([azimuth]).data
-    neglected = {name: float(data[name][0]) for name in ("coupling", "aside", "gap")}
+    names = {"coupling": "coupling", "aside": "lateral_offset", "gap": "gap"}
+    neglected = {text: float(data[name][0]) for text, name in names.items()}
     header = {
         "name": solid.description,
         "about": _describe_solid(solid),

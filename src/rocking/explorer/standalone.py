@@ -218,7 +218,7 @@ def _build_templates() -> dict[str, str]:
     """Return the bytes of records as the package prepares them, for the page to change: hexadecimal."""
     templates = {"state": _write_bytes(state.new_states(1, 0))}
     for model, scheme, is_recorded in product(MODELS, (Certified(), VelocityThreshold(1.0)), (False, True)):
-        run = Setup(Block(width=0.4, height=2.0).as_bodies(), model, scheme).prepare(None, record=is_recorded)
+        run = Setup(Block(width=0.4, height=2.0).as_bodies(), model, scheme).prepare(None, writes_tables=is_recorded)
         key = f"{model} {scheme.name}"
         templates[f"settings {key} {'record' if is_recorded else 'state'}"] = _write_bytes(run.settings)
         templates[f"block {key}"] = _write_bytes(run.records)

@@ -17,7 +17,7 @@ from rocking.errors import BlockError, OptionError, RockingError, escape_braces,
 from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, COUPLES, FORCES, INPUTS, READERS, BlockDescription
 from rocking.inputs.notes import block_notes, restraint_notes
-from rocking.inputs.quantities import Quantity
+from rocking.inputs.quantities import NumberReader
 
 Item = TypeVar("Item")
 
@@ -143,7 +143,7 @@ def note_likely_mistakes(blocks: Sequence[Block], bodies: Sequence[Body] = ()) -
         note(sentence)
 
 
-def find_reader(parameter: str) -> Quantity:
+def find_reader(parameter: str) -> NumberReader:
     """Return the reader of a parameter of a restraint or of another body."""
     kind = INPUTS[parameter].kind if parameter in INPUTS else "number"
     return READERS.get(kind, READERS["number"])[0]

@@ -14,7 +14,7 @@ from rocking.inputs.notes import level_notes
 from rocking.records.units import normalise_spelling
 
 #: Reader of a number of each kind, and its SI unit.
-READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
+READERS: Final[Mapping[str, tuple[quantities.NumberReader, str]]] = {
     "number": (quantities.read_number, ""),
     "length": (quantities.read_length, "m"),
     "position": (quantities.read_position, "m"),
@@ -186,8 +186,8 @@ INPUTS: Final = index_by_name(
     Input("thrust", "", "texts",
         "Horizontal force to side +, as force=1500,height=4 (N, m), with offset (m); several times for several."),
     Input("load", "", "texts",
-        "Weight on it, as mass=250,height=3 (kg, m), with offset (m), and follows=no for one that presses and does "
-        "not move with it; several times for several."),
+        "Weight on it, as mass=250,height=3 (kg, m), with offset (m), and moves_with_block=no for one that only "
+        "presses; several times for several."),
     Input("gravity", "model", "acceleration", "", "m/s²"),
     Input("motion", "motion", "text", default="ridgecrest-clc-090"),
     Input("channel", "motion", "text", "Channel, by number or name, of files that hold several."),

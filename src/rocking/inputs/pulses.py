@@ -74,7 +74,7 @@ class PulseFamily:
         """Return the SI unit of a parameter; empty without a unit."""
         return READERS.get(self.parameter(parameter).kind, (None, ""))[1]
 
-    def quantity(self, parameter: str) -> quantities.Quantity | None:
+    def quantity(self, parameter: str) -> quantities.NumberReader | None:
         """Return the reader of a parameter; None for a word."""
         return READERS.get(self.parameter(parameter).kind, (None, ""))[0]
 

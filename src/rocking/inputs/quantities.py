@@ -18,7 +18,7 @@ from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import ACCELERATION_UNITS, TIME_UNITS, Unit, normalise_spelling
 
 #: Reader of one number: converts its text, with the name of its argument, to SI units.
-Quantity = Callable[[str, str], float]
+NumberReader = Callable[[str, str], float]
 
 #: Maximum count of numbers in a range.
 _MAX_COUNT: Final = 100_000
@@ -66,7 +66,7 @@ def read_number(text: str, name: str) -> float:
     return value
 
 
-def _create_reader(units: Mapping[str, Unit], expected: str) -> Quantity:
+def _create_reader(units: Mapping[str, Unit], expected: str) -> NumberReader:
     """Return a reader of a number with or without one of some units."""
 
     def read(text: str, name: str) -> float:
@@ -108,19 +108,19 @@ def read_tilt(text: str, name: str) -> float:
     raise OptionError(message, name, value=text)
 
 
-def read_sides(text: str, name: str, quantity: Quantity = read_number) -> float | list[float]:
+def read_sides(text: str, name: str, quantity: NumberReader = read_number) -> float | list[float]:
     """Return one number, or a list of two: side + and side -."""
     return _read_one_or_two(text, name, quantity, "a number, or two numbers separated by a comma (side +, side -)")
 
 
-def read_bounds(text: str, name: str, quantity: Quantity = read_number) -> float | tuple[float, ...]:
+def read_bounds(text: str, name: str, quantity: NumberReader = read_number) -> float | tuple[float, ...]:
     """Return one known number, or two: the lowest and highest plausible values."""
     expected = "a known number, or the lowest and the highest plausible number, separated by a comma"
     numbers = _read_one_or_two(text, name, quantity, expected)
     return tuple(numbers) if isinstance(numbers, list) else numbers
 
 
-def _read_one_or_two(text: str, name: str, quantity: Quantity, expected: str) -> float | list[float]:
+def _read_one_or_two(text: str, name: str, quantity: NumberReader, expected: str) -> float | list[float]:
     numbers = [quantity(part, name) for part in text.split(",")]
     if len(numbers) > 2:
         raise OptionError(f"{{}} must be {expected}, not {text!r}", name, value=text)
@@ -131,7 +131,7 @@ def _read_one_or_two(text: str, name: str, quantity: Quantity, expected: str) ->
 PLUS_MINUS: Final = re.compile(r"\+-|±|\+/-")
 
 
-def read_uncertain(text: str, name: str, quantity: Quantity = read_number) -> Distribution:
+def read_uncertain(text: str, name: str, quantity: NumberReader = read_number) -> Distribution:
     """Return the normal distribution of "0.30 +- 0.02" (mean and standard deviation) or "30 +- 2 cm"."""
     mean, deviation = PLUS_MINUS.split(text, maxsplit=1)
     unit = "" if _split_unit(mean)[1] else _split_unit(deviation)[1]
@@ -142,7 +142,7 @@ def read_uncertain(text: str, name: str, quantity: Quantity = read_number) -> Di
         raise OptionError(message + escape_braces(repr(text.strip())), name, value=text) from None
 
 
-def read_axis(value: Any, name: str, quantity: Quantity = read_number) -> Floats:
+def read_axis(value: Any, name: str, quantity: NumberReader = read_number) -> Floats:
     """Return the numbers of an entry of a study file: one, a list, or a range."""
     if isinstance(value, str):
         return read_array(value, name, quantity)
@@ -150,7 +150,7 @@ def read_axis(value: Any, name: str, quantity: Quantity = read_number) -> Floats
     return np.array([quantity(entry if isinstance(entry, str) else repr(entry), name) for entry in entries])
 
 
-def read_array(text: str, name: str, quantity: Quantity = read_number) -> Floats:
+def read_array(text: str, name: str, quantity: NumberReader = read_number) -> Floats:
     """Return numbers from "1,2,5" or from "START:STOP:COUNT", with ":log" at the end for equal ratios."""
     parts = text.split(":")
     if len(parts) == 1:
@@ -170,7 +170,7 @@ def read_array(text: str, name: str, quantity: Quantity = read_number) -> Floats
     raise OptionError(f"{{}} must be {requirement}, not {text!r}", name, value=text)
 
 
-def read_level_at_period(text: str, name: str, quantity: Quantity = read_acceleration) -> tuple[float, float]:
+def read_level_at_period(text: str, name: str, quantity: NumberReader = read_acceleration) -> tuple[float, float]:
     """Return an acceleration, m/s^2, and a period, s, from "0.4g@1.0"."""
     level, at, period = text.partition("@")
     if not at:
@@ -179,7 +179,7 @@ def read_level_at_period(text: str, name: str, quantity: Quantity = read_acceler
 
 
 def read_scaling(
-    texts: Mapping[str, str | float | None], quantity: Quantity = read_acceleration
+    texts: Mapping[str, str | float | None], quantity: NumberReader = read_acceleration
 ) -> tuple[float, Measure] | None:
     """Return the level to which a motion is scaled and its measure, or None without a level."""
     options = {name: value for name, value in texts.items() if value is not None}

@@ -1,10 +1,10 @@
 """Derivatives of one number of a response by all coefficients of its motion, in one backward pass.
 
-Whereas `trace.vary` propagates one change of the input forwards to all numbers of a response, this module propagates
-the derivatives of one number by the state, d number = l du + m dv, backwards to all inputs. Along an arc with
-du'' = k(t) du - c du' + f(t), m'' = k(t) m + c m' and l = c m - m', and a forcing f adds the integral of m f. Through
-an impact, the transposed saltation applies. A tendon that yields adds its plastic elongation to the state, which forces
-arcs with an elastic tendon and is written when the body turns back.
+Whereas `trace.compute_variation` propagates one change of the input forwards to all numbers of a response, this module
+propagates the derivatives of one number by the state, d number = l du + m dv, backwards to all inputs. Along an arc
+with du'' = k(t) du - c du' + f(t), m'' = k(t) m + c m' and l = c m - m', and a forcing f adds the integral of m f.
+Through an impact, the transposed saltation applies. A tendon that yields adds its plastic elongation to the state,
+which forces arcs with an elastic tendon and is written when the body turns back.
 """
 
 import math
@@ -36,7 +36,7 @@ from rocking.kernels.trace import (
 _STATE_DERIVATIVES = 3
 
 #: Rounding of a step, divided by its largest terms.
-_ROUNDING = 2.0**-51
+_STEP_ROUNDING = 2.0**-51
 
 
 class AdjointEnd(IntEnum):
@@ -115,11 +115,11 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
         abs(block.threshold[side]) * weight + abs(block.restraint_threshold[side]) + push
     )
     force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
-    force = _ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
+    force = _STEP_ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
     force += block.threshold_slope[side] * ground_error(ground)
-    change[3] += abs(change[0]) * (0.5 * _ROUNDING * (height + speed * t) + 0.5 * force * t * t)
-    change[3] += abs(change[1]) * (0.5 * _ROUNDING * speed + force * t)
-    change[3] += abs(change[0] * v + change[1] * w) * _ROUNDING * end
+    change[3] += abs(change[0]) * (0.5 * _STEP_ROUNDING * (height + speed * t) + 0.5 * force * t * t)
+    change[3] += abs(change[1]) * (0.5 * _STEP_ROUNDING * speed + force * t)
+    change[3] += abs(change[0] * v + change[1] * w) * _STEP_ROUNDING * end
 
 
 @inlined

@@ -67,7 +67,7 @@ _CONTACT_ROUNDING = 2.0**-46
 _AMBIGUOUS_DISTANCE = 2.0**-36
 
 #: Fraction of a step for which a block sticks after its forces have only touched the cone of friction.
-_AFTER_TOUCH = 1e-3
+_TOUCHING_STEP_RATIO = 1e-3
 
 
 @kernel
@@ -260,7 +260,7 @@ def slip_along_arc(
         return StepOutcome.LOST
     if stick == 0.0 and state.slip_rate == 0.0:  # the cone was only touched: a short step without slip
         state.direction = 0
-        order, h, _ = expand_arc(ground, block, settings, scratch, state, _AFTER_TOUCH * h)
+        order, h, _ = expand_arc(ground, block, settings, scratch, state, _TOUCHING_STEP_RATIO * h)
         return finish_step(
             ground, settings, state, advance_to_event(state, scratch, order, h, block.overturn_angle), h_max
         )

@@ -21,14 +21,14 @@ from rocking.kernels.compiled import inlined, shared
 
 #: Number of Newton steps to the time of rest, and the relative error of the speed that ends them.
 _MAX_NEWTON_STEPS = 5
-_AGREEMENT = 2.0**-40
+_SPEED_TOLERANCE = 2.0**-40
 
 THIRD = 1.0 / 3.0
 FIFTEENTH = 1.0 / 15.0
 
 #: Coefficients of powers 1, 2, 3, 4.
 Series = tuple[float, float, float, float]
-Three = tuple[float, float, float]
+Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
@@ -92,7 +92,7 @@ def side_at_candidate(side: ImpactSide, s: float) -> RestSide:
 
 
 @inlined
-def mean_restoring(a: RestSide, half: Series, sign: float) -> Three:
+def mean_restoring(a: RestSide, half: Series, sign: float) -> Triple:
     """Compute coefficients 1, 2, 3 of B, where Y B is the speed at the start (sign -1) or end (+1) of an arc.
 
     Y is half the duration, C = z - Y the remaining time and G = g - rate C + curvature C^2 the acceleration at its
@@ -125,7 +125,7 @@ def mean_restoring(a: RestSide, half: Series, sign: float) -> Three:
 
 
 @inlined
-def known_speed_terms(a: RestSide, half: Series, sign: float) -> Three:
+def known_speed_terms(a: RestSide, half: Series, sign: float) -> Triple:
     """Compute coefficients 2, 3, 4 of Y B without g Y, which contains the unknown coefficient."""
     b = mean_restoring(a, half, sign)
     y, y2, y3, _ = half
@@ -140,7 +140,7 @@ def solve_pair(first: float, second: float, p: float, q: float) -> Pair:
 
 
 @inlined
-def speed_difference(m: Series, ends: Three, starts: Three, speed: Series, e: float) -> Three:
+def speed_difference(m: Series, ends: Triple, starts: Triple, speed: Series, e: float) -> Triple:
     """Compute orders 2, 3, 4 of the difference of the speeds at an impact, with zero half durations of that order.
 
     ``m`` is the remaining time at the next impact, ``ends`` and ``starts`` are the `known_speed_terms` of this arc's
@@ -247,7 +247,7 @@ def solve_candidate(
     A, B = expand_curves(a, b, e_i, e_j)
     residual = v / s - initial_speed(a, A.half)
     for _ in range(_MAX_NEWTON_STEPS):
-        if not abs(residual) > _AGREEMENT * A.speed[0]:
+        if not abs(residual) > _SPEED_TOLERANCE * A.speed[0]:
             break
         # The slope includes the change of the first coefficient with the candidate; other changes are smaller.
         first = A.speed[0]
@@ -263,7 +263,7 @@ def solve_candidate(
 
 
 #: Relative allowance for rounding.
-_ROUNDING = 2.0**-48
+_BOUND_ROUNDING = 2.0**-48
 
 #: Largest relative distance from the candidate for the proof, and its factor on the bounds.
 _MAX_DISTANCE = 2.0**-12
@@ -300,7 +300,7 @@ def bound_mean_restoring(a: RestSide, half: Series) -> Pair:
 
 
 @inlined
-def bound_speed(half: Series, b: Three, higher_terms: float) -> float:
+def bound_speed(half: Series, b: Triple, higher_terms: float) -> float:
     """Bound the terms of Y B beyond order 4, divided by z^5."""
     y2, y3, y4 = abs(half[1]), abs(half[2]), abs(half[3])
     b1, b2, b3 = abs(b[0]), abs(b[1]), abs(b[2])
@@ -343,7 +343,7 @@ def bound_arcs(side: ImpactSide, a: RestSide, half: Series) -> ArcLimits:
     Y = sum_magnitudes(half)
     stiffness = abs(a.stiffness) * Y * Y * _MARGIN
     magnitude = abs(side.g) + change
-    min_restoring = min(side.g, a.g) - 0.25 * curvature - 2.0 * _MAX_DISTANCE * change - _ROUNDING * magnitude
+    min_restoring = min(side.g, a.g) - 0.25 * curvature - 2.0 * _MAX_DISTANCE * change - _BOUND_ROUNDING * magnitude
     min_slope = min_restoring * (1.0 - stiffness) - (THIRD * curvature * Y * Y + 0.1 * rate * stiffness * Y) * _MARGIN
     growth = half[0] - (2.0 * abs(half[1]) + 3.0 * abs(half[2]) + 4.0 * abs(half[3])) * _MARGIN
     higher_terms, mean_bound = bound_mean_restoring(a, half)
@@ -357,11 +357,11 @@ def bound_arcs(side: ImpactSide, a: RestSide, half: Series) -> ArcLimits:
 
 
 @inlined
-def bound_shifts(m: Series, current: ArcLimits, following: ArcLimits, speed: Series, e: float) -> Three:
+def bound_shifts(m: Series, current: ArcLimits, following: ArcLimits, speed: Series, e: float) -> Triple:
     """Bound the shift of the time of rest by one arc and impact, divided by z^5, z, and z times the distance so far."""
     M = sum_magnitudes(m)
     fifth = bound_mismatch(m, current.end, following.start, speed, e) * following.inverse
-    rounding = 4.0 * _ROUNDING * (e * current.speeds + following.speeds * M)
+    rounding = 4.0 * _BOUND_ROUNDING * (e * current.speeds + following.speeds * M)
     inverse_before, inverse_after = current.inverse, e * following.inverse
     first = (
         rounding * following.inverse
@@ -373,7 +373,7 @@ def bound_shifts(m: Series, current: ArcLimits, following: ArcLimits, speed: Ser
 
 
 @inlined
-def bound_distance(first: float, ratios: Pair, first_shift: Three, second_shift: Three) -> float:
+def bound_distance(first: float, ratios: Pair, first_shift: Triple, second_shift: Triple) -> float:
     """Bound the distance of the time of rest from the candidate by the geometric sum of all shifts; NaN: no proof."""
     pair = ratios[0] * ratios[1]
     square = ratios[0] * ratios[0]
@@ -386,7 +386,7 @@ def bound_distance(first: float, ratios: Pair, first_shift: Three, second_shift:
 
 
 @inlined
-def bound_ratio(m: Series, shift: Three, next_shift: Three) -> float:
+def bound_ratio(m: Series, shift: Triple, next_shift: Triple) -> float:
     """Bound the ratio of remaining times at two impacts, shifts included; NaN if their order is uncertain."""
     shifted = shift[0] + shift[1] + shift[2] * _MAX_DISTANCE + next_shift[1]
     higher = (abs(m[1]) + abs(m[2]) + abs(m[3])) * _MARGIN
@@ -406,7 +406,7 @@ def refine_bracket(v: float, i: ImpactSide, j: ImpactSide, window: float) -> Pai
     if not 0.5 * first <= window:
         return math.nan, math.nan
     s, a, b, A, B, residual = solve_candidate(v, i, j, first)
-    half_width = s * bound_remainder(i, j, (a, b), (A, B), residual) * (1.0 + _ROUNDING) + _ROUNDING * s
+    half_width = s * bound_remainder(i, j, (a, b), (A, B), residual) * (1.0 + _BOUND_ROUNDING) + _BOUND_ROUNDING * s
     if not (s > 0.0 and s + half_width <= window):
         return math.nan, math.nan
     return s - half_width, s + half_width
@@ -423,7 +423,7 @@ def bound_remainder(
     shift_i = bound_shifts(m_i, limits_i, limits_j, B.speed, i.restitution)
     shift_j = bound_shifts(m_j, limits_j, limits_i, A.speed, j.restitution)
     ratios = bound_ratio(m_i, shift_i, shift_j), bound_ratio(m_j, shift_j, shift_i)
-    first = (abs(residual) + 4.0 * _ROUNDING * limits_i.speeds) * limits_i.inverse
+    first = (abs(residual) + 4.0 * _BOUND_ROUNDING * limits_i.speeds) * limits_i.inverse
     return bound_distance(first, ratios, shift_i, shift_j)
 
 
@@ -435,4 +435,4 @@ def bound_restoring_error(error: float, change: float, curvature: float, height:
     ground accelerations a in units of g, k = p^2 (cos(alpha) - j a sin(alpha)), with a curvature of
     p^2 hypot(1, |a|max).
     """
-    return (error + height * (change + 0.5 * curvature * height)) * (1.0 + _ROUNDING)
+    return (error + height * (change + 0.5 * curvature * height)) * (1.0 + _BOUND_ROUNDING)

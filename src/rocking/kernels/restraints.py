@@ -22,7 +22,7 @@ from rocking.kernels.events import find_first_root
 from rocking.kernels.state import Record, Records, TendonLaw
 
 #: Distance from a level, relative to it, that is rounding.
-_ROUNDING = 2.0**-44
+_LEVEL_TOLERANCE = 2.0**-44
 
 
 @shared
@@ -101,7 +101,7 @@ def find_level_passage(c: Floats, order: int, h: float, level: float, sign: floa
     if level == np.inf:
         return np.inf
     d[0] = sign * (level - c[0])
-    if abs(d[0]) <= _ROUNDING * level:
+    if abs(d[0]) <= _LEVEL_TOLERANCE * level:
         d[0] = 0.0
     for k in range(1, order + 1):
         d[k] = -sign * c[k]

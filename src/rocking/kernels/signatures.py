@@ -45,7 +45,16 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
     return {
         "march.march": (sample, block, settings, table, scratch, states[0]),
         "trace.trace": (trail, scratch, fixed(), count, array(1, 3)),
-        "trace.vary": (trail, scratch, state.new_record(state.VARIATION), 0, fixed(), array(), array(), array()),
+        "trace.compute_variation": (
+            trail,
+            scratch,
+            state.new_record(state.VARIATION),
+            0,
+            fixed(),
+            array(),
+            array(),
+            array(),
+        ),
         "adjoint.adjoint": (trail, scratch, state.new_record(state.VARIATION), 0, 0.0, array(3), array(2, 2)),
         "adjoint.adjoint_of_final_state": (trail, scratch, 0, array(3), array(2, 2)),
         "periodic.iterate": (problem, scratch, states, 1, array(1, 1, 3), array(1, TRAP_COLUMNS), count, count),

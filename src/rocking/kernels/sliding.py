@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 
+from rocking.core.arrays import Floats
 from rocking.kernels.arc import (
     NEGLIGIBLE,
     expand_arc,
@@ -43,7 +44,7 @@ from rocking.kernels.state import ORDER, Record
 _FIRST_STEP = 1.3
 
 #: Accelerations of the foot that rounding may cause, divided by g.
-_ROUNDING = 2.0**-48
+_ACCELERATION_ROUNDING = 2.0**-48
 
 #: Number of last terms that must be negligible where a series ends, and largest number of times that a step is
 #: shortened until they are.
@@ -276,14 +277,22 @@ def shorten_slip(block: Record, scratch: Record, h: float) -> float:
     return h
 
 
+@inlined
+def ignore_rounding_at_start(velocity: Floats) -> None:
+    """Set the first acceleration of a foot that starts to slip to zero if it may be a rounding error."""
+    if (
+        velocity[0] == 0.0 and abs(velocity[1]) <= _ACCELERATION_ROUNDING
+    ):  # the forces are on the cone except for rounding
+        velocity[1] = 0.0
+
+
 @shared
 def find_slip_end(scratch: Record, order: int, h: float, direction: float) -> tuple[float, float]:
     """Find the first times in [0, h) at which slide-rock sticks, and at which contact is lost; inf if never."""
     d = scratch.auxiliary
     for k in range(order):
         d[k] = direction * scratch.slip[k]
-    if d[0] == 0.0 and abs(d[1]) <= _ROUNDING:  # the forces are on the cone except for rounding
-        d[1] = 0.0
+    ignore_rounding_at_start(d)
     stick = find_first_passing(d, order - 1, h)
     for k in range(order - 1):
         d[k] = scratch.lift[k]
@@ -332,6 +341,7 @@ def find_slide_end(
         h = min(h, 2.0 * abs(state.slip_rate) / block.kinetic_friction)
     for k in range(degree + 1):
         d[k] = state.direction * scratch.slip[k]
+    ignore_rounding_at_start(d)
     stick = find_first_passing(d, degree, h)
     lost = np.inf
     if has_vertical(ground):

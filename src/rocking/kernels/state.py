@@ -176,7 +176,7 @@ SETTINGS = define_record(
     tolerance="f8",  # largest accepted width of a bracket on the time of rest, s
     stop="f8",  # time at which to stop, s
     no_end_time="?",  # whether the stop time is infinite
-    record="?",  # whether to write the tables, or only the state
+    writes_tables="?",  # whether to write the tables, or only the state
 )
 
 #: State of a march.
@@ -328,7 +328,7 @@ _ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
 def has_space(settings: Record, table: Records, state: Record) -> bool:
     """Return whether the table has space for one iteration of the march."""
     max_rows = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
-    return not settings.record or max_rows + _ROWS_PER_ITERATION <= table.shape[0]
+    return not settings.writes_tables or max_rows + _ROWS_PER_ITERATION <= table.shape[0]
 
 
 @inlined
@@ -352,7 +352,7 @@ def stop_at_rest(resting: int) -> int:
 @inlined
 def write_node(ground: Ground, settings: Record, table: Records, state: Record) -> None:
     """Write the state."""
-    if not settings.record:
+    if not settings.writes_tables:
         return
     row = table[state.nodes].node
     row.time = piece_start(ground, state.piece) + state.offset
@@ -371,7 +371,7 @@ def write_node(ground: Ground, settings: Record, table: Records, state: Record) 
 @inlined
 def write_event(settings: Record, table: Records, state: Record, time: float, kind: int) -> None:
     """Write an uplift, rest or overturning."""
-    if settings.record:
+    if settings.writes_tables:
         row = table[state.events].event
         row.time = time
         row.kind = kind
@@ -382,7 +382,7 @@ def write_event(settings: Record, table: Records, state: Record, time: float, ki
 @inlined
 def write_impact(settings: Record, table: Records, state: Record, time: float, speed: float) -> None:
     """Write the last impact, from the state after it and the speed before."""
-    if not settings.record:
+    if not settings.writes_tables:
         return
     row = table[state.impacts - 1].impact
     row.time = time
@@ -400,7 +400,7 @@ def write_sequence(
     ``time``: last impact; ``bounds``: (lower, upper, time) to rest.
     """
     lower, upper, time_to_rest = bounds
-    if settings.record:
+    if settings.writes_tables:
         row = table[state.sequences].sequence
         row.start = state.sequence_start
         row.end = time + time_to_rest

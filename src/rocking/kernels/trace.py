@@ -46,8 +46,8 @@ def copy_trail(trail: Trail) -> Trail:
     return trail._replace(block=trail.block.copy()) if trail.block["yielding"] else trail
 
 
-#: Three variations.
-Three = tuple[float, float, float]
+#: Variations variations.
+Variations = tuple[float, float, float]
 
 #: Columns of the output of `trace`.
 _ROTATION, _VELOCITY, _ACCELERATION, _SLIP, _SLIP_VELOCITY = 0, 1, 2, 3, 4
@@ -165,7 +165,7 @@ _MIN_JUMP_EXCESS = 1e-9
 
 
 @kernel
-def vary(
+def compute_variation(
     trail: Trail,
     scratch: Record,
     work: Record,
@@ -307,7 +307,7 @@ def step_duration(trail: Trail, node: Record, next_node: Record) -> float:
 
 @shared
 def expand_variation(
-    trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: Three, duration: float
+    trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: Variations, duration: float
 ) -> int:
     """Write the series of the variation along the arc from a node into ``work.change``, and return its order.
 

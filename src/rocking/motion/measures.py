@@ -35,6 +35,12 @@ class MotionMeasures:
 
     breakpoints: Floats
     coefficients: Floats
+    name: str
+
+    @property
+    def other_horizontal(self) -> MotionMeasures | None:
+        """Orthogonal horizontal component, if any."""
+        return getattr(self, "orthogonal", None)
 
     @property
     def duration(self) -> float:
@@ -110,16 +116,28 @@ class MotionMeasures:
         """Arias intensity, m/s: ``pi/(2 g)`` times the exact integral of the squared acceleration."""
         return math.pi / (2.0 * STANDARD_GRAVITY) * float(np.sum(_integrate_square(self.coefficients, self._widths())))
 
-    @property
-    def cumulative_absolute_velocity(self) -> float:
-        """Exact integral of the absolute acceleration, m/s, with sign changes located within pieces."""
+    def _integrate_between_signs(self) -> Floats:
+        """Integrate the acceleration over intervals in which its sign is constant, located within pieces, m/s."""
         widths = self._widths()
         integral = self._compute_velocity()[:, np.newaxis, :]
         roots = piecewise.find_root_candidates(widths, self.coefficients)
         cuts = np.hstack([np.zeros((len(widths), 1)), roots, widths[:, np.newaxis]])
-        # The sign is constant between cuts. Adding the integral's start value would only lose digits.
+        # Adding the integral's start value would only lose digits.
         integral[..., 0] = 0.0
-        return float(np.sum(np.abs(np.diff(piecewise.evaluate_pieces(integral, cuts), axis=1))))
+        return np.asarray(np.diff(piecewise.evaluate_pieces(integral, cuts), axis=1))
+
+    @property
+    def cumulative_absolute_velocity(self) -> float:
+        """Exact integral of the absolute acceleration, m/s, with sign changes located within pieces."""
+        return float(np.sum(np.abs(self._integrate_between_signs())))
+
+    @property
+    def incremental_velocity(self) -> float:
+        """Largest exact change of the ground velocity between two sign changes of the acceleration, m/s."""
+        changes = self._integrate_between_signs().ravel()
+        changes = changes[changes != 0.0]
+        starts = np.flatnonzero(np.diff(np.sign(changes), prepend=0.0))
+        return float(np.max(np.abs(np.add.reduceat(changes, starts)))) if len(starts) else 0.0
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
         """Return the time between two fractions of the Arias intensity, s, or NaN if the intensity is zero.

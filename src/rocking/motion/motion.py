@@ -13,9 +13,9 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
-from rocking.errors import MotionError
+from rocking.errors import MotionError, escape_braces
 from rocking.motion import piecewise
-from rocking.motion.description import Description, create_label
+from rocking.motion.description import Description, Origin, compute_start_delay, create_label
 from rocking.motion.processing import ProcessingMethods
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
 
@@ -48,6 +48,8 @@ class Motion(ProcessingMethods):
         coefficients, or 0 if the pieces are the motion itself (records).
     vertical : Motion, optional
         Vertical ground acceleration over the same time, positive upwards (see `with_vertical`).
+    orthogonal : Motion, optional
+        Other horizontal component, for intensity measures of the pair (see `with_orthogonal`).
 
     Attributes
     ----------
@@ -81,6 +83,7 @@ class Motion(ProcessingMethods):
     history: tuple[str, ...] = ()
     error: float = 0.0
     vertical: Motion | None = None
+    orthogonal: Motion | None = None
     dt: float | None = field(init=False)
 
     def __post_init__(self) -> None:
@@ -96,12 +99,13 @@ class Motion(ProcessingMethods):
         history = tuple(checks.text(entry, "sentence of a motion's history", MotionError) for entry in self.history)
         error_name = "approximation error of a motion"
         error = checks.between(self.error, error_name, MotionError, 0.0, piecewise.MAX_ACCELERATION)
-        if self.vertical is not None and not isinstance(self.vertical, Motion):
-            type_name = type(self.vertical).__name__
-            message = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type_name}"
-            raise MotionError(message, "vertical", value=self.vertical)
-        if self.vertical is not None and self.vertical.vertical is not None:
-            raise MotionError("{} must be a motion without a vertical component of its own", "vertical")
+        for component, part in self._other_components().items():
+            if part is not None and not isinstance(part, Motion):
+                message = "{} must be a Motion, as from rocking.read or Motion.from_samples, not "
+                raise MotionError(message + type(part).__name__, component, value=part)
+            if part is not None and (part.vertical is not None or part.orthogonal is not None):
+                kind = "a vertical component" if component == "vertical" else "components"
+                raise MotionError(f"{{}} must be a motion without {kind} of its own", component)
         checked_fields = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
         for name, value in checked_fields.items():
             object.__setattr__(self, name, value)
@@ -193,8 +197,8 @@ class Motion(ProcessingMethods):
         level : float
             Target level, SI units: accelerations in m/s^2, not g (0.5 g is ``0.5 * 9.80665``). `history` contains both.
         measure : {"pga", "pgv", "factor"} or Measure
-            Peak acceleration (m/s^2), peak velocity (m/s), factor as for `scaled`, or spectral acceleration (m/s^2) as
-            ``rocking.Measure("sa", period=1.0)``.
+            Peak acceleration (m/s^2), peak velocity (m/s), factor as for `scaled`, or another measure of a motion, for
+            example spectral acceleration (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
 
         Returns
         -------
@@ -216,7 +220,7 @@ class Motion(ProcessingMethods):
         if intensity_measure.name == "factor":
             return self.scaled(level)
         target = checks.positive(level, "level", MotionError, intensity_measure.units)
-        factor = target / intensity_measure.require_positive_value(self, self.name)
+        factor = intensity_measure.find_factor(target, intensity_measure.require_positive_value(self, self.name))
         return self._multiply(factor, intensity_measure.describe_scaling(target, factor))
 
     def with_vertical(self, vertical: Motion | None) -> Motion:
@@ -232,6 +236,53 @@ class Motion(ProcessingMethods):
         if vertical is not None and origin is not None and origin.downwards:
             vertical = vertical._multiply(-1.0, f"turned upwards, as its channel is called {origin.channel!r}")
         return self if vertical is self.vertical else replace(self, vertical=vertical)
+
+    def with_orthogonal(self, orthogonal: Motion | None) -> Motion:
+        """Return the motion with the other horizontal component, for intensity measures of the pair.
+
+        A body responds to the motion alone, in its plane. Scaling, delay and processing apply to both components. None
+        removes the component. `records.load_pairs` reads both components of each station.
+
+        Parameters
+        ----------
+        orthogonal : Motion or None
+            Simultaneous component perpendicular to this one.
+
+        Returns
+        -------
+        Motion
+            The same motion, with `orthogonal`.
+
+        Raises
+        ------
+        MotionError
+            If `orthogonal` is not a motion, or according to the files the components are not perpendicular within 5
+            degrees, or do not begin together.
+
+        See Also
+        --------
+        rocking.Measure : Intensity measures of pairs, for example RotD50.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> first, second = (rocking.records.load(f"ridgecrest-clc-{azimuth}") for azimuth in ("090", "360"))
+        >>> rotd50 = rocking.Measure("pga", component="rotd50").value(first.with_orthogonal(second))
+        >>> f"{first.pga:.2f} {second.pga:.2f} {rotd50:.2f} m/s^2"
+        ''
+        """
+        if isinstance(orthogonal, Motion):
+            orthogonal = replace(orthogonal, vertical=None, orthogonal=None)
+            azimuths = [(part.description.origin or Origin()).azimuth for part in (self, orthogonal)]
+            if None not in azimuths and abs((azimuths[1] - azimuths[0]) % 180.0 - 90.0) > 5.0:  # type: ignore[operator]
+                message = f"the components {self.name} and {orthogonal.name} have azimuths of {azimuths[0]:g} and "
+                raise MotionError(
+                    escape_braces(message) + f"{azimuths[1]:g} deg; {{}} must be perpendicular", "orthogonal"
+                )
+            if delay := compute_start_delay(self.description, orthogonal.description, self.dt):
+                message = f"the components {self.name} and {orthogonal.name} begin {abs(delay):.6g} s apart"
+                raise MotionError(f"{escape_braces(message)}; remove the start of one with processed(trim=...)")
+        return replace(self, orthogonal=orthogonal)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the ground acceleration in g over time, and the vertical one below, with parameters of `Result.plot`.
@@ -295,17 +346,17 @@ class Motion(ProcessingMethods):
         return Motion(breakpoints, first + second, name, description, error=error, vertical=vertical)
 
     def _multiply(self, factor: float, history_entry: str) -> Motion:
-        """Return both components times a factor, the vertical one times its absolute value."""
-        vertical = self.vertical
-        if vertical is not None and abs(factor) != 1.0:
-            vertical = vertical._multiply(abs(factor), history_entry)
+        """Return all components times a factor, the vertical and the orthogonal one times its absolute value."""
+        fields: dict[str, Any] = self._other_components()
+        if abs(factor) != 1.0:
+            fields = {name: part and part._multiply(abs(factor), history_entry) for name, part in fields.items()}
         with np.errstate(over="ignore", invalid="ignore"):
             coefficients = self.coefficients * factor
         if not np.all(np.abs(coefficients[:, 0]) <= piecewise.MAX_ACCELERATION) or not np.isfinite(coefficients).all():
             raise MotionError(piecewise.TOO_STRONG)
         description, history = self.description.scaled(factor), (*self.history, history_entry)
-        fields: dict[str, Any] = {"description": description, "history": history, "error": self.error * abs(factor)}
-        return replace(self, coefficients=coefficients, vertical=vertical, **fields)
+        fields |= {"description": description, "history": history, "error": self.error * abs(factor)}
+        return replace(self, coefficients=coefficients, **fields)
 
 
 def _describe_peak(motion: Motion) -> str:

@@ -47,11 +47,18 @@ class ProcessingMethods(MotionMeasures):
     history: tuple[str, ...]
     error: float
     vertical: Self | None
+    orthogonal: Self | None
+
+    def _other_components(self) -> dict[str, Self | None]:
+        """Return the other components by their names."""
+        return {"vertical": self.vertical, "orthogonal": self.orthogonal}
+
     dt: float | None
 
     def _derive(self, change: str, history_entry: str, **fields: Any) -> Self:
         """Return the motion with other fields and an extended history."""
-        fields = {"description": self.description.changed(change), "history": (*self.history, history_entry)} | fields
+        history = (*self.history, history_entry)
+        fields = {"description": self.description.changed(change), "history": history, "orthogonal": None} | fields
         return replace(self, **fields)  # type: ignore[type-var]
 
     def _describe_origin(self) -> str:
@@ -121,17 +128,17 @@ class ProcessingMethods(MotionMeasures):
         wait = checks.positive(delay, "delay", MotionError, "s")
         rows = np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients])
         pieces = {"breakpoints": np.append(0.0, self.breakpoints + wait), "coefficients": rows}
-        vertical = None if self.vertical is None else self.vertical.delayed(wait)
-        return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, vertical=vertical)
+        others = {name: part and part.delayed(wait) for name, part in self._other_components().items()}
+        return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, **others)
 
-    def floor(self, period: float, damping: float = DAMPING, *, ringing: float | None = None) -> Self:
+    def on_floor(self, period: float, damping: float = DAMPING, *, free_vibration: float | None = None) -> Self:
         """Return the motion of a floor: the absolute acceleration of a linear oscillator under the motion.
 
         Parameters
         ----------
         period, damping : float
             Natural period of the building, s, and its fraction of critical damping.
-        ringing : float, optional
+        free_vibration : float, optional
             Duration of the floor motion after the ground motion, s, by default until a free oscillation decays to a
             thousandth.
 
@@ -143,7 +150,7 @@ class ProcessingMethods(MotionMeasures):
         Raises
         ------
         MotionError
-            If period or damping is out of range, or both damping and `ringing` are missing.
+            If period or damping is out of range, or both damping and `free_vibration` are missing.
 
         Notes
         -----
@@ -151,7 +158,7 @@ class ProcessingMethods(MotionMeasures):
         At 0.6 the motion is ``ground + (floor + -ground) * 0.6``. Contents do not act back on the floor. A hazard curve
         of the ground does not apply to a fragility against floor measures.
         """
-        breakpoints, coefficients, error = _compute_floor_motion(self, period, damping, ringing, self.error)
+        breakpoints, coefficients, error = _compute_floor_motion(self, period, damping, free_vibration, self.error)
         history_entry = f"on a floor of period {period:.6g} s, damping {damping:.6g}"
         return self._derive("floor", history_entry, breakpoints=breakpoints, coefficients=coefficients, error=error)
 
@@ -205,12 +212,13 @@ class ProcessingMethods(MotionMeasures):
             steps.append(lambda motion: _resample(motion, resample))
         if window is None and not steps:
             raise MotionError("at least one of trim, baseline, band_pass and resample is required")
-        vertical = self.vertical
-        if vertical is not None and window is not None and window[0] > vertical.duration - piecewise.MIN_DURATION:
-            vertical = None  # the vertical motion has ended by then
-        if vertical is not None:
-            vertical = vertical._apply_steps(window, steps, self.dt)
-        return replace(self._apply_steps(window, steps), vertical=vertical)  # type: ignore[type-var]
+        others = self._other_components()
+        for name, part in others.items():
+            if part is not None and window is not None and window[0] > part.duration - piecewise.MIN_DURATION:
+                others[name] = None  # this component has ended by then
+            elif part is not None:
+                others[name] = part._apply_steps(window, steps, self.dt)
+        return replace(self._apply_steps(window, steps), **others)  # type: ignore[type-var]
 
     def _apply_steps(
         self, window: tuple[float, float] | None, steps: list[_ProcessingStep], fine_step: float | None = None
@@ -342,29 +350,45 @@ def _join_samples(samples: Floats, step: float, history_entry: str) -> Processed
 
 
 def _compute_floor_motion(
-    motion: Piecewise, period: float, damping: float, ringing: float | None, error: float = 0.0
+    motion: Piecewise, period: float, damping: float, free_vibration: float | None, error: float = 0.0
 ) -> tuple[Floats, Floats, float]:
     """Compute the absolute acceleration of an oscillator from rest, and its error bound, m/s^2.
 
-    For u'' + 2 z w u' + w^2 u = -a(t) it is -(2 z w u' + w^2 u). On each piece u is the Taylor series of the exact
-    solution about its start, from the series of the solutions of the states (1, 0) and (0, 1) and of the one from rest.
+    For u'' + 2 z w u' + w^2 u = -a(t) it is -(2 z w u' + w^2 u).
     """
     end = float(motion.breakpoints[-1])
     natural_period = checks.positive(period, "period", MotionError, "s")
     rate, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, MotionError)
-    if ringing is None and damping_ratio == 0.0:
-        raise MotionError("the motion of a floor without {} does not decay; give {}, in s", "damping", "ringing")
+    if free_vibration is None and damping_ratio == 0.0:
+        raise MotionError("the motion of a floor without {} does not decay; give {}, in s", "damping", "free_vibration")
     # By default a free oscillation continues until it has decayed to a thousandth.
-    if ringing is None:
+    if free_vibration is None:
         tail = -math.log(1e-3) / (damping_ratio * rate)
     else:
-        tail = checks.between(ringing, "ringing", MotionError, 0.0, 1e15, "s")
-    step = _MAX_ANGLE / rate
-    if not (end + tail) / step <= 1e6:
+        tail = checks.between(free_vibration, "free_vibration", MotionError, 0.0, 1e15, "s")
+    if not (end + tail) / (_MAX_ANGLE / rate) <= 1e6:
         message = f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s"
-        raise MotionError(f"{message}; use a longer one, or a shorter {{}}", "period", "ringing", value=period)
-    nodes = np.append(motion.breakpoints, end + tail) if tail > 0.0 else motion.breakpoints
-    subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / step)).astype(np.intp)
+        raise MotionError(f"{message}; use a longer one, or a shorter {{}}", "period", "free_vibration", value=period)
+    breakpoints, solution = compute_oscillator(motion, rate, damping_ratio, tail)
+    columns = solution.shape[1] - 2
+    velocity = solution[:, 1:] * np.arange(1, columns + 2)
+    acceleration = -(2.0 * damping_ratio * rate * velocity[:, :columns] + rate**2 * solution[:, :columns])
+    peak = float(np.max(np.abs(acceleration[:, 0]), initial=0.0))
+    truncation_error = 4.0 * peak * _MAX_ANGLE**columns / math.factorial(columns)
+    # The effects of an error of the acceleration add up.
+    propagated_error = error * (2.0 / damping_ratio if damping_ratio > 0.0 else rate * (end + tail))
+    return breakpoints, acceleration, truncation_error + propagated_error
+
+
+def compute_oscillator(motion: Piecewise, rate: float, damping_ratio: float, tail: float) -> tuple[Floats, Floats]:
+    """Return breakpoints, s, and coefficients of the displacement u, m, with u'' + 2 z w u' + w^2 u = -a(t), from rest.
+
+    On each piece u is the Taylor series of the exact solution about its start, from the series of the solutions of the
+    states (1, 0) and (0, 1) and of the one from rest. ``tail`` is the time after the motion, s.
+    """
+    nodes = motion.breakpoints
+    nodes = np.append(nodes, nodes[-1] + tail) if tail > 0.0 else nodes
+    subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / (_MAX_ANGLE / rate))).astype(np.intp)
     start, width = np.repeat(nodes[:-1], subdivisions), np.repeat(np.diff(nodes) / subdivisions, subdivisions)
     index = np.arange(subdivisions.sum()) - np.repeat(np.cumsum(subdivisions) - subdivisions, subdivisions)
     breakpoints = np.append(start + index * width, nodes[-1])
@@ -375,14 +399,7 @@ def _compute_floor_motion(
     rates = series[..., 1:] * np.arange(1, columns + 2)
     end_states = [piecewise.evaluate_pieces(s, np.broadcast_to(width, s.shape[:-1])) for s in (series, rates)]
     states = _propagate_states(np.stack(end_states))
-    solution = series[2] + np.einsum("jn,jnk->nk", states, series[:2])
-    velocity = solution[:, 1:] * np.arange(1, columns + 2)
-    acceleration = -(2.0 * damping_ratio * rate * velocity[:, :columns] + rate**2 * solution[:, :columns])
-    peak = float(np.max(np.abs(acceleration[:, 0]), initial=0.0))
-    truncation_error = 4.0 * peak * _MAX_ANGLE**columns / math.factorial(columns)
-    # The effects of an error of the acceleration add up.
-    propagated_error = error * (2.0 / damping_ratio if damping_ratio > 0.0 else rate * (end + tail))
-    return breakpoints, acceleration, truncation_error + propagated_error
+    return breakpoints, series[2] + np.einsum("jn,jnk->nk", states, series[:2])
 
 
 def _compute_oscillator_series(forcing: Floats, rate: float, damping_ratio: float, terms: int) -> Floats:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,26 +14,56 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import add_unit
-from rocking.errors import MotionError, OptionError
+from rocking.errors import MotionError, OptionError, escape_braces
 from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
+from rocking.motion.pairs import iterate_directions, rotate_peaks, rotate_spectral_acceleration
 
 #: Intensity measures of the analyses.
-IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
-MeasureName = Literal["factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
+IntensityName = Literal[
+    "pga", "pgv", "pgd", "sa", "sa_average", "arias", "cav", "incremental_velocity", "duration", "pga_ratio",
+    "pgv_ratio",
+]  # fmt: skip
+MeasureName = Literal["factor"] | IntensityName
+
+#: Horizontal component or combination of both.
+ComponentName = Literal["own", "geometric_mean", "larger", "rotd50", "rotd100"]
 
 INTENSITIES: Final[Sequence[str]] = get_args(IntensityName)
-#: Measures of a motion alone.
-SCALING_MEASURES: Final = ("factor", "pga", "pgv", "sa")
 
-#: Unit, and name in words.
-_UNITS_AND_NAMES: Final[dict[str, tuple[str, str]]] = {
-    "factor": ("1", "factor of the motion"),
-    "pga": ("m/s^2", "peak ground acceleration"),
-    "pgv": ("m/s", "peak ground velocity"),
-    "sa": ("m/s^2", "spectral acceleration"),
-    "pga_ratio": ("1", "PGA / uplift acceleration"),
-    "pgv_ratio": ("1", "p PGV / uplift acceleration"),
+
+class _Quantity(NamedTuple):
+    """Unit, name in words, short name, and power of the factor on a motion by which the measure changes."""
+
+    unit: str
+    name: str
+    short_name: str = ""
+    exponent: int = 1
+
+
+_QUANTITIES: Final[dict[str, _Quantity]] = {
+    "factor": _Quantity("1", "factor of the motion"),
+    "pga": _Quantity("m/s^2", "peak ground acceleration", "PGA"),
+    "pgv": _Quantity("m/s", "peak ground velocity", "PGV"),
+    "pgd": _Quantity("m", "peak ground displacement", "PGD"),
+    "sa": _Quantity("m/s^2", "spectral acceleration", "SA"),
+    "sa_average": _Quantity("m/s^2", "average spectral acceleration", "average SA"),
+    "arias": _Quantity("m/s", "Arias intensity", "Arias intensity", 2),
+    "cav": _Quantity("m/s", "cumulative absolute velocity", "CAV"),
+    "incremental_velocity": _Quantity("m/s", "incremental velocity", "incremental velocity"),
+    "duration": _Quantity("s", "significant duration D5-95", "D5-95", 0),
+    "pga_ratio": _Quantity("1", "PGA / uplift acceleration"),
+    "pgv_ratio": _Quantity("1", "p PGV / uplift acceleration"),
 }
+
+#: Measures of a motion alone to which it can be scaled.
+SCALING_MEASURES: Final = tuple(
+    name for name, quantity in _QUANTITIES.items() if quantity.exponent and not name.endswith("_ratio")
+)
+
+_COMPONENTS: Final[dict[str, str]] = {
+    "own": "", "geometric_mean": "geometric mean", "larger": "larger component", "rotd50": "RotD50",
+    "rotd100": "RotD100",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -41,19 +72,33 @@ class Measure:
 
     Parameters
     ----------
-    name : {"factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
-        Factor on the motion, peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2), or a
-        dimensionless measure of the block: "pga_ratio" is the peak acceleration divided by the uplift acceleration,
-        "pgv_ratio" the peak velocity divided by the uplift acceleration and the time scale 1/p. For a free block these
-        are PGA/(g tan alpha) and p PGV/(g tan alpha), in the linear model with alpha for tan alpha. Restraints and
-        leaning change the uplift acceleration.
-    period, damping : float, optional
-        Period of the oscillator of "sa", s, and its fraction of critical damping.
+    name : str
+        Name of the measure:
+
+        - "pga", "pgv", "pgd": peak acceleration (m/s^2), velocity (m/s), displacement (m)
+        - "sa": spectral acceleration (m/s^2) at a period
+        - "sa_average": geometric mean of spectral accelerations (m/s^2) at several periods
+        - "arias": Arias intensity (m/s); "cav": cumulative absolute velocity (m/s)
+        - "incremental_velocity": `Motion.incremental_velocity` (m/s)
+        - "duration": significant duration D5-95 (s), to which motions cannot be scaled
+        - "pga_ratio", "pgv_ratio": dimensionless measures of the block, namely the peak acceleration divided by the
+          uplift acceleration, and the peak velocity divided by the uplift acceleration and the time scale 1/p. For a
+          free block these are PGA/(g tan alpha) and p PGV/(g tan alpha), in the linear model with alpha for tan alpha.
+          Restraints and leaning change the uplift acceleration.
+        - "factor": factor on the motion
+    period : float or sequence of float, optional
+        Period of the oscillator of "sa", or periods of "sa_average", s.
+    damping : float, optional
+        Fraction of critical damping of "sa" and "sa_average".
+    component : {"own", "geometric_mean", "larger", "rotd50", "rotd100"}
+        Component of the ground motion: the motion itself, or for motions with an orthogonal component
+        (`records.load_pairs`) the geometric mean or the larger value of both, or the median or the largest value over
+        all directions in steps of 1 degree :cite:p:`boore2010`.
 
     Raises
     ------
     OptionError
-        If the measure is unknown, or `period` or `damping` is missing, out of place or out of range.
+        If the measure or component is unknown, or `period` or `damping` is missing, out of place or out of range.
 
     See Also
     --------
@@ -66,20 +111,31 @@ class Measure:
     >>> measure = Measure("sa", period=1.0)
     >>> measure.label, measure.units
     ('spectral acceleration at 1 s (g)', 'm/s^2')
+    >>> Measure("pgv", component="rotd50").label
+    'peak ground velocity, RotD50 (m/s)'
     """
 
     name: MeasureName
-    period: float | None = None
+    period: float | tuple[float, ...] | None = None
     damping: float = DAMPING
+    component: ComponentName = "own"
 
     def __post_init__(self) -> None:
-        checks.choice(self.name, "measure", OptionError, get_args(MeasureName))
+        checks.choice(self.name, "measure", OptionError, [*_QUANTITIES])
+        checks.choice(self.component, "component", OptionError, get_args(ComponentName))
         damping = check_damping(self.damping, OptionError)
         object.__setattr__(self, "damping", damping)
-        if self.name == "sa":
+        if self.name == "factor" and self.component != "own":
+            raise OptionError('{} does not apply to {} "factor"', "component", "measure")
+        if self.name in ("sa", "sa_average"):
             if self.period is None:
-                raise OptionError('{} "sa" requires {}, in s', "measure", "period")
-            object.__setattr__(self, "period", checks.positive(self.period, "period", OptionError, "s"))
+                needed = "{}, in s" if self.name == "sa" else "several values of {}, in s, for example (0.5, 1.0, 2.0)"
+                raise OptionError(f'{{}} "{self.name}" requires {needed}', "measure", "period")
+            if self.name == "sa":
+                periods: Any = checks.positive(self.period, "period", OptionError, "s")
+            else:
+                periods = tuple(checks.increasing_numbers(self.period, "period", OptionError).tolist())
+            object.__setattr__(self, "period", periods)
         elif self.period is not None or damping != DAMPING:
             argument = "damping" if self.period is None else "period"
             raise OptionError(f'{{}} applies only to {{}} "sa", not to "{self.name}"', argument, "measure")
@@ -91,14 +147,17 @@ class Measure:
         checks.choice(name, "measure", OptionError, among)
         if isinstance(measure, Measure):
             return measure
-        if measure == "sa":
-            raise OptionError('{} "sa" requires a period, in s; use rocking.Measure("sa", period=1.0)', "measure")
+        if measure in ("sa", "sa_average"):
+            example = 'a period, in s; use rocking.Measure("sa", period=1.0)'
+            if measure == "sa_average":
+                example = 'periods, in s; use rocking.Measure("sa_average", period=(0.5, 1.0, 2.0))'
+            raise OptionError(f'{{}} "{measure}" requires {example}', "measure")
         return cls(measure)
 
     @property
     def units(self) -> str:
         """Units of the measure, or "1"."""
-        return _UNITS_AND_NAMES[self.name][0]
+        return _QUANTITIES[self.name].unit
 
     @property
     def column(self) -> str:
@@ -112,19 +171,28 @@ class Measure:
 
     @property
     def quantity(self) -> str:
-        """Name in words, with the damping unless it is 5 %."""
-        return _UNITS_AND_NAMES[self.name][1] + ("" if self.period is None else f" at {self._oscillator_text}")
+        """Name in words, with the component of a pair, and the damping unless it is 5 %."""
+        return self._qualify(_QUANTITIES[self.name].name, " at {}")
 
     @property
     def short_name(self) -> str:
         """Name for a table or a figure: PGA, PGV, SA(1 s), with the damping unless it is 5 %."""
-        if self.period is not None:
-            return f"SA({self._oscillator_text})"
-        return self.name.upper() if self.name in ("pga", "pgv") else self.quantity
+        quantity = _QUANTITIES[self.name]
+        return self._qualify(quantity.short_name or quantity.name, "({})")
+
+    def _qualify(self, name: str, oscillator: str) -> str:
+        """Add oscillator and component to a name."""
+        name += "" if self.period is None else oscillator.format(self._oscillator_text)
+        return name if self.component == "own" else f"{name}, {_COMPONENTS[self.component]}"
+
+    @property
+    def _periods_text(self) -> str:
+        periods = np.ravel([] if self.period is None else self.period)
+        return " to ".join(f"{period:.6g}" for period in np.unique(periods[[0, -1]])) + " s"
 
     @property
     def _oscillator_text(self) -> str:
-        return f"{self.period:g} s" + ("" if self.damping == DAMPING else f", damping {self.damping:g}")
+        return self._periods_text + ("" if self.damping == DAMPING else f", damping {self.damping:g}")
 
     @property
     def label(self) -> str:
@@ -134,7 +202,7 @@ class Measure:
     @property
     def display_unit(self) -> str:
         """Units for display, empty for a dimensionless measure."""
-        return {"m/s^2": "g", "m/s": "m/s", "1": ""}[self.units]
+        return {"m/s^2": "g", "1": ""}.get(self.units, self.units)
 
     def format_value(self, value: float) -> str:
         """Return a value with its unit, to six digits, and accelerations also in g."""
@@ -143,23 +211,73 @@ class Measure:
         return f"{value:.6g}" if self.units == "1" else f"{value:.6g} {self.units}"
 
     @property
-    def motion_measure_name(self) -> Literal["factor", "pga", "pgv", "sa"]:
+    def motion_measure_name(self) -> str:
         """Name of the underlying measure of the motion alone."""
-        return {"pga_ratio": "pga", "pgv_ratio": "pgv"}.get(self.name, self.name)  # type: ignore[return-value]
+        return self.name.removesuffix("_ratio")
 
     @property
     def motion_measure(self) -> Measure:
         """Underlying measure of the motion alone."""
         name = self.motion_measure_name
-        return self if name == self.name else Measure(name, self.period, self.damping)
+        return self if name == self.name else replace(self, name=name)  # type: ignore[arg-type]
 
     def value(self, motion: MotionMeasures) -> float:
-        """Return the measure of a motion alone, in SI units, or 1 if levels are factors."""
-        if self.period is not None:
+        """Return the measure of a motion (of its pair, unless the component is "own"), in SI units, or 1 for factors.
+
+        Raises `MotionError` if the component requires a pair and the motion has no orthogonal component.
+        """
+        if self.component == "own":
+            return self._compute(motion)
+        values = motion.__dict__.setdefault("_pair_values", {})
+        if self not in values:
+            values[self] = self._compute_pair(motion)
+        return float(values[self])
+
+    def _compute_pair(self, motion: MotionMeasures) -> float:
+        """Compute the measure of a pair, which takes longer."""
+        orthogonal = motion.other_horizontal
+        if orthogonal is None:
+            message = (
+                f"the {self.quantity} requires two horizontal components, and {escape_braces(motion.name)} has one; "
+            )
+            raise MotionError(message + "use records.load_pairs, or with_orthogonal")
+        if self.component.startswith("rotd"):
+            return self._compute_rotated(motion, orthogonal)
+        both = [self._compute(part) for part in (motion, orthogonal)]
+        return max(both) if self.component == "larger" else math.sqrt(both[0] * both[1])
+
+    def _compute(self, motion: MotionMeasures) -> float:
+        """Compute the measure of one component."""
+        if self.name == "sa_average":
+            return float(_average(motion.spectral_acceleration(np.ravel(self.period), self.damping)))  # type: ignore[arg-type]
+        if isinstance(self.period, float):
             return float(motion.spectral_acceleration(self.period, self.damping))
-        if self.motion_measure_name == "factor":
-            return 1.0
-        return motion.pga if self.motion_measure_name == "pga" else motion.pgv
+        if self.name == "duration":
+            return motion.significant_duration()
+        names = {"arias": "arias_intensity", "cav": "cumulative_absolute_velocity"}
+        name = self.motion_measure_name
+        return 1.0 if name == "factor" else float(getattr(motion, names.get(name, name)))
+
+    def _compute_rotated(self, motion: MotionMeasures, orthogonal: MotionMeasures) -> float:
+        """Compute the median or the largest value of the measure over all directions."""
+        reduce, name = (np.median if self.component == "rotd50" else np.max), self.motion_measure_name
+        if self.period is not None:
+            periods = np.ravel(self.period).tolist()
+            values = [rotate_spectral_acceleration(motion, orthogonal, period, self.damping) for period in periods]
+            return float(reduce(_average(values)))
+        if name in ("pga", "pgv", "pgd"):
+            return float(reduce(rotate_peaks(motion, orthogonal, ("pga", "pgv", "pgd").index(name))))
+        return float(reduce([self._compute(rotated) for rotated in iterate_directions(motion, orthogonal)]))
+
+    def find_factor(self, level: Any, value: Any) -> Any:
+        """Return the factor on a motion with a value of the measure that scales it to a level, elementwise."""
+        ratio = np.asarray(level) / value
+        return ratio if self.exponent == 1 else ratio ** (1.0 / self.exponent)
+
+    @property
+    def exponent(self) -> int:
+        """Power of the factor on a motion by which the measure changes: 2 for "arias", 0 for "duration", else 1."""
+        return _QUANTITIES[self.name].exponent
 
     def require_positive_value(self, motion: MotionMeasures, name: str) -> float:
         """Return `value`, or raise an error for a motion `name` that is zero throughout."""
@@ -180,16 +298,25 @@ class Measure:
         """
         return uplift_accelerations if self.name == "pga_ratio" else uplift_accelerations / p
 
-    def options(self) -> dict[str, float]:
-        """Return period (s) and damping of "sa", or nothing for other measures."""
-        return {} if self.period is None else {"period": self.period, "damping": self.damping}
+    def options(self) -> dict[str, Any]:
+        """Return period (s) and damping of spectral accelerations, and the component unless it is the motion's own."""
+        component = {} if self.component == "own" else {"component": self.component}
+        return component if self.period is None else {"period": self.period, "damping": self.damping, **component}
 
     def describe_scaling(self, level: float, factor: float) -> str:
         """Return the history sentence of a motion that was scaled to a level (SI units)."""
         if self.name == "factor":
             return f"scaled by {factor:.6g}"
-        oscillator = "" if self.period is None else f" at {self.period:.6g} s, damping {self.damping:.6g}"
-        return f"scaled by {factor:.6g} to a {_UNITS_AND_NAMES[self.name][1]} of {self.format_value(level)}{oscillator}"
+        name, value = _QUANTITIES[self.name].name, self.format_value(level)
+        component = "" if self.component == "own" else f" ({_COMPONENTS[self.component]})"
+        oscillator = "" if self.period is None else f" at {self._periods_text}, damping {self.damping:.6g}"
+        return f"scaled by {factor:.6g} to a {name}{component} of {value}{oscillator}"
+
+
+def _average(values: ArrayLike) -> Floats:
+    """Compute geometric means over the first axis."""
+    with np.errstate(divide="ignore"):  # of zero
+        return np.asarray(np.exp(np.mean(np.log(values), axis=0)))
 
 
 #: Factor on unscaled motions.

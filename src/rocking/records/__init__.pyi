@@ -1,5 +1,5 @@
 from .catalogue import Record, info, load, names
-from .components import Components, group_components
+from .components import Components, group_components, load_pairs
 from .formats import channels, identify, read
 from .formats.channel import Channel, Identification
 from .named import Contents, contents, shipped
@@ -16,6 +16,7 @@ __all__ = [
     "identify",
     "info",
     "load",
+    "load_pairs",
     "names",
     "read",
     "shipped",

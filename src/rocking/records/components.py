@@ -7,10 +7,10 @@ import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from rocking.core.progress import note
-from rocking.errors import RecordError, escape_braces
+from rocking.errors import MotionError, RecordError, escape_braces
 from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
@@ -56,6 +56,19 @@ class Components:
         vertical = "" if self.vertical is None else " and the vertical one"
         return f"<Components: {self.station}, {self.event}: {len(self.horizontals)} horizontal{vertical}>"
 
+    def motions(self, *, vertical: bool = False) -> tuple[Motion, Motion]:
+        """Return both horizontal components, each with the other as orthogonal component.
+
+        With `vertical`, both have the vertical component. Raises `RecordError` if there are not two horizontal
+        components or there is no vertical one.
+        """
+        first, second = self.pair
+        if vertical and self.vertical is None:
+            raise RecordError(f"{escape_braces(self.station)} has no vertical component")
+        upwards = self.vertical if vertical else None
+        pairs = first.with_orthogonal(second), second.with_orthogonal(first)
+        return pairs[0].with_vertical(upwards), pairs[1].with_vertical(upwards)
+
     @property
     def pair(self) -> tuple[Motion, Motion]:
         """The two horizontal components.
@@ -67,7 +80,8 @@ class Components:
         """
         if len(self.horizontals) != 2:
             names = ", ".join(motion.name for motion in self.horizontals) or "none"
-            raise RecordError(f"{self.station} has {len(self.horizontals)} horizontal components, not two: {names}")
+            text = f"{self.station} has {len(self.horizontals)} horizontal components, not two: {names}"
+            raise RecordError(escape_braces(text))
         return self.horizontals[0], self.horizontals[1]
 
 
@@ -78,6 +92,7 @@ def group_components(
     units: str | None = None,
     baseline: int | str | None = None,
     highpass: float | None = None,
+    keep_going: bool = True,
 ) -> tuple[Components, ...]:
     """Read all channels of records and group those of one station and event.
 
@@ -87,12 +102,14 @@ def group_components(
         Files, folders, patterns, ZIP archives and shipped records.
     dt, units, baseline, highpass : optional
         As for `rocking.read`, for files that do not state step and units.
+    keep_going : bool
+        Whether files that cannot be read are skipped with a note. Otherwise the first one raises its error.
 
     Returns
     -------
     tuple of Components
         Components in the order of the files. Channels at different places of a building or depths of a borehole, and
-        files in different formats or steps, are separate. Files that cannot be read are skipped with a note.
+        files in different formats, steps or with different factors, are separate.
 
     Raises
     ------
@@ -118,19 +135,71 @@ def group_components(
             request = Request.create(dt, units, several=True)
             channels = [] if is_shipped(name) else formats.read_content(name, request)[1]
         except RecordError as error:
+            if not keep_going:
+                raise
             reasons.append(str(error))
             continue
         motions = [channel.motion(baseline, highpass) for channel in channels] or [catalogue.load(name)]
         places = [f"{each.metadata.get('location', '')}{each.name.partition(' b')[2]}" for each in channels] or [""]
         for motion, place in zip(motions, places, strict=True):
             origin = motion.description.origin or Origin()
-            key = (origin.station or name, origin.event, origin.format, motion.dt, place)
+            key = (origin.station or name, origin.event, origin.format, motion.dt, place, factor)
             groups.setdefault(key, []).append(motion if factor == 1.0 else motion.scaled(factor))
     for reason in reasons:
         if not groups:
             raise RecordError(f"no record could be read; the first: {escape_braces(reason)}")
         note(f"skipped: {reason}")
     return tuple(_create_components(str(key[0]), str(key[1]), motions) for key, motions in groups.items())
+
+
+def load_pairs(
+    names: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], *, vertical: bool = False, **options: Any
+) -> tuple[Motion, ...]:
+    """Read the pairs of horizontal components of stations, for intensity measures of pairs.
+
+    Parameters
+    ----------
+    names : str, path, or iterable of these
+        As for `group_components`.
+    vertical : bool
+        Whether the motions have the vertical component of their station.
+    **options : optional
+        Options of `group_components`: dt, units, baseline, highpass and keep_going.
+
+    Returns
+    -------
+    tuple of Motion
+        Two motions for each station and event, each with the other as orthogonal component. Stations without two
+        horizontal components (or without the required vertical one) are skipped with a note.
+
+    Raises
+    ------
+    RecordError
+        If there is no pair.
+
+    See Also
+    --------
+    rocking.Measure : Intensity measures of pairs, for example RotD50.
+    rocking.fragility : Count only the larger response of each pair.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> first, second = rocking.records.load_pairs("ridgecrest-clc-*")
+    >>> first.name, first.orthogonal.name
+    ('ridgecrest-clc-090', 'ridgecrest-clc-360')
+    """
+    motions, reasons = list[Motion](), list[str]()
+    for group in group_components(names, **options):
+        try:
+            motions += group.motions(vertical=vertical)
+        except (RecordError, MotionError) as error:
+            reasons.append(str(error))
+    for reason in reasons:
+        if not motions:
+            raise RecordError(f"there is no pair of horizontal components; the first: {escape_braces(reason)}")
+        note(f"skipped: {reason}")
+    return tuple(motions)
 
 
 def _create_components(station: str, event: str, motions: list[Motion]) -> Components:

@@ -101,6 +101,9 @@ def _describe_wrong_type(value: Any) -> str:
 #: Name of a record with a factor.
 _FACTOR = re.compile(r"(?s)(.+) x ([+-]?\d[\d.]*(?:[eE][+-]?\d+)?)")
 
+#: Name of the vertical component of the same station, for pairs.
+OWN = "own"
+
 #: Name of a record on standard input.
 STANDARD_INPUT = "-"
 

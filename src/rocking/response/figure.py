@@ -192,7 +192,7 @@ def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
 
 def _shade_slip(axes: Axes, intervals: Floats) -> None:
     for start, end in intervals[intervals[:, 0] < intervals[:, 1]]:
-        axes.axvspan(start, end, color=ABOVE, alpha=0.15, linewidth=0.0, label="slips")
+        axes.axvspan(start, end, color=ABOVE, alpha=0.5, fill=False, hatch="////", linewidth=0.0, label="slips")
 
 
 def _draw_rotation(axes: Axes, time: Floats, rotation: Floats, tipping_angles: Floats, limit: str) -> None:

@@ -23,7 +23,7 @@ from rocking.response.response import Response
 from rocking.response.sensitivity import require_sticking
 
 #: Quantities that can be differentiated.
-Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
+GradientTarget = Literal["peak", "rotation", "velocity", "event", "impact"]
 
 #: Time before a rest, s, up to which impacts are followed. The remainder is of first order, and rounding smaller.
 _REST_MARGIN: Final = 1e-5
@@ -117,7 +117,7 @@ class Gradient:
         return f"<Gradient: {'; '.join(filter(None, [text, self.reason]))}>"
 
 
-def gradient(response: Response, quantity: Quantity = "peak", time_or_index: float | None = None) -> Gradient:
+def gradient(response: Response, quantity: GradientTarget = "peak", time_or_index: float | None = None) -> Gradient:
     """Differentiate a result of a response by the samples of its motion and by the initial state.
 
     Parameters
@@ -165,7 +165,7 @@ def gradient(response: Response, quantity: Quantity = "peak", time_or_index: flo
     if not isinstance(response, Response):
         raise OptionError("{} must be a Response, as rocking.simulate returns", "response", value=response)
     require_sticking(response.slips)
-    checks.choice(quantity, "quantity", OptionError, get_args(Quantity))
+    checks.choice(quantity, "quantity", OptionError, get_args(GradientTarget))
     if quantity == "peak":
         target = _target_peak(response, time_or_index)
     elif quantity in ("rotation", "velocity"):
@@ -214,7 +214,7 @@ def _target_peak(response: Response, time_or_index: float | None) -> _Target:
     return _Target(value, instant, trail, row, since, (1.0, 0.0), reason, is_height=True)
 
 
-def _target_state(response: Response, quantity: Quantity, instant: float | None) -> _Target:
+def _target_state(response: Response, quantity: GradientTarget, instant: float | None) -> _Target:
     """Create the target for the rotation or velocity at a time."""
     if instant is None:
         raise OptionError(f"a {quantity} requires {{}}, the time in s", "time_or_index")
@@ -229,7 +229,7 @@ def _target_state(response: Response, quantity: Quantity, instant: float | None)
     return _Target(float(motion_state[column]), time, trail, row, since, (0.0, sign) if column else (sign, 0.0))
 
 
-def _target_time(response: Response, quantity: Quantity, index: float | None) -> _Target:
+def _target_time(response: Response, quantity: GradientTarget, index: float | None) -> _Target:
     """Create the target for the time of an event or impact."""
     trail, is_event = response.solution.trail, quantity == "event"
     nodes, results = trail.nodes, response.events if is_event else response.impacts
@@ -259,7 +259,11 @@ def _find_later_nodes(response: Response, row: int, until: float) -> Records:
 def _has_ties_before(trail: Trail, instant: float) -> bool:
     """Return whether rounding determined a touch up to an instant, by integrating again."""
     settings, start = trail.settings.copy(), state.state_at_node(trail.nodes[0])
-    settings["stop"], settings["no_end_time"], settings["record"] = math.nextafter(instant, math.inf), False, False
+    settings["stop"], settings["no_end_time"], settings["writes_tables"] = (
+        math.nextafter(instant, math.inf),
+        False,
+        False,
+    )
     march(trail.ground, copy_trail(trail).block, settings, state.new_table(0), state.new_scratch(), start)
     return bool(start["rounding_decisions"] > 0)
 

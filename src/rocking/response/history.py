@@ -194,7 +194,7 @@ def add_all_impacts(trail: Trail, *, ends_in_sequence: bool) -> Trail:
     if not len(last_impacts):
         return trail
     body, settings, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
-    settings["rest_rule"], settings["no_end_time"], settings["record"] = state.RestRule.VELOCITY, False, True
+    settings["rest_rule"], settings["no_end_time"], settings["writes_tables"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
     parts, next_row, plastic = [], 0, compute_plastic_elongations(trail)
     for row in last_impacts:

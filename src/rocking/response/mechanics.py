@@ -37,12 +37,12 @@ _MAX_FRICTION: Final = 3.0
 ForceMeasure = Callable[[Floats, Floats], Floats]
 
 
-def check_friction(value: object) -> float:
+def check_available_friction(value: object, name: str = "available_friction") -> float:
     """Return a coefficient of friction, or raise `OptionError` if it is not in (0, 3]."""
-    coefficient = checks.positive(value, "friction", OptionError)
+    coefficient = checks.positive(value, name, OptionError)
     if coefficient > _MAX_FRICTION:
         message = f"{{}} must be at most {_MAX_FRICTION:g}, not {coefficient:g}"
-        raise OptionError(f"{message}; use the tangent of an angle of friction", "friction", value=value)
+        raise OptionError(f"{message}; use the tangent of an angle of friction", name, value=value)
     return coefficient
 
 

@@ -105,11 +105,15 @@ class Response(ResponseData):
     def _headline(self) -> str:
         return summary.format_line(self)
 
-    def summary_rows(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> Sequence[Row]:
+    def summary_rows(
+        self, available_friction: float | None = None, *, precision: float = MOTION_PRECISION
+    ) -> Sequence[Row]:
         """Return the lines of `summary` as rows of name, value, unit and note; arguments as of `summary`."""
-        return summary.create_rows(self, friction, precision)
+        return summary.create_rows(self, available_friction, precision)
 
-    def result_rows(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> Sequence[Row]:
+    def result_rows(
+        self, available_friction: float | None = None, *, precision: float = MOTION_PRECISION
+    ) -> Sequence[Row]:
         """Return the entries of `to_dict` as rows of name, value and unit; arguments as of `summary`."""
         body, motion, limit = self.block, self.motion, self.block.coordinate.limit
         entries = motion and {
@@ -135,8 +139,9 @@ class Response(ResponseData):
         if self.friction is not None:
             rows += [Row("friction_static", self.friction[0]), Row("friction_kinetic", self.friction[1])]
             rows += [Row("largest_slip", self.largest_slip, "m"), Row("residual_slip", self.residual_slip, "m")]
-        if friction is not None:
-            rows += [Row("friction", friction), Row("sliding_time", self.sliding_time(friction), "s")]
+        if available_friction is not None:
+            rows.append(Row("available_friction", available_friction))
+            rows.append(Row("sliding_time", self.sliding_time(available_friction), "s"))
         rows += [Row("impacts_resolved", len(self.impacts)), Row("duration", self.duration, "s")]
         perturbed = [self.perturbed().to_dict(), self.perturbed(*choose_steps(precision)).to_dict()]
         rows += [Row("time_at_rest", self.time_at_rest, "s"), Row("perturbed", perturbed)]
@@ -163,12 +168,12 @@ class Response(ResponseData):
         rows.append(Row(f"peak_{name}", self.peak_rotation, unit))
         return [*rows, Row(f"residual_{name}", self.residual_rotation, unit)]
 
-    def summary(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> str:
+    def summary(self, available_friction: float | None = None, *, precision: float = MOTION_PRECISION) -> str:
         """Return a description of the response, line by line, as printed by ``rocking simulate``.
 
         Parameters
         ----------
-        friction : float, optional
+        available_friction : float, optional
             Coefficient of friction, for a check of sliding with the time of the first slip.
         precision : float
             Relative precision of the ground motion, from 1e-6 to 0.1, for counting outcomes within it.
@@ -179,14 +184,16 @@ class Response(ResponseData):
         initial state) scaled by 1, 1 +- 1e-6 and 1 +- 3e-6, at most nine decimals and six digits. If the times differ
         by a millisecond, or the peaks in the third digit, their range is reported. See `Response.perturbed`.
         """
-        return format_rows(self.summary_rows(friction, precision=precision), _WIDTH)
+        return format_rows(self.summary_rows(available_friction, precision=precision), _WIDTH)
 
-    def to_dict(self, friction: float | None = None, *, precision: float = MOTION_PRECISION) -> dict[str, Any]:
+    def to_dict(
+        self, available_friction: float | None = None, *, precision: float = MOTION_PRECISION
+    ) -> dict[str, Any]:
         """Return the result as plain values, as printed by ``rocking simulate --json``; arguments as of `summary`.
 
         Names contain units. Numbers that are not finite are None.
         """
-        return rows_to_dict(self.result_rows(friction, precision=precision))
+        return rows_to_dict(self.result_rows(available_friction, precision=precision))
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
         """Return time histories and events as a dataset. Its ``to_dataframe`` multiplies all dimensions.

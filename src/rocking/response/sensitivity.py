@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Final
 
@@ -16,9 +16,10 @@ from rocking.core.tables import format_count
 from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.adjoint import AdjointEnd, adjoint, adjoint_of_final_state
-from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
+from rocking.kernels.trace import Quantity, Trail, compute_variation, copy_trail
 from rocking.kernels.uplift import write_next_uplifts
 from rocking.response.history import TimeHistory
+from rocking.response.perturbed import Repeat
 
 #: A response is ambiguous if changes of its inputs by one unit in the last place change its peak by more than this
 #: fraction, or the time of an event or impact by more than this number of seconds.
@@ -36,7 +37,7 @@ _START_FIELDS: Final[dict[int, str]] = {Quantity.ROTATION: "u", Quantity.VELOCIT
 _ULP: Final = 2.0**-52
 
 #: Relative distance from a threshold within which a motion may or may not exceed it.
-_TIE: Final = 2.0**-44
+TIE: Final = 2.0**-44
 
 #: Largest product of an error and the rates of balance and impacts for which its first order is used as a bound.
 _MAX_NONLINEARITY: Final = 0.5
@@ -153,7 +154,9 @@ def _vary_input(trail: Trail, quantity: int, times: Floats, impacts: int, events
     start = _START_FIELDS.get(quantity)
     if start is None or trail.nodes[start][0] != 0.0:  # a share of zero has no effect
         scratch, variation = state.new_scratch(), state.new_record(state.VARIATION)
-        vary(copy_trail(trail), scratch, variation, quantity, times, heights, impact_changes, event_changes)
+        compute_variation(
+            copy_trail(trail), scratch, variation, quantity, times, heights, impact_changes, event_changes
+        )
     return heights, impact_changes, event_changes
 
 
@@ -162,12 +165,36 @@ def find_ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding
 
     ``height`` is the height of the peak above the stop, and ``rounding_decisions`` the known number of ties.
     """
-    early, late = (_compute_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
+    early, late = (_compute_uplifts(trail, share) for share in (1.0 - TIE, 1.0 + TIE))
     rounding_decisions += int(np.any(late > early + AMBIGUITY))
     peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._changes)
     is_peak_clear = np.all(peak <= AMBIGUITY * max(height, 1e-300))
     is_clear = (is_peak_clear, np.all(np.concatenate(times) <= AMBIGUITY), rounding_decisions == 0)
     return tuple(name for name, clear in zip(("peak", "events", "touch"), is_clear, strict=True) if not clear)
+
+
+def find_slip_ambiguities(repeats: Sequence[Repeat], rounding_decisions: int) -> tuple[str, ...]:
+    """Return the results of `find_ambiguities` for a response that slips, from simulations with factors 1 +- TIE.
+
+    "touch" includes a mode of motion longer than `AMBIGUITY` that does not occur for all factors.
+    """
+    share = _ULP / TIE
+    peaks, modes = [repeat.peak for repeat in repeats], [_list_modes(repeat.events) for repeat in repeats]
+    is_same = len({repeat.outcome for repeat in repeats}) == 1 == len({tuple(names) for names, _ in modes})
+    spread = np.max(np.ptp([times for _, times in modes], axis=0), initial=0.0) if is_same else 0.0
+    is_peak_clear = share * np.ptp(peaks) <= AMBIGUITY * max(peaks)
+    is_clear = (is_peak_clear, share * spread <= AMBIGUITY, is_same and rounding_decisions == 0)
+    return tuple(name for name, clear in zip(("peak", "events", "touch"), is_clear, strict=True) if not clear)
+
+
+def _list_modes(events: NDArray[np.void]) -> tuple[list[tuple[str, int]], Floats]:
+    """Return kind and side of the events that start a mode longer than `AMBIGUITY`, and the times of these modes, s."""
+    lasting = np.append(np.diff(events["time"]) > AMBIGUITY, True)
+    names = [(str(event["kind"]), int(event["side"])) for event in events[lasting]]
+    is_new = np.array([k == 0 or names[k] != names[k - 1] for k in range(len(names))])
+    return [name for name, new in zip(names, is_new, strict=True) if new], events["time"][
+        np.append(True, lasting[:-1])
+    ][is_new]
 
 
 def _compute_uplifts(trail: Trail, factor: float) -> Floats:

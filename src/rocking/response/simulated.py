@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ from rocking.response.history import Solution, TimeHistory, add_all_impacts
 from rocking.response.mechanics import (
     Contact,
     Energy,
-    check_friction,
+    check_available_friction,
     compute_friction_demand,
     compute_linear_balance,
     compute_pull,
@@ -39,11 +39,14 @@ from rocking.response.perturbed import (
     Repeat,
     check_factors,
 )
-from rocking.response.sensitivity import AMBIGUITY, Sensitivity, bound_rest_errors, find_ambiguities, require_sticking
-
-#: Relative change of the motion by which the sensitivity of a response that slips is estimated, and rounding error.
-_SMALL: Final = 1e-10
-_ULP: Final = 2.0**-52
+from rocking.response.sensitivity import (
+    TIE,
+    Sensitivity,
+    bound_rest_errors,
+    find_ambiguities,
+    find_slip_ambiguities,
+    require_sticking,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -252,12 +255,8 @@ class ResponseData(Result):
         the ground, or whether it falls from its balance. `perturbed` returns the spread of such results.
         """
         if self.slips:
-            close = self.perturbed(_SMALL, 3)
-            low, high = close.peak_range
-            changes = ((high - low) / _SMALL, np.nanmax(close.event_spreads, initial=0.0) / _SMALL)
-            named = zip(("peak", "events"), changes, strict=True)
-            names = [name for name, change in named if change * _ULP > AMBIGUITY]
-            return (*names, *(("touch",) if self.rounding_decisions or not close.is_decided else ()))
+            repeats = [self._repeat(1.0 + change) for change in (-TIE, 0.0, TIE)]
+            return find_slip_ambiguities(repeats, self.rounding_decisions)
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
         height = abs(self.peak_rotation - self.block.stops[0])
@@ -405,13 +404,13 @@ class ResponseData(Result):
         """Smallest ratio of normal force to weight, between impacts and until `tipping_time`."""
         return self._extremes[1]
 
-    def sliding_time(self, friction: float) -> float:
-        """Return the first time, s, at which sticking requires more than a friction coefficient; NaN if never.
+    def sliding_time(self, available_friction: float) -> float:
+        """Return the first time, s, at which sticking requires more than the available friction; NaN if never.
 
         The coefficient is positive and at most 3. The search excludes impulses at impacts and ends at `tipping_time`.
         Motion after a slip is not modelled.
         """
-        level = check_friction(friction)
+        level = check_available_friction(available_friction)
         if not self.required_friction > level:
             return math.nan
 

@@ -39,10 +39,10 @@ _AMBIGUITIES: Final = {
 }
 
 
-def create_rows(response: ResponseData, friction: float | None, precision: float) -> list[Row]:
-    """Return the rows of a summary, including the check of a coefficient of friction if given."""
+def create_rows(response: ResponseData, available_friction: float | None, precision: float) -> list[Row]:
+    """Return the rows of a summary, including the check of an available friction if given."""
     body = response.block
-    sliding = math.nan if friction is None else response.sliding_time(friction)
+    sliding = math.nan if available_friction is None else response.sliding_time(available_friction)
     rows = [
         Row("block" if isinstance(body, Block) else "body", body.description),
         Row("parameters", format_sides(body.sides)),
@@ -74,10 +74,10 @@ def create_rows(response: ResponseData, friction: float | None, precision: float
             slip = f"{1e3 * response.largest_slip:.4g} mm at most" if response.slips else "none"
             residual = f", {1e3 * response.residual_slip:.4g} mm at the end" if response.slips else ""
             rows.append(Row("slip", slip, note=residual))
-        if friction is not None:
+        if available_friction is not None:
             text = f"is not enough: the block slides, first at {sliding:.4f} s; {end_of_validity}"
             text = "is enough: the block does not slide" if math.isnan(sliding) else text
-            rows.append(Row(f"friction {friction:g}", text))
+            rows.append(Row(f"friction {available_friction:g}", text))
         if not math.isnan(response.lift_off_time):
             rows.append(Row("base lifts off", f"at {response.lift_off_time:.4f} s; {end_of_validity}"))
     perturbed = response.perturbed()

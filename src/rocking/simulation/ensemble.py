@@ -88,7 +88,7 @@ class Scales:
     Attributes
     ----------
     measure : Measure or None
-        Measure of `values`: factor, peak acceleration (m/s^2), peak velocity (m/s) or spectral acceleration (m/s^2).
+        Measure of `values`, in SI units.
     values : ndarray
         Levels of the measure.
 
@@ -133,7 +133,8 @@ class Scales:
     def factors(self, motion: Motion) -> Floats:
         """Return the factor that scales a motion to each level."""
         with np.errstate(over="ignore"):
-            factors = self.values / (self.measure or FACTOR).require_positive_value(motion, motion.name)
+            measure = self.measure or FACTOR
+            factors: Floats = measure.find_factor(self.values, measure.require_positive_value(motion, motion.name))
             largest = factors.max() * np.abs(motion.coefficients).max()
         if not largest <= MAX_ACCELERATION:
             motion.scaled(float(factors.max()))  # raises for too strong motions, not only steep ones
@@ -187,7 +188,9 @@ class Product:
 
     def __post_init__(self) -> None:
         checks.choice(self.polarity, "polarity", OptionError, list(SIGNS))
-        build_settings(self.bodies, self.model, self.chattering, self.duration, record=False)  # raises before the work
+        build_settings(
+            self.bodies, self.model, self.chattering, self.duration, writes_tables=False
+        )  # raises before the work
         check_friction(self.bodies, self.model, self.friction)
         for motion in self.motions:
             check_components(self.bodies, motion)
@@ -365,9 +368,9 @@ def simulate_many(
         As for `simulate`.
     levels : array_like, optional
         Levels of `measure` to which every motion is scaled. Adds the dimension ``scale``.
-    measure : {"factor", "pga", "pgv"} or Measure
-        Measure of `levels`: factors on the motions, peak accelerations (m/s^2), peak velocities (m/s), or spectral
-        accelerations (m/s^2), for example ``rocking.Measure("sa", period=1.0)``.
+    measure : str or Measure
+        Measure of `levels` in SI units: "factor", "pga", "pgv" or another name of `Measure`, for example spectral
+        accelerations (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
     polarity : {"+", "-", "both"}
         Original motions, reversed motions, or both, which adds the dimension ``polarity``.
     duration : float, optional

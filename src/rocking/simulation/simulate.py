@@ -92,9 +92,9 @@ def simulate(
 
     Notes
     -----
-    Without `friction` the block does not slide, and `Response.sliding_time` and ``summary(friction)`` report when it
-    would. With `friction` it sticks, slides on both pivots or slips on one while it rocks, and every transition is
-    located (see "Sliding" in the documentation).
+    Without `friction` the block does not slide, and `Response.sliding_time` and ``summary(available_friction)`` report
+    when it would. With `friction` it sticks, slides on both pivots or slips on one while it rocks, and every transition
+    is located (see "Sliding" in the documentation).
 
     Examples
     --------
@@ -123,7 +123,7 @@ def compute_response(
     """Compute a response like `simulate`, with `name` for the initial coordinate in errors."""
     scheme, bodies, motion = chattering_scheme(chattering), require_body(block).as_bodies(), check_motion(motion)
     setup = Setup(bodies, model, scheme, duration, initial, friction)
-    run = setup.prepare(motion, factor, record=True, name=name)
+    run = setup.prepare(motion, factor, writes_tables=True, name=name)
     if factor != 1.0:
         set_start(run.states, run.records, bodies, *_scale_start(initial, factor, run.records, bodies.stops[0]), name)
     trail, start = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]

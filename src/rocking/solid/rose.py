@@ -39,8 +39,8 @@ class ResistanceRose(DatasetResult):
         side, and overturns it if it lasts; alpha (rad), the tilt of a table that overturns the body; p (rad/s);
         restitution on leaving this side; radius R (m); rise of the centre of mass up to the unstable balance (m).
         Effects neglected in planar rocking: coupling, ratio of the products of inertia to the moment about the axis;
-        aside, lateral distance of the pivot from the centre of mass (m); gap, lateral distance between the pivots of
-        both sides (m). Over (corner): east and north of the centre of mass (m), the support polygon. Attributes:
+        lateral_offset of the pivot from the centre of mass (m); gap, lateral distance between the pivots of both sides
+        (m). Over (corner): east and north of the centre of mass (m), the support polygon. Attributes:
         weakest_azimuth and weakest_acceleration, exact, and height_of_mass (m).
 
     See Also
@@ -56,7 +56,7 @@ class ResistanceRose(DatasetResult):
     """
 
     TABLES = MappingProxyType({
-        "rose": ("acceleration", "alpha", "p", "restitution", "radius", "rise", "coupling", "aside", "gap"),
+        "rose": ("acceleration", "alpha", "p", "restitution", "radius", "rise", "coupling", "lateral_offset", "gap"),
         "support": ("east", "north"),
     })  # fmt: skip
 
@@ -68,13 +68,13 @@ class ResistanceRose(DatasetResult):
     def summary(self) -> str:
         data = self.data
         titles = {"azimuth": "azimuth, deg", "acceleration": "uplift, g", "alpha": "alpha, rad", "p": "p, rad/s"} | {
-            "restitution": "restitution", "coupling": "coupling", "aside": "pivot aside, m"
+            "restitution": "restitution", "coupling": "coupling", "lateral_offset": "lateral offset, m"
         }  # fmt: skip
         rows = [*zip(*(data[name].values.tolist() for name in titles), strict=True)]
-        coupling, aside, gap = (float(data[name].max()) for name in ("coupling", "aside", "gap"))
+        coupling, offset, gap = (float(data[name].max()) for name in ("coupling", "lateral_offset", "gap"))
         limits = (
             "planar rocking leaves out turning about the vertical and rolling over corners: over all azimuths "
-            f"products of inertia are up to {coupling:.2g} of the moment, pivots lie up to {aside:.2g} m to the side "
+            f"products of inertia are up to {coupling:.2g} of the moment, pivots lie up to {offset:.2g} m to the side "
             f"of the centre of mass, and those of both sides up to {gap:.2g} m from facing each other"
         )
         return "\n\n".join([self._headline(), format_some_rows([*titles.values()], rows), limits])
@@ -142,7 +142,7 @@ def compute_rose(
         "radius": (radius, "distance from the pivot to the centre of mass", "m"),
         "rise": (radius - height, "rise of the centre of mass up to the unstable balance", "m"),
         "coupling": (coupling, "products of inertia about the axis of rocking over the moment of inertia", "1"),
-        "aside": (front.aside, "how far the pivot lies to the side of the centre of mass", "m"),
+        "lateral_offset": (front.lateral_offset, "how far the pivot lies to the side of the centre of mass", "m"),
         "gap": (gap, "how far the pivots of both sides are from facing each other", "m"),
     }
     variables = {name: variable("azimuth", values, label, unit) for name, (values, label, unit) in columns.items()}

@@ -254,8 +254,9 @@ class Solid(Result):
                 f"{polygons.compute_area(self.support):.4g} m^2"),
             Row("least resistance", f"towards {self.weakest_azimuth:.4g} deg: lifted at {row['acceleration']:.4g} g, "
                 f"alpha {row['alpha']:.4g} rad, p {row['p']:.4g} rad/s"),
-            Row("left out there", f"products of inertia, {row['coupling']:.2g} of the moment; pivot {row['aside']:.2g} "
-                f"m to the side of the centre of mass, {row['gap']:.2g} m from facing the other one"),
+            Row("left out there", f"products of inertia, {row['coupling']:.2g} of the moment; pivot "
+                f"{row['lateral_offset']:.2g} m to the side of the centre of mass, {row['gap']:.2g} m from facing the "
+                "other one"),
             *(Row("repaired", sentence) for sentence in self.repairs),
             *(Row("note", sentence) for sentence in self.notes),
         ]  # fmt: skip

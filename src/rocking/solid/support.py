@@ -33,7 +33,7 @@ class Extent(NamedTuple):
     high: Floats  # upper lateral end of it
 
     @property
-    def aside(self) -> Floats:
+    def lateral_offset(self) -> Floats:
         """Lateral distance of the edge or corner from the centre of mass, m; 0 if an edge extends past it."""
         return np.asarray(np.maximum(np.maximum(self.low, -self.high), 0.0))
 

@@ -33,18 +33,21 @@ from rocking.inputs.pulses import find_family
 from rocking.inputs.toml import Tables
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
-from rocking.records.named import expand_record_names, load_motion, path_exists
+from rocking.records.named import OWN, expand_record_names, load_motion, path_exists
 from rocking.simulation.ensemble import Product, Scales
 
 #: Template of a study file, with comments.
 TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")
 
 #: Measures for scaling motions, and how their levels are read.
-_MEASURES: Final[Mapping[str, quantities.Quantity]] = {
+_MEASURES: Final[Mapping[str, quantities.NumberReader]] = {
     "factor": quantities.read_number,
     "pga": read_noted_acceleration,
     "pgv": quantities.read_velocity,
     "sa": read_noted_acceleration,
+    "sa_average": read_noted_acceleration,
+    **dict.fromkeys(("arias", "cav", "incremental_velocity"), quantities.read_velocity),
+    "pgd": quantities.read_position,
 }
 
 #: Keys of restraints; keys of tables are plurals.
@@ -53,15 +56,26 @@ _RESTRAINT_KEYS: Final = tuple(f"{name}s" if name in FORCES else name for name i
 #: Tables of a file and their keys.
 SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
     "blocks": ("csv", *BLOCK, *_RESTRAINT_KEYS),
-    "motions": ("records", "channel", "vertical", "units", "dt", "baseline", "highpass", "skip_unreadable", "pulses"),
-    "scales": (*_MEASURES, "period", "damping", "polarity"),
+    "motions": (
+        "records",
+        "channel",
+        "vertical",
+        "pairs",
+        "units",
+        "dt",
+        "baseline",
+        "highpass",
+        "skip_unreadable",
+        "pulses",
+    ),
+    "scales": (*_MEASURES, "period", "damping", "component", "polarity"),
     "simulation": ("model", "chattering", "duration", "friction"),
 }
 
 #: Keys whose values are not numbers, and the required type (also of the items of a list).
 _VALUE_TYPES: Final[Mapping[str, tuple[Any, str]]] = {
-    **dict.fromkeys(("csv", "vertical", "units", "polarity", "model", "chattering"), (str, "text")),
-    **dict.fromkeys(("one_sided", "skip_unreadable"), (bool, "true or false")),
+    **dict.fromkeys(("csv", "vertical", "units", "component", "polarity", "model", "chattering"), (str, "text")),
+    **dict.fromkeys(("one_sided", "skip_unreadable", "pairs"), (bool, "true or false")),
     **{f"{name}s": ([dict], f"tables, [[blocks.{name}s]]") for name in FORCES},
     "pulses": ([dict], "tables, [[motions.pulses]]"),
     **dict.fromkeys(("channel", "baseline"), (str | int, "text or a whole number")),
@@ -208,7 +222,7 @@ def _create_objects(
     table: str,
     k: int,
     entries: Mapping[str, Any],
-    find_quantity: Callable[[str], quantities.Quantity | None],
+    find_quantity: Callable[[str], quantities.NumberReader | None],
     create: Callable[[dict[str, Any]], Any],
 ) -> list[Any]:
     """Create the object of the k-th table, or several for lists or ranges."""
@@ -245,8 +259,9 @@ def _read_scales(tables: Tables) -> Scales:
         message = f"motions can be scaled to one measure only, not to {join_placeholders(measures)}"
         raise tables.create_error("scales", measures[0], message, *measures)
     options = {option: entries[option] for option in ("period", "damping") if option in entries}
-    for option in () if "sa" in entries else options:
+    for option in () if {"sa", "sa_average"} & {*entries} else options:
         raise tables.create_error("scales", option, "{} is only allowed with {}", option, "sa")
+    options |= {"component": entries["component"]} if "component" in entries else {}
     if not measures:
         return Scales.from_levels(None, FACTOR)
     (name,) = measures
@@ -266,7 +281,11 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
     for name in entries.get("records", []):
         with tables.locating_record_errors(name):
             names_by_path |= dict.fromkeys(_match_records(folder, name), name)
-    motions, names, skipped = [], [], []
+    motions, names, skipped = list[Motion](), list[str](), list[str]()
+    if entries.get("pairs", False):
+        motions += _load_pairs(tables, [*names_by_path])
+        names += [motion.name for motion in motions]
+        names_by_path = {}
     for path, name in names_by_path.items():
         try:
             with tables.locating_record_errors(name):
@@ -287,9 +306,25 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
     return motions, names + [""] * (len(motions) - len(names)), skipped
 
 
+#: Keys of [motions] that also apply to pairs.
+_READING: Final = ("dt", "units", "baseline", "highpass")
+
+
+def _load_pairs(tables: Tables, paths: list[str]) -> list[Motion]:
+    """Load the pairs of horizontal components, with vertical ones if the key is "own"."""
+    entries = tables.table("motions")
+    if "channel" in entries or entries.get("vertical", OWN) != OWN:
+        message = f'with pairs, {{}} is not allowed, and {{}} must be "{OWN}": the vertical component of the station'
+        raise tables.create_error("motions", "pairs", message, "channel", "vertical")
+    options = {name: entries[name] for name in _READING if name in entries}
+    with tables.locating_record_errors(paths[0] if paths else ""):
+        keep_going = entries.get("skip_unreadable", False)
+        return [*records.load_pairs(paths, vertical="vertical" in entries, keep_going=keep_going, **options)]
+
+
 def _load_record(tables: Tables, path: str, *, several: bool) -> Motion:
     entries = tables.table("motions")
-    metadata = {name: entries[name] for name in ("dt", "units", "baseline", "highpass") if name in entries}
+    metadata = {name: entries[name] for name in _READING if name in entries}
     if "channel" in entries:
         metadata["channel"] = str(entries["channel"])
     if "vertical" in entries:  # a file beside the study file, or any other name

@@ -280,12 +280,15 @@ def _motion_to_arrays(motion: Motion, prefix: str) -> dict[str, NDArray[Any]]:
     texts |= {"history": motion.history, "error": motion.error}
     arrays = {"breakpoints": motion.breakpoints, "coefficients": motion.coefficients}
     arrays["words"] = np.array(json.dumps(texts))
-    vertical = {} if motion.vertical is None else _motion_to_arrays(motion.vertical, f"{prefix}/vertical")
-    return {f"{prefix}/{name}": array for name, array in arrays.items()} | vertical
+    parts = {f"{prefix}/{name}": array for name, array in arrays.items()}
+    for name, part in (("vertical", motion.vertical), ("orthogonal", motion.orthogonal)):
+        parts |= {} if part is None else _motion_to_arrays(part, f"{prefix}/{name}")
+    return parts
 
 
 def _motion_from_arrays(arrays: Mapping[str, NDArray[Any]], prefix: str) -> Motion:
     texts = json.loads(str(arrays[f"{prefix}/words"]))
+    others = [name for name in ("vertical", "orthogonal") if f"{prefix}/{name}/words" in arrays]
     return Motion(
         arrays[f"{prefix}/breakpoints"],
         arrays[f"{prefix}/coefficients"],
@@ -293,5 +296,5 @@ def _motion_from_arrays(arrays: Mapping[str, NDArray[Any]], prefix: str) -> Moti
         description=Description(texts["family"], texts["parameters"], texts["text"]),
         history=tuple(texts["history"]),
         error=texts["error"],
-        vertical=_motion_from_arrays(arrays, f"{prefix}/vertical") if f"{prefix}/vertical/words" in arrays else None,
+        **{name: _motion_from_arrays(arrays, f"{prefix}/{name}") for name in others},
     )

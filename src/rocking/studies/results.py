@@ -18,6 +18,7 @@ from rocking.analysis.curve import fit_curve
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.levels import (
     assign_clusters,
+    assign_pairs,
     check_limit,
     check_limit_states,
     compute_exceedances,
@@ -27,13 +28,14 @@ from rocking.analysis.levels import (
     describe_polarities,
     describe_pool,
     describe_sample,
+    find_larger_responses,
     find_single_block,
     normalise_positive_weights,
 )
 from rocking.analysis.spectrum import compute_fractiles, compute_overturned_share
 from rocking.block.body import Bodies
 from rocking.core import checks
-from rocking.core.arrays import Flags, Floats, select_evenly, split_range
+from rocking.core.arrays import Flags, Floats, Integers, select_evenly, split_range
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, format_some_rows, variable
 from rocking.core.tables import (
@@ -224,10 +226,11 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, dataset.attrs | attributes)
 
 
-def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
+def _iterate_peak_ratios(store: Store, larger: Measure | None = None) -> Iterator[tuple[slice, Floats]]:
     """Yield normalised peak rotations (motions, scales, polarities, blocks) by slices of blocks.
 
-    Values are infinite if the block overturned and NaN if the simulation was abandoned.
+    Values are infinite if the block overturned and NaN if the simulation was abandoned. With a measure, only the larger
+    response of each pair and of both polarities is yielded, shape (pairs, scales, 1, blocks).
     """
     store.require_complete()
     *sizes, count = store.product.shape
@@ -241,7 +244,26 @@ def _iterate_peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
             message = "were stopped by the study's duration, while the block moved or the motion went on, so that their"
             raise StudyError(f"{count_text} {message} outcomes are unknown: create the study without a duration")
         alpha = compute_slenderness(store.product.bodies.select(blocks))
-        yield blocks, compute_ratios(alpha, peak, overturned != 0.0, unfinished != 0.0)
+        ratios = compute_ratios(alpha, peak, overturned != 0.0, unfinished != 0.0)
+        if larger is not None:
+            by_level = ratios.transpose(1, 0, 3, 2)
+            indices = find_larger_responses(by_level, store.product.motions, larger)
+            ratios = by_level.ravel()[indices].swapaxes(0, 1)[:, :, None]
+        yield blocks, ratios
+
+
+def _list_counted_motions(product: Product, measure: Measure, *, larger: bool) -> Integers:
+    """Return the positions of the motions that count: all, or the first of each pair."""
+    if not larger:
+        return np.arange(len(product.motions))
+    pairs, values = assign_pairs(product.motions), _compute_intensities(product, measure)
+    first = np.unique(pairs, return_index=True)[1]
+    if not np.allclose(values, values[first][pairs], rtol=1e-9, atol=0.0):
+        message = (
+            "{} requires scales at which both components of a pair have the same factor: factors, or {} in [scales]"
+        )
+        raise OptionError(message, "larger", "component")
+    return first
 
 
 def _mark_repeated(bodies: Bodies, polarities: int) -> Flags:
@@ -335,7 +357,7 @@ class BlockTable(DatasetResult):
 
 def _parse_measure(attributes: Mapping[str, Any]) -> Measure:
     """Create the measure from the attributes of a variable."""
-    options = {name: attributes[name] for name in ("period", "damping") if name in attributes}
+    options = {name: attributes[name] for name in ("period", "damping", "component") if name in attributes}
     return Measure(attributes["measure"], **options)
 
 
@@ -399,16 +421,19 @@ def fit_pooled_fragility(
     confidence: float,
     weights: ArrayLike | None,
     clusters: ArrayLike | None,
+    *,
+    larger: bool = False,
 ) -> Fragility:
     """Fit one curve to the outcomes of all blocks, with optional weights."""
     limits = _check_limit_states(limit_states, confidence)
     product, bodies = store.product, store.product.bodies
     units, unit_indices = np.unique(compute_units(bodies, measure, product.model), return_inverse=True)
     shares = normalise_positive_weights(weights, len(bodies))
-    motions, scales, _, _ = product.shape
-    trials, missing = np.zeros((motions, scales, len(units))), 0
+    motions = _list_counted_motions(product, measure, larger=larger)
+    scales = product.scales.count
+    trials, missing = np.zeros((len(motions), scales, len(units))), 0
     counts = {name: np.zeros_like(trials) for name in limits}
-    for blocks, ratios in _iterate_peak_ratios(store):
+    for blocks, ratios in _iterate_peak_ratios(store, measure if larger else None):
         membership = np.where(unit_indices[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
         is_known = ~np.isnan(ratios)
         trials += is_known.sum(axis=2, dtype=float) @ membership
@@ -416,8 +441,8 @@ def fit_pooled_fragility(
         for name, limit in limits.items():
             counts[name] += compute_exceedances(ratios, limit, name).sum(axis=2) @ membership
     has_trials = trials > 0.0
-    labels = assign_clusters(product.motions, clusters)
-    intensities = (_compute_intensities(product, measure)[:, :, None] / units)[has_trials]
+    labels = assign_clusters(product.motions, clusters)[motions]
+    intensities = (_compute_intensities(product, measure)[motions][:, :, None] / units)[has_trials]
     groups = np.broadcast_to(labels[:, None, None], has_trials.shape)[has_trials]
     curves = []
     for name, limit in limits.items():
@@ -425,6 +450,7 @@ def fit_pooled_fragility(
         curves.append(fit_curve(name, data, groups, confidence, measure, limit))
     text = f"{describe_pool(bodies, weights)}, {describe_sample(labels, clusters)}, {format_count(scales, 'scale')}"
     text += f", {product.model} model{describe_polarities(product.polarity, is_symmetric=bodies.is_symmetric)}"
+    text += ", the larger response" * larger
     return Fragility(
         *(tuple(curves), measure, text, find_single_block(bodies), product.model),
         outcomes=None,
@@ -455,6 +481,8 @@ def fit_block_fragilities(
     limit_states: Mapping[str, float] | None,
     confidence: float,
     clusters: ArrayLike | None,
+    *,
+    larger: bool = False,
 ) -> BlockTable:
     """Fit a curve to the outcomes of each block."""
     import xarray as xr
@@ -463,11 +491,13 @@ def fit_block_fragilities(
     product, bodies, scales = store.product, store.product.bodies, store.product.scales.count
     estimates = {name: np.full((len(limits), len(bodies)), np.nan) for name in _CURVE_VARIABLES}
     faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
-    intensities, units = _compute_intensities(product, measure).ravel(), compute_units(bodies, measure, product.model)
-    labels = np.repeat(assign_clusters(product.motions, clusters), scales)
+    motions = _list_counted_motions(product, measure, larger=larger)
+    intensities = _compute_intensities(product, measure)[motions].ravel()
+    units = compute_units(bodies, measure, product.model)
+    labels = np.repeat(assign_clusters(product.motions, clusters)[motions], scales)
     fit = partial(fit_fragility, measure=measure, confidence=confidence)
     with Progress("fitting", len(bodies) * len(limits)) as bar:
-        for blocks, ratios in _iterate_peak_ratios(store):
+        for blocks, ratios in _iterate_peak_ratios(store, measure if larger else None):
             repeated = _mark_repeated(bodies.select(blocks), ratios.shape[2])
             missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
             distinct = np.where(repeated, np.nan, ratios)
@@ -510,4 +540,4 @@ def _compute_intensities(product: Product, measure: Measure) -> Floats:
     if scales.measure == measure.motion_measure:
         return np.tile(scales.values, (len(values), 1))  # the input values, bit for bit
     factors = np.array([scales.factors(motion) for motion in product.motions])
-    return np.asarray(np.abs(factors) * values[:, None])
+    return np.asarray(np.abs(factors) ** measure.exponent * values[:, None])

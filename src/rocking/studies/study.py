@@ -293,12 +293,14 @@ class Study:
         confidence: float = 0.9,
         weights: ArrayLike | None = None,
         clusters: ArrayLike | None = None,
+        larger: bool = False,
     ) -> Fragility:
         """Fit fragility curves to the outcomes of all blocks, with the arguments and results of `rocking.fragility`.
 
         The intensity is the measure of a motion at a scale. A StudyError is raised if units are missing or damaged.
         """
-        return fit_pooled_fragility(self._store, Measure.parse(measure), limit_states, confidence, weights, clusters)
+        parsed = Measure.parse(measure)
+        return fit_pooled_fragility(self._store, parsed, limit_states, confidence, weights, clusters, larger=larger)
 
     def block_fragilities(
         self,
@@ -307,6 +309,7 @@ class Study:
         limit_states: Mapping[str, float] | None = None,
         confidence: float = 0.9,
         clusters: ArrayLike | None = None,
+        larger: bool = False,
     ) -> BlockTable:
         """Fit a fragility curve to the outcomes of each block, with the arguments and errors of `Study.fragility`.
 
@@ -314,7 +317,8 @@ class Study:
         (median_lower, median_upper, ...; SI units), exceeded and outcomes (counts; for a symmetric block of one
         polarity), and fault: the reason why no lognormal fits, or an empty string.
         """
-        return fit_block_fragilities(self._store, Measure.parse(measure), limit_states, confidence, clusters)
+        parsed = Measure.parse(measure)
+        return fit_block_fragilities(self._store, parsed, limit_states, confidence, clusters, larger=larger)
 
     def spectrum(self, fractiles: Sequence[float] = (0.16, 0.5, 0.84)) -> BlockTable:
         """Compute fractiles of the normalised peak rotation over the motions, for each scale and block.

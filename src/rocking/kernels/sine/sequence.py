@@ -19,7 +19,7 @@ from rocking.kernels.sine.arc import MAX_EXCESS, State, apply_restitution, estim
 
 #: Number of extrapolations of that expansion, and relative agreement at which they are accepted.
 LEVELS: Final = 5
-_AGREEMENT: Final = 1e-13
+_EXTRAPOLATION_TOLERANCE: Final = 1e-13
 
 #: Estimate of the remaining phase and its successive extrapolations; their factors.
 Row = tuple[float, float, float, float, float, float]
@@ -73,14 +73,16 @@ def has_converged(row: Row, last: Row, elapsed: float, x: float) -> bool:
     """
     remaining = row[LEVELS]
     expected = last[LEVELS] - elapsed
-    return (abs(remaining - row[LEVELS - 1]) <= _AGREEMENT * x) & (abs(remaining - expected) <= _AGREEMENT * x)
+    return (abs(remaining - row[LEVELS - 1]) <= _EXTRAPOLATION_TOLERANCE * x) & (
+        abs(remaining - expected) <= _EXTRAPOLATION_TOLERANCE * x
+    )
 
 
 #: Window of the proof divided by the estimate of the remaining phase.
 _WINDOW_RATIO: Final = 1.5
 
 #: Relative allowance for the rounding of P during a sequence.
-_ROUNDING: Final = 1e-12
+_PHASE_ROUNDING: Final = 1e-12
 
 
 @inlined
@@ -93,9 +95,9 @@ def bracket_remaining_phase(entry: State, window: float, delta: float, eta: floa
     if not window > 0.0:
         return np.nan, np.nan
     V, P, D = entry
-    rate = (D + window * math.sqrt((1.0 - P) * (1.0 - P) + D * D)) * (1.0 + _ROUNDING)
-    low = P * (1.0 - _ROUNDING)
-    high = (P + window * rate) * (1.0 + _ROUNDING)
+    rate = (D + window * math.sqrt((1.0 - P) * (1.0 - P) + D * D)) * (1.0 + _PHASE_ROUNDING)
+    low = P * (1.0 - _PHASE_ROUNDING)
+    high = (P + window * rate) * (1.0 + _PHASE_ROUNDING)
     second = Bounds(delta, 2.0 - high, 2.0 - low, high - low, rate, 0.0)
     first = Bounds(delta, low, high, high - low, rate, 0.0)
     return bracket_geometrically(V, second, first, (eta, eta), (eta, eta))

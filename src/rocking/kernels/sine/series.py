@@ -93,18 +93,18 @@ ThreeSeries = tuple[Series, Series, Series]
 FourSeries = tuple[Series, Series, Series, Series]
 
 #: Relative change of each coefficient by the last extrapolation at which its result is accepted.
-_AGREEMENT: Final = 1e-14
+_EXTRAPOLATION_TOLERANCE: Final = 1e-14
 
 _MAX_PAIRS: Final = 100_000
 
 #: Number of pairs in the first batch: until the speed has decreased by exp(-4.6), and some more.
-_DECAY: Final = 2.3
+_BATCH_DECAY: Final = 2.3
 _EXTRA_PAIRS: Final = 3
 
 
 def compute_phase_coefficients(delta: float, eta: float, order: int) -> Series:
     """Compute ``order`` coefficients c_k of omega tau_ch = sqrt(eps) (c_0 + c_1 eps + ...); all NaN: not resolved."""
-    count = LEVELS + _EXTRA_PAIRS + int(_DECAY / -math.log(eta))
+    count = LEVELS + _EXTRA_PAIRS + int(_BATCH_DECAY / -math.log(eta))
     elapsed, entries = expand_first_impact(delta, eta, order)
     while elapsed.shape[0] < _MAX_PAIRS:
         new_elapsed, new_entries = expand_impact_pairs(entries[-1], delta, eta, count)
@@ -116,7 +116,7 @@ def compute_phase_coefficients(delta: float, eta: float, order: int) -> Series:
             remaining = expand_remaining_phase(state, delta, eta).from_power(1)
             rest, change = extrapolate_series(remaining.T, elapsed, eta)
         x = np.cumsum(elapsed, axis=0)[-change.shape[0] :]
-        converged_rows = np.flatnonzero((change <= _AGREEMENT * np.abs(x)).all(axis=1))
+        converged_rows = np.flatnonzero((change <= _EXTRAPOLATION_TOLERANCE * np.abs(x)).all(axis=1))
         if converged_rows.size:
             coefficients: Series = x[converged_rows[0]] + rest[converged_rows[0]]
             return coefficients

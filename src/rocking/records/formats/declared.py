@@ -85,9 +85,9 @@ class Format:
     units: str  # units, for the documentation
     marks: tuple[str, ...]  # patterns in the first lines, of which the first one begins a channel
     header: tuple[Mapping[str, Any], ...]  # parts of a channel's header
-    stated: tuple[str, ...]  # patterns with statements as named groups
+    statement_patterns: tuple[str, ...]  # patterns with statements as named groups
     mark_lines: int = 1  # number of lines that contain the marks
-    shape: str = ""  # pattern at the start of the file
+    start_pattern: str = ""  # pattern at the start of the file
     has_several: bool = False  # whether a file may contain several channels
     other_data: str = "(?!)"  # line that begins data of other quantities, which are skipped
     pairs_header: tuple[Mapping[str, Any], ...] = ()  # header of pairs of time and value, if the other one is not found
@@ -97,22 +97,24 @@ class Format:
     wide_layout: tuple[Any, ...] = ()  # place in the header's numbers, a number, and the columns that it selects
     required: tuple[str, ...] = ()  # keys that must have a value
     count_name: str = "the header"  # name of the count, for messages
-    count: tuple[Any, ...] = ()  # place of the count in the header's numbers
-    total: tuple[Any, ...] = ()  # places of the counts of acceleration and of other quantities that follow it
-    steps: tuple[tuple[Any, ...], ...] = ()  # alternative places of the step, and steps per second there
-    rate: tuple[Any, ...] = ()  # place of the samples per second
+    count_place: tuple[Any, ...] = ()  # place of the count in the header's numbers
+    total_count_places: tuple[
+        Any, ...
+    ] = ()  # places of the counts of acceleration and of other quantities that follow it
+    step_places: tuple[tuple[Any, ...], ...] = ()  # alternative places of the step, and steps per second there
+    rate_place: tuple[Any, ...] = ()  # place of the samples per second
     precise_step: tuple[int, ...] = ()  # line, start and end of a step with more digits
     fixed_units: str = ""  # unit of all files
-    names: Mapping[str, str] = field(default_factory=dict)  # names of components by their text in the file
+    component_names: Mapping[str, str] = field(default_factory=dict)  # names of components by their text in the file
     is_padded: bool = False  # whether the last row is filled up
-    missing: float | None = None  # number for unknown values, which are rejected
+    missing_value: float | None = None  # number for unknown values, which are rejected
     is_raw: bool = False  # whether the numbers are counts with the offset of an instrument
 
     def recognise(self, source: Source) -> Recognised | None:
         """Return the format if each of its marks is found."""
         lines = source.find_first_lines(self.mark_lines)
         found = [[line for line in lines if _compile(mark).search(line.text)] for mark in self.marks]
-        shape = _compile(self.shape).match(source.data[:4096].decode("latin-1"))
+        shape = _compile(self.start_pattern).match(source.data[:4096].decode("latin-1"))
         if not all(found) or shape is None:
             return None
         match = _compile(self.marks[0]).search(found[0][0].text)
@@ -169,7 +171,7 @@ class Header:
     lines: list[Line] = field(default_factory=list)  # lines read
     numbers: dict[str, Floats] = field(default_factory=dict)  # numbers of the header by name
     skips: Sequence[int] = (0,)  # alternative numbers of rows before the numbers
-    stated: dict[str, list[Statement]] = field(default_factory=lambda: defaultdict(list))  # statements by name
+    statements: dict[str, list[Statement]] = field(default_factory=lambda: defaultdict(list))  # statements by name
     is_paired: bool = False  # whether the numbers are pairs
 
     def read(self) -> None:
@@ -197,11 +199,11 @@ class Header:
     def _collect(self) -> None:
         """Collect what the header states, by name, in the order of the patterns."""
         text = "\n".join(line.text for line in self.lines)
-        patterns = self.form.stated if self.lines else ()
+        patterns = self.form.statement_patterns if self.lines else ()
         for match in filter(None, (_compile(pattern).search(text) for pattern in patterns)):
             for name, value in ((name, value) for name, value in match.groupdict().items() if value is not None):
                 line = self.lines[text.count("\n", 0, match.start(name))]
-                self.stated[re.sub(r"_\d$", "", name)].append(Statement(" ".join(value.split()), line.start))
+                self.statements[re.sub(r"_\d$", "", name)].append(Statement(" ".join(value.split()), line.start))
 
     def _fail(self, text: str, offset: int, advice: str = "correct the header, or download the file again") -> NoReturn:
         raise self.source.error(f"{text}; {advice}", offset)
@@ -295,12 +297,12 @@ class Header:
 
     def find(self, name: str, default: str = "") -> str:
         """Return the first statement that is not empty."""
-        return next((statement.text for statement in self.stated.get(name, ()) if statement.text), default)
+        return next((statement.text for statement in self.statements.get(name, ()) if statement.text), default)
 
     @property
     def offset(self) -> int:
         """Offset of the line for errors on the numbers."""
-        places = [statement.offset for name in ("count", "factor") for statement in self.stated.get(name, ())]
+        places = [statement.offset for name in ("count", "factor") for statement in self.statements.get(name, ())]
         return places[0] if places else self.lines[-1].start if self.lines else self.end
 
     def _read_number(self, statement: Statement, *, positive: bool = False) -> float:
@@ -315,37 +317,37 @@ class Header:
 
     def find_number(self, name: str, *, positive: bool = False) -> float:
         """Return the first stated number, or 0."""
-        statements = [statement for statement in self.stated.get(name, ()) if statement.text]
+        statements = [statement for statement in self.statements.get(name, ()) if statement.text]
         return self._read_number(statements[0], positive=positive) if statements else 0.0
 
     def find_count(self, surplus: int) -> Count:
         """Return the stated number of values in each column."""
-        if self.form.count:
-            return Count(self.get_number(*self.form.count), self.offset, max_surplus=surplus)
-        counts = [(self._read_number(statement), statement.offset) for statement in self.stated.get("count", ())]
+        if self.form.count_place:
+            return Count(self.get_number(*self.form.count_place), self.offset, max_surplus=surplus)
+        counts = [(self._read_number(statement), statement.offset) for statement in self.statements.get("count", ())]
         if len({count for count, _ in counts}) > 1:
             self._fail(f"the header specifies both {counts[0][0]:.15g} and {counts[1][0]:.15g} values", counts[0][1])
         if counts:
             return Count(*counts[0], self.form.count_name, surplus)
-        if not self.stated.get("seconds"):
+        if not self.statements.get("seconds"):
             return Count(0.0, self.offset, max_surplus=math.inf)
         rate = self.find_number("rate")
         # The duration is in whole seconds. Fewer samples, or a surplus of a second, are errors.
-        place = self.stated["seconds"][0].offset
+        place = self.statements["seconds"][0].offset
         return Count(self.find_number("seconds") * rate, place, "the duration", max_surplus=max(rate - 1.0, 0.0))
 
     def find_step(self, count: float) -> tuple[float | None, int]:
         """Return the sampling step, s, or None for pairs, and the offset of its line."""
         if self.is_paired:
             return None, self.offset
-        if self.form.rate:
-            rate = self.get_number(*self.form.rate)
-            return None if rate == self.form.missing else _invert(rate), self.offset
-        if self.form.steps:
+        if self.form.rate_place:
+            rate = self.get_number(*self.form.rate_place)
+            return None if rate == self.form.missing_value else _invert(rate), self.offset
+        if self.form.step_places:
             return self._choose_step(count), self.offset
         duration = self.find_number("duration")
-        if duration and count and not self.stated.keys() & {"step", "rate"}:
-            return float(f"{duration / count:.6g}"), self.stated["duration"][0].offset
+        if duration and count and not self.statements.keys() & {"step", "rate"}:
+            return float(f"{duration / count:.6g}"), self.statements["duration"][0].offset
         step, rounding, offset = self._read_step()
         slack = 1.5 * step + count * rounding + compute_rounding(self.find("duration"))
         if duration and count and abs(count * step - duration) > 1.01 * slack:
@@ -354,8 +356,10 @@ class Header:
 
     def _read_step(self) -> tuple[float, float, int]:
         """Return the most precise of the stated steps, s, its rounding and the offset of its line."""
-        steps = [(self._read_number(each), compute_rounding(each.text), each) for each in self.stated.get("step", ())]
-        for each in self.stated.get("rate", ()):
+        steps = [
+            (self._read_number(each), compute_rounding(each.text), each) for each in self.statements.get("step", ())
+        ]
+        for each in self.statements.get("rate", ()):
             step = _invert(self._read_number(each))
             steps.append((step, compute_rounding(each.text) * step**2, each))
         if not steps:
@@ -373,12 +377,12 @@ class Header:
     def _choose_step(self, count: float) -> float:
         """Return the first step among the header's numbers that fits the stated duration."""
         about = self.find_number("about")
-        for name, index, per_second in self.form.steps:
+        for name, index, per_second in self.form.step_places:
             step = self.get_number(name, index) / per_second
             # The duration is printed in whole seconds, in some files without the last interval.
             if step > 0.0 and (not about or abs(count * step - about) <= 1.0 + step):
                 return float(step)
-        names = " and ".join(str(index) for index in sorted(index for _, index, _ in self.form.steps))
+        names = " and ".join(str(index) for index in sorted(index for _, index, _ in self.form.step_places))
         text = f"real headers {names} are inconsistent with {count:.15g} points and the stated duration"
         self._fail(text, self.offset)
 
@@ -408,7 +412,7 @@ class Header:
         """Create the channels of the numbers up to the offset `end`."""
         source, form = self.source, self.form
         unit = request.resolve_unit(source, form.fixed_units or self.find("units"), self.offset)
-        words = " ".join(statement.text for statement in self.stated.get("columns", ()))
+        words = " ".join(statement.text for statement in self.statements.get("columns", ()))
         columns = re.sub(r"\([^)]*\)|[/;]", " ", words).split() or [""]
         layout = self._choose_layout()
         count = self.find_count(layout.per_line if layout and form.is_padded else 0)
@@ -439,19 +443,21 @@ class Header:
     def _read_scaled(self, end: int, layout: Layout | None, count: Count, multiple: int) -> Floats:
         """Read the stated number of values in several columns, times the stated factor."""
         form, size = self.form, count.values * multiple
-        if form.total:
-            counts = self.numbers[form.total[0]][form.total[1] - 1 : form.total[2]]
+        if form.total_count_places:
+            counts = self.numbers[form.total_count_places[0]][
+                form.total_count_places[1] - 1 : form.total_count_places[2]
+            ]
             if counts[0] != count.values:
                 self._fail(f"the header specifies both {count.values:.15g} and {counts[0]:.15g} values", count.offset)
             size = float(counts.sum())
         stated = count._replace(values=size, max_surplus=count.max_surplus * multiple)
         values = self._read_values(end, layout, stated)
-        if (form.total or form.is_padded) and count.values:
+        if (form.total_count_places or form.is_padded) and count.values:
             values = values[: int(count.values * multiple)]
-        missing = self.find_number("missing") if form.missing is None else form.missing
+        missing = self.find_number("missing") if form.missing_value is None else form.missing_value
         if missing and (values == missing).any():
             raise missing_value_error(self.source, missing, self.offset)
-        if "factor" in self.stated:
+        if "factor" in self.statements:
             with np.errstate(over="ignore"):
                 divisor = self.find_number("divisor", positive=True) or 1.0
                 values = values * self.find_number("factor", positive=True) / divisor
@@ -460,7 +466,7 @@ class Header:
     def _find_labels(self, column: str, index: int) -> dict[str, Any]:
         """Return number, name, azimuth, station, event, start and metadata of a component."""
         form, number = self.form, self.find("number")
-        name = form.names.get(self.find("name"), column or self.find("name"))
+        name = form.component_names.get(self.find("name"), column or self.find("name"))
         ordinal = int(number) if number else self.ordinal + index
         letter = self.find(f"azimuth_{name[:1].lower()}") if name else ""
         event, magnitude, start = self.find("event"), self.find("magnitude"), None
@@ -475,14 +481,16 @@ class Header:
             "station": ".".join(filter(None, (self.find("network"), self.find("station")))),
             "event": f"{event}, magnitude {magnitude}" if magnitude else event,
             "start": start,
-            "facts": {name[5:].replace("_", " "): self.find(name) for name in self.stated if name.startswith("fact_")},
+            "facts": {
+                name[5:].replace("_", " "): self.find(name) for name in self.statements if name.startswith("fact_")
+            },
         }
 
     def _check_peak(self, acceleration: Floats, index: int, unit: Unit) -> None:
         """Raise an error if the peak of a component contradicts the stated one, as with another unit."""
-        statements = [*self.stated.get("peaks", ()), *self.stated.get("peak", ())]
+        statements = [*self.statements.get("peaks", ()), *self.statements.get("peak", ())]
         numbers = [[abs(float(number)) for number in re.findall(NUMBER, each.text)] for each in statements]
-        if len(numbers) == 1 and "peaks" in self.stated:
+        if len(numbers) == 1 and "peaks" in self.statements:
             numbers = [[number] for number in numbers[0]]
         if index >= len(numbers) or not numbers[index]:
             return
