@@ -13,9 +13,9 @@ from urllib.parse import parse_qsl, urlsplit
 
 import httpx
 
-from rocking.explorer.authentication import EXCHANGE
 from rocking.explorer.core import Explorer
 from rocking.explorer.launch import start_listening
+from rocking.explorer.server import EXCHANGE
 
 CASE = "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=0.4g"
 SINE = "view=map&width=0.24&height=1.1&motion=sine:amplitude%3D0.2247g,frequency%3D1.15,cycles%3D2.5"
@@ -33,7 +33,6 @@ SLIDE = """async (count) => {
   }
   return took;
 }"""
-COMPILED = "import('/page/api.js').then(({json}) => json('/api/start', {})).then((found) => found.compilation.done)"
 MAP = "[Number(document.body.dataset.first), Number(document.body.dataset.mapTook)]"
 
 
@@ -54,7 +53,6 @@ def main():
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.goto(here.link(dict(parse_qsl(CASE))))
         wait(page, "document.body.dataset.rested")
-        wait(page, COMPILED)
         ready = []
         for _ in range(5):
             page.reload()

@@ -26,7 +26,7 @@ SIMULATION = "simulate el-centro-meloland-270 --width 0.24 --height 1.1 --json"
 USES = {
     "formats": "import obspy.core",
     "excel": "import pandas; pandas.DataFrame({'a': [1.0]}).to_excel('table.xlsx')",
-    "explorer": "import bokeh, uvicorn, rocking.explorer.launch, rocking.explorer.server",
+    "explorer": "import uvicorn, rocking.explorer.launch, rocking.explorer.server",
     "browser": "import playwright.sync_api",
     "cluster": "import distributed, dask_jobqueue",
     "parquet": "import pandas; pandas.DataFrame({'a': [1.0]}).to_parquet('table.parquet')",

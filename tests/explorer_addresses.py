@@ -42,8 +42,7 @@ _CHOICES = {
 
 #: What only the page reads.
 _SHOWN = {
-    "view": ("response", "block", "map", "periodic", "compare", "constructor"),
-    "compare": ("treatment", "block", "motion", "toString"),
+    "view": ("shake", "map", "periodic", "assess", "constructor"),
     "x": ("p", "omega", "constructor"),
     "quantity": ("mode", "rest", "hasOwnProperty"),
     "points": ("8", "0", "abc"),
@@ -51,9 +50,7 @@ _SHOWN = {
     "to": ("1e-300", "2", "1e300", "Infinity", "6"),
     "sweep": ("a", "omega", "valueOf"),
     "sweep_points": ("8", "-1"),
-    "other.motion": ("none", "constructor", "sine:amplitude=0.4g,frequency=1,cycles=2.5"),
-    "other.chattering": ("velocity=0.05", "valueOf=3"),
-    "other.width": ("0.5", "abc"),
+    "other": ("motion=none", "width=0.5&height=1&chattering=velocity%3D0.05", "constructor", "width=abc"),
 }
 
 

@@ -7,7 +7,7 @@ from urllib.parse import parse_qs, urlsplit
 import anyio.from_thread
 import httpx
 
-from rocking.explorer.authentication import EXCHANGE
+from rocking.explorer.server import EXCHANGE
 
 
 class Client:
@@ -43,7 +43,6 @@ def bearing(secret):
 
 def let_in(client, token, base=""):
     """Exchange a token for the secret, as the page does, and carry it from now on."""
-    client.headers["sec-fetch-site"] = "same-origin"
     answer = client.post(base + EXCHANGE, headers=bearing(token))
     assert answer.status_code == 200, answer.text
     client.headers.update(bearing(answer.text))

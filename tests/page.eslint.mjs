@@ -21,5 +21,4 @@ export default [
       "no-unused-vars": ["error", {varsIgnorePattern: "^_"}],
     },
   },
-  {files: ["**/nonce.js"], languageOptions: {sourceType: "script"}},
 ];

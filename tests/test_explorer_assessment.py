@@ -56,7 +56,7 @@ def test_the_curve_is_that_of_the_script_to_the_last_bit(case, texts):
 
 
 def test_every_record_adds_a_row_of_its_own_and_the_curve_so_far():
-    found = assessed(STATUE, records=RISING, friction="0.22", **LEVELS)
+    found = assessed(STATUE, records=RISING, **LEVELS)
     block, rows = rocking.Block(width=0.24, height=1.1), [part.header for part in simulate_records(found)]
     assert [row["share"] for row in rows] == [0.2, 0.4, 0.6, 0.8, 1.0]
     up = rocking.records.load("el-centro-meloland-up")
@@ -66,7 +66,6 @@ def test_every_record_adds_a_row_of_its_own_and_the_curve_so_far():
         row, response = header["row"], rocking.simulate(block, motion)
         assert row["overturns"] == response.overturned
         assert row["friction_needed"] == response.required_friction
-        assert row["sliding_time"] == pytest.approx(response.sliding_time(0.22), nan_ok=True)
         assert row["ratios"]["west"] == rocking.rules.west(block, motion).ratio[0]
         assert row["ratios"]["ishiyama"] == rocking.rules.ishiyama(block, motion).ratio[0]
         assert len(row["overturned_levels"]) == 6
@@ -145,7 +144,6 @@ def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it
         ({"records": PLAIN, "levels": "61"}, "from 2 to 60"),
         ({"records": PLAIN, "levels": "nan"}, "from 2 to 60"),
         ({"records": PLAIN, "level_from": "2g", "level_to": "1g"}, "below the last"),
-        ({"records": PLAIN, "friction": "7"}, "at most 3"),
         ({"records": "motion=none"}, "shakes nothing"),
         ({"records": "0"}, "names no motion"),
         ({"records": "key=x"}, "names no motion"),

@@ -186,9 +186,9 @@ def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch
     store = UploadStore()
     monkeypatch.setattr(uploads, "MAX_FILES", 3)
     keys = [store.add_file(f"{seed}.txt", samples(seed).encode()) for seed in range(3)]
-    with pytest.raises(RecordError, match="3 files and 256 MiB are kept at most; take some out of the list"):
+    with pytest.raises(RecordError, match="3 files and 256 MiB are kept at most; remove records from the list"):
         store.add_file("4.txt", samples(4).encode())
-    assert store.add_file("again.txt", samples(1).encode()) == keys[1]
+    assert store.add_file("1.txt", samples(1).encode()) == keys[1]
     store.describe_file(keys[0])
     store.read(keys[0], None, 0.01, "g")
     store.remove(keys[0])

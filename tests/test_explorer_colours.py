@@ -11,7 +11,7 @@ from rocking.explorer.payload import load_english_texts
 
 PAGE = Path(rocking.explorer.__file__).parent / "page"
 STYLE = (PAGE / "colours.css").read_text("utf-8")
-OUTCOMES = (PAGE / "outcomes.js").read_text("utf-8")
+OUTCOMES = (PAGE / "map.js").read_text("utf-8")
 HEX = re.compile(r"#[0-9a-fA-F]{6}\b")
 
 #: Marks, each with what is beside it; contrast is 3:1 at least (WCAG 2.2, 1.4.11).
@@ -61,7 +61,7 @@ def is_orange(ink):
 
 
 def constant(name):
-    """Colours of a constant of outcomes.js."""
+    """Colours of a constant of map.js."""
     return HEX.findall(re.search(rf"export const {name} = .*?;\n", OUTCOMES, re.S)[0])
 
 
@@ -78,10 +78,10 @@ def test_colours_of_the_page_stand_out(scheme, kind, least):
 def test_orange_means_overturning_and_nothing_else():
     for scheme, colours in palettes().items():
         assert [name for name, ink in colours.items() if is_orange(ink)] == ["over"], scheme
-    modes = re.findall(r'\[(-?\d|AFTER_REST), "(#[0-9a-f]{6})"\]', OUTCOMES.partition("VERDICTS")[0])
+    modes = re.findall(r'\[(-?\d), "(#[0-9a-f]{6})"\]', OUTCOMES.partition("VERDICTS")[0])
     assert len(modes) >= 7
     for mode, ink in modes:
-        text = load_english_texts()[f"mode.{mode.replace('AFTER_REST', '-4')}"]
+        text = load_english_texts()[f"mode.{mode}"]
         assert is_orange(ink) == text.startswith("overturns"), text
     assert [is_orange(ink) for ink in constant("OUTCOMES")] == [False] * 4 + [True, False]
     assert not any(map(is_orange, constant("RAMP")[:-1]))

@@ -15,14 +15,11 @@ from explorer_texts import in_english
 
 import rocking
 from rocking.errors import BlockError, OptionError, RecordError, RockingError
-from rocking.explorer import apart, meshes
-from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
 from rocking.explorer.server import App
 from rocking.explorer.uploads import MAX_FILE_SIZE, MAX_FILES, UploadStore
-from rocking.solid.mesh import SHIPPED_MESHES
 
 STATUE = {"mesh": "statue", "azimuth": "30", "motion": "ridgecrest-clc-090", "pga": "0.6g"}
 DENSITY = "plinth=2700,figure=2650,head=2650"
@@ -40,17 +37,6 @@ def content(mesh, kind="stl"):
     return found if isinstance(found, bytes) else found.encode()
 
 
-@pytest.fixture
-def here(monkeypatch):
-    """Read files in this process: what reads them apart is tested by itself."""
-
-    def made(name, data, options):
-        found = apart.answer_request(json.dumps({"name": name, "options": dict(options)}).encode() + b"\n" + data)
-        return apart.decode_answer(json.dumps(found))
-
-    monkeypatch.setattr(meshes, "read_mesh_in_process", made)
-
-
 def test_a_case_of_a_mesh_is_the_packages_block_of_that_azimuth():
     for texts, given in (
         ({}, {}),
@@ -65,12 +51,12 @@ def test_a_case_of_a_mesh_is_the_packages_block_of_that_azimuth():
 
 
 @pytest.mark.thorough
-def test_code_of_a_mesh_has_the_same_bits(run, tmp_path, monkeypatch, here):
+def test_code_of_a_mesh_has_the_same_bits(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     data = content(box((300.0, 200.0, 1000.0)))
     (tmp_path / "-my block.STL").write_bytes(data)
     store = UploadStore()
-    key = store.add_mesh("C:\\scans\\-my block.STL", data)
+    key = store.add_file("C:\\scans\\-my block.STL", data)
     judged = 0
     for texts in (
         STATUE,
@@ -99,7 +85,7 @@ def test_the_picture_of_a_body_is_of_its_plane():
         texts = {**STATUE, "azimuth": repr(azimuth)}
         payload = explorer.case(texts)
         plus, minus = solid.block(azimuth).sides
-        block, profile = payload.header["block"], payload.arrays["profile"].reshape(-1, 6)
+        block, profile = payload.header["block"], payload.arrays["outline"].reshape(-1, 6)
         assert block["body"]["azimuth"] == azimuth
         edges = np.array(block["body"]["edges"])
         assert np.allclose(edges[:, 0], [side.radius * math.sin(side.alpha) for side in (plus, minus)], rtol=1e-14)
@@ -108,65 +94,65 @@ def test_the_picture_of_a_body_is_of_its_plane():
         assert profile[:, 1].max() == pytest.approx(solid.height, rel=1e-9) == block["outline"]["top"]
         assert block["outline"]["widest"] >= edges[:, 0].max() - 1e-6
     plain = explorer.case({"width": "0.3", "height": "1", "motion": "none", "initial_rotation": "1deg"})
-    assert "profile" not in plain.arrays
+    assert "outline" not in plain.arrays
     assert plain.header["block"]["body"] is None
 
 
 def test_what_is_said_of_a_body_are_its_own_numbers():
     explorer = Explorer()
-    found = explorer.body({**STATUE, "density": DENSITY})
+    found = explorer.details({**STATUE, "density": DENSITY})
+    header, arrays = found.header["body"], found.arrays
     solid = rocking.Solid.from_mesh("statue", density=DENSITIES)
-    rose = solid.rose(found.arrays["azimuth"])
-    assert np.array_equal(found.arrays["acceleration"], rose.data.acceleration.values)
-    assert len(found.arrays["azimuth"]) == 180
-    assert (found.header["weakest_azimuth"], found.header["weakest"]) == (90.0, rose.data.weakest_acceleration)
-    assert (
-        in_english(found.header["about"])
-        == "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³, 455.4 kg."
-    )
-    without_mass = in_english(explorer.body(STATUE).header["about"])
+    rose = solid.rose(arrays["azimuth"])
+    assert np.array_equal(arrays["acceleration"], rose.data.acceleration.values)
+    assert len(arrays["azimuth"]) == 180
+    assert (header["weakest_azimuth"], header["weakest"]) == (90.0, rose.data.weakest_acceleration)
+    about = "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³, 455.4 kg."
+    assert in_english(header["about"]) == about
+    without_mass = in_english(explorer.details(STATUE).header["body"]["about"])
     assert without_mass == "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³."
-    assert "Towards 30° the products of inertia are" in in_english(found.header["left_out"])
-    assert in_english(found.header["repaired"]) == "Nothing had to be repaired in the mesh."
-    assert np.allclose(found.arrays["support"].reshape(-1, 2), solid.support - solid.centre[:2])
-    assert found.arrays["piece"][-1] == len(found.arrays["plan"]) / 2 > 100
-    with pytest.raises(OptionError, match="this block is of no mesh"):
-        explorer.body({"width": "0.3", "height": "1"})
+    assert "Towards 30° the products of inertia are" in in_english(header["left_out"])
+    assert in_english(header["repaired"]) == "Nothing had to be repaired in the mesh."
+    assert np.allclose(arrays["support"].reshape(-1, 2), solid.support - solid.centre[:2])
+    assert arrays["piece"][-1] == len(arrays["plan"]) / 2 > 100
+    assert explorer.details({"width": "0.3", "height": "1"}).header["body"] is None
 
 
-def test_what_was_mended_is_said_and_what_looks_wrong_is_noted(here):
+def test_what_was_mended_is_said_and_what_looks_wrong_is_noted():
     explorer = Explorer()
     scan = box((300.0, 200.0, 1000.0))
     scan.update_faces(scan.triangles_center[:, 2] > 0.0)
     scan.invert()
-    taken = explorer.add_mesh("scan.obj", content(scan, "obj"))
+    taken = explorer.add_file("scan.obj", content(scan, "obj"))
     texts = {**STATUE, "mesh": f"file:{taken['key']}", "azimuth": str(taken["azimuth"])}
-    assert in_english(explorer.body(texts).header["repaired"]).startswith("Repaired in the mesh: 1 hole filled")
+    assert in_english(explorer.details(texts).header["body"]["repaired"]).startswith(
+        "Repaired in the mesh: 1 hole filled"
+    )
     assert "the body is 1000 m high" in explorer.case(texts).header["block"]["notes"][-1]
     assert explorer.case({**texts, "unit": "mm"}).header["block"]["notes"] == []
 
 
-def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
+def test_meshes_are_known_by_their_content_and_so_many_at_most():
     store = UploadStore()
     data = content(box())
-    key = store.add_mesh("box.stl", data)
+    key = store.add_file("box.stl", data)
     first = read_case({**STATUE, "mesh": f"file:{key}"}, store).block
     store.remove(key)
     others = [store.add_file(f"{k}.txt", str(k).encode()) for k in range(MAX_FILES)]
     with pytest.raises(RecordError, match=f"{MAX_FILES} files and 256 MiB are kept at most"):
-        store.add_mesh("box.stl", data)
-    with pytest.raises(RecordError, match="this mesh is not here any more: drop its file on the page again"):
+        store.add_file("box.stl", data)
+    with pytest.raises(RecordError, match="the file of mesh is not here any more: open it again"):
         read_case({**STATUE, "mesh": f"file:{key}"}, store)
     assert len({*others, key}) == MAX_FILES + 1
     store.remove(others[0])
-    assert store.add_mesh("again.stl", data) == key
+    assert store.add_file("box.stl", data) == key
     assert read_case({**STATUE, "mesh": f"file:{key}"}, store).block.sides == first.sides
 
 
-def test_a_mesh_that_is_refused_is_not_kept(here):
+def test_a_mesh_that_is_refused_is_not_kept():
     explorer = Explorer()
     with pytest.raises(BlockError):
-        explorer.add_mesh("flat.stl", content(trimesh.creation.box((1.0, 1.0, 1e-9))))
+        explorer.add_file("flat.stl", content(trimesh.creation.box((1.0, 1.0, 1e-9))))
     assert explorer.uploads.usage()["files"] == 0
 
 
@@ -220,14 +206,14 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_a_hostile_mesh_is_answered_in_one_sentence(name, here, tmp_path, monkeypatch):
+def test_a_hostile_mesh_is_answered_in_one_sentence(name, tmp_path, monkeypatch):
     (tmp_path / "secret.bin").write_bytes(bytes(9))
     (tmp_path / "folder").mkdir()
     monkeypatch.chdir(tmp_path / "folder")
     data, words = HOSTILE[name]
     explorer = Explorer()
     with pytest.raises(BlockError, match=words) as caught:
-        taken = explorer.add_mesh(name, data)
+        taken = explorer.add_file(name, data)
         explorer.case({**STATUE, "mesh": f"file:{taken['key']}"})  # what a choice on the page may correct is taken
     said = str(caught.value)
     assert said.startswith(f"{name}: ") or name == "point.obj"
@@ -238,21 +224,21 @@ def test_a_hostile_mesh_is_answered_in_one_sentence(name, here, tmp_path, monkey
 def test_files_that_are_no_meshes_or_too_large_are_refused():
     store = UploadStore()
     for name in ("a.zip", "a.3mf", "a.tar.gz", "a.obj.zip", "a", "obj", "a.dae", "a.json"):
-        with pytest.raises(RecordError, match="is no mesh by its name: files of obj, ply, stl, glb, gltf"):
-            store.add_mesh(name, b"PK")
+        with pytest.raises(RockingError):
+            store.describe_file(store.add_file(name, b"PK"))
     with pytest.raises(RecordError, match="may be 16 MiB large"):
-        store.add_mesh("a.stl", bytes(MAX_FILE_SIZE + 1))
+        store.add_file("a.stl", bytes(MAX_FILE_SIZE + 1))
     for name in ("statu", "../statue", "/etc/passwd", "statue.obj"):
         with pytest.raises(BlockError, match=r"must be (one of )?.?statue|did you mean"):
             read_case({**STATUE, "mesh": name}, store)
 
 
-def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned(here):
+def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned():
     explorer = Explorer()
     lying = box((0.2, 1.0, 3.0))
     lying.vertices[lying.vertices[:, 2] < 0.1] *= [0.1, 0.1, 1.0]
     lying.vertices[:, 1] += np.where(lying.vertices[:, 2] > 0.1, 0.6, 0.0)
-    taken = explorer.add_mesh("lying.stl", content(lying))
+    taken = explorer.add_file("lying.stl", content(lying))
     assert taken["azimuth"] == 0.0
     texts = {**STATUE, "mesh": f"file:{taken['key']}"}
     with pytest.raises(BlockError, match="does not stand"):
@@ -260,45 +246,21 @@ def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned(here):
     assert explorer.case({**texts, "up": "-z", "azimuth": "0"}).header["block"]["body"]["name"] == "lying.stl"
 
 
-@pytest.mark.thorough
-def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
-    data = SHIPPED_MESHES["statue"].read_bytes()
-    made, sections = apart.read_mesh_in_process("statue.obj", data, {"unit": "ft"})
-    assert rocking.Solid(**made).to_dict() == rocking.Solid.from_mesh("statue", unit="ft").to_dict()
-    assert (
-        np.abs(
-            sections.compute_outline(30.0) - apart.read_mesh("statue", {"unit": "ft"})[1].compute_outline(30.0)
-        ).max()
-        < 1e-5
-    )
-    monkeypatch.setattr(apart, "_MAX_WAIT", 0.05)
-    with pytest.raises(BlockError, match=r"statue\.obj: takes more than 20 s or 2 GiB to read: make the mesh coarser"):
-        apart.read_mesh_in_process("statue.obj", data, {})
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="limits of a process are those of Linux")
-def test_a_process_that_takes_too_much_is_ended(tmp_path, monkeypatch):
-    (tmp_path / "sitecustomize.py").write_text("import resource\nresource.setrlimit(resource.RLIMIT_CPU, (0, 1))\n")
-    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
-    with pytest.raises(BlockError, match="takes more than"):
-        apart.read_mesh_in_process("statue.obj", SHIPPED_MESHES["statue"].read_bytes(), {})
-
-
-def test_what_reads_meshes_may_be_missing(here, monkeypatch):
+def test_what_reads_meshes_may_be_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(OptionError, match=r"trimesh, which is not installed: run pip install '\.\[mesh\]'"):
-        Explorer().add_mesh("box.stl", content(box()))
+        Explorer().add_file("box.stl", content(box()))
 
 
 @pytest.fixture(scope="module")
 def page():
     with clients() as portal:
-        application = RequestAuthentication(App(Explorer(), {}).asgi, 8123)
-        yield let_in(Client(portal, application, "http://127.0.0.1:8123"), application.new_token())
+        app = App(Explorer(), {})
+        yield let_in(Client(portal, app.asgi, "http://127.0.0.1:8123"), app.new_token())
 
 
-def test_the_server_takes_a_mesh_and_shows_it(page, here):
-    taken = page.post("/api/meshes", params={"name": "../box.stl"}, content=content(box((0.2, 0.4, 1.0)))).json()
+def test_the_server_takes_a_mesh_and_shows_it(page):
+    taken = page.post("/api/files", params={"name": "../box.stl"}, content=content(box((0.2, 0.4, 1.0)))).json()
     assert (taken["name"], taken["azimuth"] % 180.0) == ("box.stl", 90.0)
     texts = {**STATUE, "mesh": f"file:{taken['key']}", "azimuth": "90"}
     answer = page.get("/api/case", params=texts).content
@@ -307,21 +269,20 @@ def test_the_server_takes_a_mesh_and_shows_it(page, here):
     assert [side["alpha"] for side in header["block"]["sides"]] == pytest.approx([expected.alpha] * 2, rel=1e-6)
     assert [side["p"] for side in header["block"]["sides"]] == pytest.approx([expected.p] * 2, rel=1e-6)
     assert header["block"]["body"]["name"] == "box.stl"
-    assert page.get("/api/body", params=texts).headers["content-type"] == "application/octet-stream"
+    assert page.get("/api/details", params=texts).headers["content-type"] == "application/octet-stream"
     for path, params, words in (
-        ("/api/case", {**texts, "mesh": "file:0123"}, "this mesh is not here any more"),
+        ("/api/case", {**texts, "mesh": "file:0123"}, "the file of “Mesh” is not here any more"),
         ("/api/case", {**texts, "unit": "yard"}, "“Unit of the coordinates” must be one of"),
         ("/api/case", {**texts, "up": "north"}, "“Axis that points up” must be one of"),
         ("/api/case", {**texts, "density": "stone"}, "“Density (kg/m³)”"),
         ("/api/case", {**texts, "azimuth": "nan"}, "azimuth"),
-        ("/api/body", {"width": "1", "height": "2"}, "this block is of no “Mesh”"),
     ):
         refused = page.get(path, params=params)
         assert refused.status_code == 422
         assert words.lower() in refused.json()["problem"].lower()
-    assert page.post("/api/meshes", params={"name": "a.zip"}, content=b"PK").status_code == 422
+    assert page.post("/api/files", params={"name": "a.zip"}, content=b"PK").status_code == 422
     large = {"content-length": str(MAX_FILE_SIZE + 1)}
-    assert page.post("/api/meshes", params={"name": "a.stl"}, content=b"", headers=large).status_code == 413
+    assert page.post("/api/files", params={"name": "a.stl"}, content=b"", headers=large).status_code == 413
 
 
 # The texts of seed 3 have the statue turned, which takes most of the time.

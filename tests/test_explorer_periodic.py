@@ -3,6 +3,7 @@
 import math
 import re
 import runpy
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -17,7 +18,6 @@ from rocking.explorer.periodic import (
     STORED_STATES,
     describe_orbit,
     find_sine,
-    pack_sweep_part,
     read_sweep,
     simulate_sweep,
     suggest_sine,
@@ -164,17 +164,24 @@ def test_the_nearest_sine_has_the_peaks_of_the_motion():
 
 # Sweeps
 
+Steady = namedtuple("Steady", "states period")
+
 
 def swept(sweep):
     """What the finest level of a sweep finds, by direction and number of the value."""
     found, shares, strides = {}, [], []
     for part in simulate_sweep(sweep):
-        shares.append(part.share)
-        strides.append(part.stride)
-        if part.stride == 1:
-            found |= {
-                (part.direction, index): each for index, each in zip(part.indices, part.steady_states, strict=True)
-            }
+        header, states = part.header, part.arrays["states"].reshape(-1, 2)
+        shares.append(header["share"])
+        strides.append(header["stride"])
+        ends = np.cumsum(header["counts"])[:-1]
+        if header["stride"] == 1:
+            each = zip(np.split(states, ends), header["words"], strict=True)
+            steady = [
+                Steady(found_states, int(words["phrase"] == "sweep.still") or words["values"].get("period", 0))
+                for found_states, words in each
+            ]
+            found |= {(header["direction"], index): one for index, one in zip(header["indices"], steady, strict=True)}
     assert np.all(np.diff(shares) > 0.0) and shares[-1] == 1.0
     assert strides[0] == 8 and np.all(np.diff(strides) <= 0)
     return found
@@ -249,8 +256,7 @@ def test_the_case_at_a_point_of_a_sweep_settles_on_that_point(name, texts):
 def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
     sweep = read_sweep(case_of(sine(6.0)), {"sweep_points": "16", "sweep_to": "8.7"})
     words = set()
-    for part in simulate_sweep(sweep):
-        payload = pack_sweep_part(sweep, part)
+    for payload in simulate_sweep(sweep):
         states = payload.arrays["states"].reshape(-1, 2)
         assert sum(payload.header["counts"]) == len(states) == len(payload.arrays["drawn"])
         assert payload.arrays["drawn"] == pytest.approx(states[:, 0] / sweep.case.block.alpha)
@@ -263,7 +269,7 @@ def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
     ("motion", "asked", "words"),
     [
         ("ridgecrest-clc-090", {}, "needs a sine"),
-        (sine(3.0), {"sweep": "mass"}, "over a or omega"),
+        (sine(3.0), {"sweep": "mass"}, "must be a or omega"),
         (sine(3.0), {"sweep_points": "7"}, "from 8 to 400"),
         (sine(3.0), {"sweep_from": "3", "sweep_to": "2"}, "must be positive and below"),
         (sine(3.0), {"sweep_from": "0"}, "must be positive and below"),

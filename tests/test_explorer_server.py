@@ -20,16 +20,16 @@ from urllib.parse import urlencode
 import httpx
 import numpy as np
 import pytest
-from explorer_client import Client, clients, let_in, opened_by
+from explorer_client import Client, bearing, clients, let_in, opened_by
 
 import rocking
 from rocking.core.threads import LOOKAHEAD, count_cores
 from rocking.errors import OptionError, RockingError, StudyError
 from rocking.explorer import launch, server, uploads
-from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.core import Explorer
+from rocking.explorer.inputs import read_case
 from rocking.explorer.launch import start_listening
-from rocking.explorer.server import App
+from rocking.explorer.server import EXCHANGE, App
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import MAX_FILE_SIZE, UploadStore
 
@@ -50,8 +50,7 @@ def opened():
     with clients() as portal:
 
         def open_page(app):
-            application = RequestAuthentication(app.asgi, PORT)
-            return let_in(Client(portal, application, OURS), application.new_token())
+            return let_in(Client(portal, app.asgi, OURS), app.new_token())
 
         yield open_page
 
@@ -73,13 +72,15 @@ def unpacked(data):
     return header, arrays
 
 
-def frames(data):
-    at = 0
+def parts_of(data):
+    """Header and arrays of each part of a stream."""
+    at, found = 0, []
     while at < len(data):
-        (length,) = struct.unpack_from("<I", data, at)
-        assert length % 4 == 0
-        yield data[at + 4 : at + 4 + length]
-        at += 4 + length
+        (length,) = struct.unpack_from("<Q", data, at)
+        found.append(unpacked(data[at + 8 : at + 8 + length]))
+        at += 8 + length
+    assert at == len(data)
+    return found
 
 
 # What is answered
@@ -90,19 +91,18 @@ def test_a_case_comes_as_header_and_aligned_arrays(page, explorer):
     response = explorer.simulate(STATUE).response
     assert header["peak_rotation"] == response.peak_rotation
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])
-    code = page.get("/api/code", params=STATUE).json()
-    assert code["command"].startswith("rocking simulate ridgecrest-clc-090")
-    assert "rocking.records.load('ridgecrest-clc-090')" in code["python"]
+    header, arrays = unpacked(page.get("/api/details", params={**STATUE, "from": "232", "to": "233"}).content)
+    assert header["command"].startswith("rocking simulate ridgecrest-clc-090")
+    assert "rocking.records.load('ridgecrest-clc-090')" in header["python"]
+    assert header["summary"][0][0] == "block" and len(arrays["displacement"]) > 100
 
 
 def test_a_window_comes_with_times_from_its_start(page, explorer):
-    texts = {**STATUE, "from": "232", "to": "233", "ground": "1", "points": "300"}
-    header, arrays = unpacked(page.get("/api/window", params=texts).content)
+    header, arrays = unpacked(page.get("/api/case", params={**STATUE, "from": "232", "to": "233"}).content)
     assert header["window"] == {"from": 232.0, "to": 233.0, "impacts": 3, "unresolved": None}
     assert arrays["time"][0] == 0.0
     response = explorer.simulate(STATUE).response
     assert arrays["rotation"] == pytest.approx(response.rotation(232.0 + arrays["time"]), abs=1e-12)
-    assert len(arrays["displacement"]) > 100
 
 
 def test_what_is_not_finite_is_null_in_a_header(page):
@@ -113,17 +113,18 @@ def test_what_is_not_finite_is_null_in_a_header(page):
 
 def test_a_map_comes_coarse_to_fine_and_whole(page):
     axes = {"x": "omega", "y": "a", "points": "24"}
-    first, *parts = frames(page.get("/api/map", params={**SINE, **axes}).content)
-    about = json.loads(first)
+    (about, _), *parts = parts_of(page.get("/api/map", params={**SINE, **axes}).content)
     assert about["shape"] == [24, 24]
     assert about["outcomes"][1] == "complete"
     assert len(about["curves"]["exact"]) == 24
+    case = read_case(SINE, UploadStore())
+    threshold = min(case.block.uplift_thresholds("nonlinear"))
+    assert about["case"] == pytest.approx([2.0 * math.pi * 0.3, case.motion.pga / threshold])
     seen, strides = np.zeros(576, int), []
-    for part in parts:
-        stride, count = struct.unpack_from("<II", part)
-        strides.append(stride)
-        seen[np.frombuffer(part, "<u4", count, 8)] += 1
-        assert len(part) == 8 + 4 * count + 16 * count
+    for header, arrays in parts:
+        strides.append(header["stride"])
+        seen[arrays["points"].astype(int)] += 1
+        assert len({len(values) for values in arrays.values()}) == 1
     assert (seen == 1).all()
     # Tasks begin coarse to fine, a few at a time: no part comes before more coarser ones than may be under way.
     order = np.array(strides)
@@ -139,20 +140,7 @@ def test_the_case_at_a_point_of_a_map(page):
     assert header["motion"]["pga_g"] == pytest.approx(1.03 * math.tan(0.2), rel=1e-9)
 
 
-def test_the_response_at_a_point_of_a_map_comes_small_with_its_fate(page):
-    params = {**SINE, "x": "omega", "y": "a", "at_x": "2", "at_y": "1.03"}
-    header, arrays = unpacked(page.get("/api/map/response", params=params).content)
-    texts = page.get("/api/map/point", params=params).json()
-    whole, _ = unpacked(page.get("/api/case", params=texts).content)
-    assert header["verdict"] == whole["verdict"]
-    assert 100 < len(arrays["time"]) == len(arrays["rotation"]) <= 300
-    assert page.get("/api/map/response", params={**params, "at_x": ""}).status_code == 422
-
-
-def test_phase_plane_and_instant_are_answered_or_refused_by_name(page):
-    header, arrays = unpacked(page.get("/api/phase", params={**SINE, "from": "0", "to": "3"}).content)
-    assert header["needed"] == [1.0, 1.0] and len(arrays["time"]) == len(arrays["kinetic"]) > 3000
-    assert page.get("/api/phase", params=SINE).status_code == 422
+def test_an_instant_is_read_or_refused_by_name(page):
     assert page.get("/api/at", params={**SINE, "at": "1.5 s"}).json()["time"] == 1.5
     refused = page.get("/api/at", params={**SINE, "at": "-3"})
     assert refused.status_code == 422 and refused.json()["argument"] == "at"
@@ -171,13 +159,11 @@ def test_what_a_case_settles_on_comes_as_header_and_arrays(page):
 
 def test_a_sweep_comes_coarse_to_fine_and_whole(page):
     texts = {**SINE, "motion": "sine:amplitude=3,frequency=0.5,cycles=2", "sweep_points": "24"}
-    first, *parts = frames(page.get("/api/sweep", params=texts).content)
-    about = json.loads(first)
-    assert about["name"] == "a" and len(about["values"]) == 24 and about["problem"] is None
+    (about, _), *parts = parts_of(page.get("/api/sweep", params=texts).content)
+    assert about["name"] == "a" and len(about["values"]) == 24
     assert "dynamics.bifurcation_diagram" in about["python"]
     seen, share, stride = {"up": [], "down": []}, 0.0, 8
-    for part in parts:
-        header, arrays = unpacked(part)
+    for header, arrays in parts:
         assert header["share"] > share and header["stride"] <= stride
         share, stride = header["share"], header["stride"]
         if stride == 1:
@@ -194,12 +180,6 @@ def test_the_case_at_a_point_of_a_sweep(page):
     assert header["at"]["a"] == pytest.approx(1.5, rel=1e-12)
 
 
-def test_a_comparison_takes_what_is_other_under_a_prefix(page):
-    header, arrays = unpacked(page.get("/api/compare", params={**STATUE, "other.chattering": "velocity=0.05"}).content)
-    assert header["cases"][1]["treatment"] == "velocity=0.05"
-    assert {"first_rotation", "second_rotation"} <= arrays.keys()
-
-
 FORMS = {
     "csv": b"time_s,rotation_rad", "events.csv": b"time_s,kind,side", "impacts.csv": b"time_s,side",
     "nc": b"\x89HDF", "svg": b"<?xml", "png": b"\x89PNG",
@@ -212,22 +192,41 @@ def test_every_export_is_a_download_of_its_kind(page, form, start):
     texts = {**SINE, "model": "linear", "motion": "one-sine:amplitude=2.5,frequency=1"}
     answer = page.get("/api/export", params={**texts, "form": form})
     assert answer.status_code == 200 and answer.content.startswith(start)
-    assert answer.headers["content-disposition"] == f"attachment; filename=rocking-response.{form}"
+    assert answer.headers["cache-control"] == "no-store"
 
 
-def test_the_page_has_a_policy_with_a_nonce_of_its_own(page):
-    first, second = (page.get("/") for _ in range(2))
-    nonces = [
-        re.search(r"'nonce-([\w-]+)'", answer.headers["content-security-policy"])[1] for answer in (first, second)
-    ]
-    assert nonces[0] != nonces[1]
-    assert f'data-nonce="{nonces[0]}"' in first.text
-    policy = dict(part.strip().split(" ", 1) for part in first.headers["content-security-policy"].split(";"))
-    assert policy["default-src"] == "'none'"
-    assert policy["script-src"] == "'self'"
-    assert policy["connect-src"] == "'self'"
-    assert policy["frame-ancestors"] == "'none'"
-    assert "unsafe" not in first.headers["content-security-policy"]
+def test_the_page_has_a_policy(page):
+    answer = page.get("/")
+    policy = dict(part.strip().split(" ", 1) for part in answer.headers["content-security-policy"].split(";"))
+    assert policy["default-src"] == policy["frame-ancestors"] == "'none'"
+    assert policy["script-src"] == policy["style-src"] == policy["connect-src"] == "'self'"
+    assert "unsafe" not in answer.headers["content-security-policy"]
+
+
+def test_the_secret_is_given_once_and_required(explorer):
+    app = App(explorer, {})
+    with clients() as portal:
+        stranger = Client(portal, app.asgi, OURS)
+        paths = [route.path for route in app.asgi.routes if route.path.startswith("/api/") and route.path != EXCHANGE]
+        assert len(paths) >= 15
+        for path in paths:
+            for headers in ({}, bearing("x"), bearing(""), {"authorization": app._secret}):
+                answer = stranger.request("POST" if path == "/api/files" else "GET", path, headers=headers)
+                assert answer.status_code == 403, path
+                assert app._secret not in answer.text
+        assert stranger.post(EXCHANGE, headers=bearing("x")).status_code == 403
+        token = app.new_token()
+        answer = stranger.post(EXCHANGE, headers=bearing(token))
+        assert (answer.status_code, answer.text) == (200, app._secret)
+        assert stranger.post(EXCHANGE, headers=bearing(token)).status_code == 403
+        assert stranger.get("/api/start", headers=bearing(app._secret)).status_code == 200
+        assert stranger.get("/api/start", params={"authorization": app._secret}).status_code == 403
+        assert not stranger.get("/").headers.get("set-cookie")
+        assert "access-control-allow-origin" not in stranger.get("/api/start", headers={"origin": OURS}).headers
+        first = app.new_token()
+        for _ in range(200):
+            app.new_token()
+        assert stranger.post(EXCHANGE, headers=bearing(first)).status_code == 403
 
 
 def test_the_page_loads_nothing_from_elsewhere():
@@ -242,18 +241,14 @@ def test_the_page_loads_nothing_from_elsewhere():
 
 
 def test_every_module_that_is_imported_is_served(page):
-    files = server.page_files()
-    texts = {name: content.decode() for name, content in files.items()}
-    imports = [(name, each) for name, text in texts.items() for each in re.findall(r'from "\./([\w.]+)"', text)]
-    assert len(imports) >= 25
-    for name, imported in imports:
-        assert imported in files, name
-    assert {"block.js", "map.js", "compare.js"} <= texts.keys()  # imported by the name of their view
-    asked = re.findall(r'(?:src|href)="(/[^"]+)"', texts["index.html"])
-    assert len(asked) >= 12
+    texts = {name: content.decode() for name, content in server.page_files().items()}
+    own = {name: text for name, text in texts.items() if "/" not in name}
+    imports = {each for text in own.values() for each in re.findall(r'from "\./([\w./-]+)"', text)}
+    asked = [*re.findall(r'(?:src|href)="(/[^"]+)"', texts["index.html"]), *(f"/page/{each}" for each in imports)]
+    assert len(imports) >= 12 and len(asked) >= 16
     for name in asked:
         answer = page.get(name)
-        assert answer.status_code == 200
+        assert answer.status_code == 200, name
         assert answer.headers["x-content-type-options"] == "nosniff"
 
 
@@ -265,6 +260,13 @@ def test_every_module_that_is_imported_is_served(page):
         ({"pgv": "1"}, "pga", "“Peak acceleration” and “Peak velocity” scale the same motion"),
         ({"pga": "-1g"}, "pga", "“Peak acceleration” must be a positive number, in m/s^2, not -9.80665"),
         ({"vertical": "nothing-up"}, "vertical", "“Vertical component”: there is no shipped record"),
+        ({"motion": "nothing"}, "motion", "“Record”"),
+        ({"motion": "none"}, "pga", "“Peak acceleration”"),
+        ({"motion": "file:00ff"}, "motion", "“Record”"),
+        ({"motion": "given:00ff"}, "motion", "“Record”"),
+        ({"motion": "sine:amplitude=1,frequency=1,cycles=2000"}, "cycles", "“Cycles” of a pulse"),
+        ({"friction": "-1"}, "friction", "“Friction coefficient”"),
+        ({"height": ""}, "width", "“Height”"),
     ],
 )
 def test_an_error_names_the_field_by_its_label_and_the_argument_that_is_wrong(page, texts, argument, words):
@@ -275,8 +277,8 @@ def test_an_error_names_the_field_by_its_label_and_the_argument_that_is_wrong(pa
 
 
 def test_what_went_wrong_inside_says_nothing_of_the_inside(page, explorer, monkeypatch):
-    monkeypatch.setattr(explorer, "summary", lambda texts: 1 / 0)
-    answer = page.get("/api/summary", params=STATUE)
+    monkeypatch.setattr(explorer, "details", lambda texts, window: 1 / 0)
+    answer = page.get("/api/details", params=STATUE)
     assert answer.status_code == 500
     problem = "this could not be computed (ZeroDivisionError); please report it"
     assert answer.json() == {"problem": problem, "argument": None}
@@ -288,7 +290,7 @@ def test_what_went_wrong_inside_says_nothing_of_the_inside(page, explorer, monke
 def test_a_record_is_uploaded_told_about_and_simulated(page):
     samples = rocking.records.load("el-centro-meloland-270").samples
     body = "\n".join(f"{value / 9.80665:.12g}" for value in samples)
-    answer = page.post("/api/records", params={"name": "el centro.txt"}, content=body)
+    answer = page.post("/api/files", params={"name": "el centro.txt"}, content=body)
     found = answer.json()
     assert set(found["missing"]) == {"dt", "units"}
     assert found["name"] == "el centro.txt"
@@ -297,36 +299,32 @@ def test_a_record_is_uploaded_told_about_and_simulated(page):
     block = rocking.Block(width=0.24, height=1.1)
     expected = rocking.simulate(block, rocking.records.load("el-centro-meloland-270"))
     assert header["peak_rotation"] == pytest.approx(expected.peak_rotation, rel=1e-6)
-    assert page.get(f"/api/records/{found['key']}", params={"dt": "0.01", "units": "g"}).json()["missing"] == []
 
 
 @pytest.mark.thorough
 def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
-    key = page.post("/api/records", params={"name": "b_ns.txt"}, content=b"0\n1\n-1\n0\n" * 99).json()["key"]
+    key = page.post("/api/files", params={"name": "b_ns.txt"}, content=b"0\n1\n-1\n0\n" * 99).json()["key"]
     rows = [row for group in page.get("/api/list").json()["groups"] for row in group["rows"]]
     assert next(row for row in rows if row["key"] == key)["measures"] is None
     answered = page.get("/api/list", params={"answers": f"key={key}&dt=0.01&units=m/s2"}).json()
     (row,) = [row for group in answered["groups"] for row in group["rows"] if row["key"] == key]
     assert row["measures"]["pga"] == 1.0 and answered["usage"]["files"] >= 1
-    assert page.post("/api/records", params={"name": "x.at2"}, content=AT2[:300] + b"x").status_code == 422
+    assert page.post("/api/files", params={"name": "x.at2"}, content=AT2[:300] + b"x").status_code == 422
     assert page.get("/api/list").json()["usage"] == answered["usage"]
     records = "motion=el-centro-meloland-270;motion=el-centro-meloland-360"
     params = {**STATUE, "records": records, "levels": "4", "level_from": "0.2g", "level_to": "0.8g"}
-    first, *found = frames(page.get("/api/assessment", params=params).content)
-    about = json.loads(first)
-    assert about["problem"] is None and len(about["records"]) == 2 and "rocking.fragility" in about["python"]
-    shares = [unpacked(part)[0]["share"] for part in found]
+    (about, _), *found = parts_of(page.get("/api/assessment", params=params).content)
+    assert len(about["records"]) == 2 and "rocking.fragility" in about["python"]
+    shares = [header["share"] for header, _ in found]
     assert len(shares) == 3 and shares[-1] == 1.0 and shares == sorted(shares)
     assert page.get("/api/assessment", params=STATUE).status_code == 422
-    forgotten = page.request("DELETE", f"/api/records/{key}")
-    assert forgotten.status_code == 200 and forgotten.headers["cache-control"] == "no-store"
-    assert page.get(f"/api/records/{key}").status_code == 422
-    assert page.request("DELETE", f"/api/records/{key}").status_code == 422
+    assert page.get("/api/remove", params={"key": key}).status_code == 200
+    assert page.get("/api/remove", params={"key": key}).status_code == 422
 
 
 def test_a_body_that_is_too_large_is_refused_before_and_while_it_comes(page):
     answer = page.post(
-        "/api/records", params={"name": "x"}, content=b"", headers={"content-length": str(MAX_FILE_SIZE + 1)}
+        "/api/files", params={"name": "x"}, content=b"", headers={"content-length": str(MAX_FILE_SIZE + 1)}
     )
     assert answer.status_code == 413
 
@@ -335,7 +333,7 @@ def test_a_body_that_is_too_large_is_refused_before_and_while_it_comes(page):
             yield bytes(2**20)
 
     tracemalloc.start()
-    assert page.post("/api/records", params={"name": "x"}, content=endless()).status_code == 413
+    assert page.post("/api/files", params={"name": "x"}, content=endless()).status_code == 413
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 4 * MAX_FILE_SIZE
@@ -400,8 +398,8 @@ def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
     "path",
     [
         "/page/../server.py", "/page/..%2fserver.py", "/page/%2e%2e/server.py", "/page//etc/passwd", "/page/index.html",
-        "/page/.", "/page/", "/page/main.js%00", "/page/main.js/", "/page//evil.example/", "/library/../bokeh.js",
-        "/library/..%5c..%5cx.js", "//etc/passwd", "/api/records/..%2f..%2fetc%2fpasswd", "/file:///etc/passwd",
+        "/page/.", "/page/", "/page/main.js%00", "/page/main.js/", "/page//evil.example/", "/page/texts.json",
+        "/page/standalone/../../server.py", "//etc/passwd", "/api/..%2f..%2fetc%2fpasswd", "/file:///etc/passwd",
     ],
 )  # fmt: skip
 def test_no_path_leads_anywhere_else(page, path):
@@ -474,40 +472,25 @@ def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):
     assert browser.get(f"{base}/api/case", params=STATUE).status_code == 200
 
 
-HEAD = b"HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: http://127.0.0.1:PORT\r\n"
+HEAD = b"HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 KNOWN = HEAD + b"Authorization: SECRET\r\n"
 PACKED = KNOWN + b"Transfer-Encoding: chunked\r\n\r\n"
 ATTACKS = [
     (b"GET /api/start " + HEAD + b"\r\n", 403),
     (b"GET /api/start " + KNOWN + b"\r\n", 200),
-    (b"GET /api/start?" + b"a=1&" * 15_000 + b" " + HEAD + b"\r\n", 403),
-    (b"GET /api/start?" + b"a=1&" * 15_000 + b" " + KNOWN + b"\r\n", 200),
-    (b"GET /api/start?" + b"a" * 200_000 + b" " + KNOWN + b"\r\n", 400),
+    (b"GET /api/start " + KNOWN + b"Authorization: Bearer x\r\n\r\n", 200),
     (b"GET /%61pi/start " + HEAD + b"\r\n", 403),
-    (b"GET //api/start " + HEAD + b"\r\n", 403),
-    (b"GET http://127.0.0.1:PORT/api/start " + HEAD + b"\r\n", 403),
+    (b"GET //api/start " + HEAD + b"\r\n", 404),
     (b"GET /page/../api/start " + HEAD + b"\r\n", 404),
     (b"GET /page/..%2f..%2fserver.py " + HEAD + b"\r\n", 404),
-    (b"GET /page/main.js%00.css " + HEAD + b"\r\n", 404),
     (b"GET /page/%0d%0aset-cookie:a=b " + HEAD + b"\r\n", 404),
-    (b"GET /page/main.js/ " + HEAD + b"\r\n", 404),
-    (b"GET /api/start " + HEAD + b"X: a\r\n Authorization: SECRET\r\n\r\n", 403),
     (b"GET /api/export?form=svg%0d%0aset-cookie:a " + KNOWN + b"\r\n", 422),
-    (b"POST /api/records?name=%0d%0aset-cookie:a " + KNOWN + b"Content-Length: 1\r\n\r\nx", 422),
-    (b"POST /api/records?name=x " + KNOWN + b"Content-Length: 4\r\nContent-Length: 5\r\n\r\nabcd", 400),
-    (b"POST /api/records?name=x " + KNOWN + b"Content-Length: 999999999\r\n\r\nx", 413),
-    (b"POST /api/records?name=x " + KNOWN + b"Content-Length: \xd9\xa3\r\n\r\nabc", 400),
-    (b"POST /api/records?name=x " + KNOWN + b"Transfer-Encoding: gzip\r\n\r\nx", 400),
-    (b"POST /api/records?name=x " + PACKED + b"-1\r\nx", 400),
-    (b"POST /api/records?name=x " + PACKED + b"1\r\nx\r\n0\r\n\r\n", 422),
-    (b"POST /api/records?name=x " + HEAD + b"Expect: 100-continue\r\nContent-Length: 9\r\n\r\n", 403),
+    (b"POST /api/files?name=%0d%0aset-cookie:a " + KNOWN + b"Content-Length: 1\r\n\r\nx", 422),
+    (b"POST /api/files?name=x " + KNOWN + b"Content-Length: 999999999\r\n\r\nx", 413),
+    (b"POST /api/files?name=x " + PACKED + b"1\r\nx\r\n0\r\n\r\n", 422),
+    (b"POST /api/start " + KNOWN + b"\r\n", 405),
     (b"TRACE /api/start " + KNOWN + b"\r\n", 405),
-    (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 421),
-    (b"GET / HTTP/1.0\r\n\r\n", 421),
     (b"GET / HTTP/1.1\r\n\r\n", 400),
-    (b"GET / HTTP/1.1\r\nHost: evil.example\r\nHost: 127.0.0.1\r\n\r\n", 400),
-    (b"CONNECT evil.example:80 HTTP/1.1\r\nHost: evil.example:80\r\n\r\n", 421),
-    (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"x: y\r\n" * 20000 + b"\r\n", 421),
     (b"\x00\x01\x02\x03\r\n\r\n", 400),
 ]
 
@@ -516,7 +499,7 @@ ATTACKS = [
 def test_what_an_attacker_writes_is_answered_as_it_should_be(running, browser, raw, status):
     secret = browser.headers["authorization"].encode()
     with socket.create_connection(("127.0.0.1", running.port), timeout=10) as connection:
-        connection.sendall(raw.replace(b"SECRET", secret).replace(b"PORT", str(running.port).encode()))
+        connection.sendall(raw.replace(b"SECRET", secret))
         answer = connection.recv(4096)
     assert answer.startswith(b"HTTP/1.1 %d " % status), answer[:60]
     assert b"set-cookie" not in answer.partition(b"\r\n\r\n")[0].lower()
@@ -653,18 +636,3 @@ def test_a_response_is_explored_in_a_frame():
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])
     with pytest.raises(OptionError, match="must be a Response"):
         rocking.explore(response.motion)
-
-
-def test_connections_whose_request_never_comes_keep_nobody_out(monkeypatch):
-    monkeypatch.setattr("rocking.explorer.server.REQUEST_TIMEOUT", 0.3)
-    here = start_listening(Explorer(), {"motion": "one-sine:amplitude=0.3g,frequency=1"})
-    here.run_in_background()
-    held = [socket.create_connection(("127.0.0.1", here.port)) for _ in range(3)]
-    for each in held:
-        each.sendall(b"GET / HT")
-    for each in held:
-        each.settimeout(20.0)
-        with contextlib.suppress(ConnectionResetError):
-            assert each.recv(100) == b""
-        each.close()
-    here.server.should_exit = True

@@ -36,7 +36,7 @@ def test_random_states_are_what_their_commands_print(explorer, run, seed, count)
     for _ in range(count):
         texts = explorer_addresses.sound(draw)
         header = explorer.case(texts).header
-        words = shlex.split(explorer.code(texts)["command"])
+        words = shlex.split(explorer.details(texts).header["command"])
         code, out, err = run(*words[1:], "--json", "--quiet")
         assert (words[0], code, err) == ("rocking", 0, ""), texts
         result = json.loads(out)

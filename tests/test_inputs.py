@@ -90,7 +90,7 @@ def test_every_input_of_a_body_is_an_option_and_a_key_and_every_other_has_an_opt
     keys = {*SCHEMA["blocks"]}
     assert {*BLOCK} <= keys and all(name in keys or f"{name}s" in keys for name in SUPPORTS)
     described = {name for name, each in INPUTS.items() if each.help}
-    assert described - {"model", "chattering"} == options & INPUTS.keys()  # these have options of their own
+    assert described - {"model", "chattering", "friction"} == options & INPUTS.keys()  # these have options of their own
 
 
 @pytest.mark.parametrize("shape", BLOCK_DESCRIPTIONS, ids=lambda shape: shape.name)

@@ -3,16 +3,11 @@
 import ast
 import os
 import re
-import socket
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from rocking.core import threads
-from rocking.explorer import apart, launch
-from rocking.studies import folder
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "rocking"
@@ -37,7 +32,7 @@ WORDS = re.compile(rf"\bimport ({'|'.join(MODULES)})\b|\b({'|'.join(MODULES_WITH
 def test_every_place_that_depends_on_the_system_is_on_the_page() -> None:
     assert len(TEXTS) > 100
     places = {name for name, text in TEXTS.items() if WORDS.search(text)}
-    assert {"explorer/apart.py", "studies/folder.py", "core/threads.py"} <= places
+    assert {"studies/folder.py", "core/threads.py"} <= places
     shown = {name for name in places if f"`{name}`" in PAGE or f"`{name.removesuffix('.py')}." in PAGE}
     assert places - shown == set()
 
@@ -80,58 +75,3 @@ def test_cores_are_all_where_no_affinity_is_known(monkeypatch: pytest.MonkeyPatc
     assert threads.count_cores() == 7
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert threads.count_cores() == 1
-
-
-def limits(refused: set[int]) -> tuple[SimpleNamespace, dict[int, tuple[int, int]]]:
-    """A stand-in for the module `resource` of a system that refuses some limits."""
-    kept: dict[int, tuple[int, int]] = {}
-
-    def setrlimit(kind: int, both: tuple[int, int]) -> None:
-        if kind in refused:
-            raise ValueError("current limit exceeds maximum limit")
-        kept[kind] = both
-
-    return SimpleNamespace(RLIMIT_AS=0, RLIMIT_CPU=1, RLIMIT_CORE=2, setrlimit=setrlimit), kept
-
-
-@pytest.mark.parametrize("refused", [set(), {0}, {0, 1}, {0, 1, 2}])
-def test_a_limit_that_the_system_refuses_leaves_the_others(monkeypatch: pytest.MonkeyPatch, refused: set[int]) -> None:
-    stand_in, kept = limits(refused)
-    monkeypatch.setitem(sys.modules, "resource", stand_in)
-    apart._limit_this_process()
-    assert set(kept) == {0, 1, 2} - refused
-
-
-@pytest.mark.parametrize(("system", "reused"), [("linux", True), ("darwin", True), ("win32", False)])
-def test_on_windows_no_other_server_may_share_the_port(
-    monkeypatch: pytest.MonkeyPatch, system: str, reused: bool
-) -> None:
-    monkeypatch.setattr(sys, "platform", system)
-    with launch._bind_socket("127.0.0.1", 0) as listening:
-        assert bool(listening.getsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR)) == reused
-
-
-class _Windows(SimpleNamespace):
-    """The module `os` as Windows has it: what is named is another's, and what it lacks fails."""
-
-    def __getattr__(self, name: str) -> object:
-        if name in ("posix_fadvise", "sched_getaffinity", "getuid"):
-            raise AttributeError(name)
-        return getattr(os, name)
-
-
-def test_a_study_is_kept_where_folders_cannot_be_flushed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def refuse(*given: object) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    # Folders cannot be opened.
-    monkeypatch.setattr(folder, "os", _Windows(name="nt", open=refuse))
-    folder.write_atomically(tmp_path / "units" / "1", b"outcomes")
-    assert (tmp_path / "units" / "1").read_bytes() == b"outcomes"
-
-
-def test_who_holds_a_lock_is_read_without_its_first_byte(tmp_path: Path) -> None:
-    with folder.lock_folder(tmp_path):
-        held = (tmp_path / "lock").read_bytes()
-        assert held[:1] == b" "
-        assert held[1:].decode().startswith(f"process {os.getpid()} on ")

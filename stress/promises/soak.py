@@ -31,8 +31,8 @@ DRIFT: Final = 0.05
 
 #: What the page asks for while it opens.
 _OPENING: Final = (
-    *("/", "/page/main.js", "/library/bokeh.min.js", "/api/start"),
-    *(f"/api/{each}?p=2.5&alpha=0.2&motion=el-centro-meloland-270" for each in ("case", "code", "summary")),
+    *("/", "/page/main.js", "/api/start"),
+    *(f"/api/{each}?p=2.5&alpha=0.2&motion=el-centro-meloland-270" for each in ("case", "details")),
 )
 
 

@@ -17,7 +17,7 @@ from rocking.core.bisection import bisect
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import FitError, OptionError
 from rocking.explorer.catalogue import find_title, number_stations, read_entries
-from rocking.explorer.inputs import Case, require_rest
+from rocking.explorer.inputs import Case, require_rest, require_sticking
 from rocking.explorer.motions import WrittenMotion, read_motion
 from rocking.explorer.parameters import ASSESSMENT, Texts
 from rocking.explorer.payload import Payload, phrase
@@ -25,7 +25,6 @@ from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import read_number
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.response.mechanics import check_available_friction
 from rocking.rules import apply_rules, overturning_velocity
 from rocking.simulation.simulate import simulate
 
@@ -68,7 +67,6 @@ class Assessment:
     uploads: UploadStore
     measure: Measure
     levels: Floats  # of the measure
-    friction: float | None  # coefficient
 
     @property
     def stations(self) -> int | None:
@@ -93,6 +91,7 @@ def read_assessment(case: Case, texts: Texts, uploads: UploadStore) -> Assessmen
         raise OptionError("an assessment needs {}: tick one or more in the list", "records")
     if not all("motion" in entry for entry in entries):
         raise OptionError("an entry of the list of {} names no motion: take it out", "records")
+    require_sticking(case)
     require_rest(side.restitution for side in case.block.sides)
     measure = _read_measure(nonempty)
     count = read_number(nonempty.get("levels", "16"), "levels")
@@ -109,12 +108,8 @@ def read_assessment(case: Case, texts: Texts, uploads: UploadStore) -> Assessmen
     low, high = chosen_ends.get("level_from", default_range[0]), chosen_ends.get("level_to", default_range[1])
     if not 0.0 < low < high < math.inf:
         raise OptionError("{} must be positive, and below the last of the levels", "level_from")
-    friction = None
-    if "friction" in nonempty:
-        friction = check_available_friction(read_number(nonempty["friction"], "friction"), "friction")
-    return Assessment(
-        case, entries, number_stations(entries, uploads), uploads, measure, np.linspace(low, high, int(count)), friction
-    )
+    stations = number_stations(entries, uploads)
+    return Assessment(case, entries, stations, uploads, measure, np.linspace(low, high, int(count)))
 
 
 def _read_measure(texts: Texts) -> Measure:
@@ -150,7 +145,6 @@ def describe_assessment(assessment: Assessment) -> dict[str, Any]:
         "records": [find_title(entry, assessment.uploads) for entry in assessment.entries],
         "thresholds": list(block.uplift_thresholds(case.model)),
         "friction_to_rock": max(block.uplift_thresholds(case.model)) / block.gravity,
-        "friction": assessment.friction,
         "overturning_velocity": _find_overturning_velocity(case),
         "rules": [{"name": name, "source": source} for name, source in RULES.items()],
         "case": None if case.motion is None else _rate_motion(case, case.motion),
@@ -225,7 +219,6 @@ def _describe_record(assessment: Assessment, motion: Motion) -> dict[str, Any]:
     """Return the outcome of an unscaled record and the friction that it requires."""
     case = assessment.case
     response = simulate(case.block, motion, model=case.model, chattering=case.chattering)
-    friction = assessment.friction
     return {
         **_rate_motion(case, motion),
         "measure": assessment.measure.value(motion),
@@ -233,7 +226,6 @@ def _describe_record(assessment: Assessment, motion: Motion) -> dict[str, Any]:
         "undecided": not response.perturbed().is_decided,
         "peak_over_slenderness": response.peak_over_slenderness,
         "friction_needed": response.required_friction,
-        "sliding_time": None if friction is None else response.sliding_time(friction),
     }
 
 

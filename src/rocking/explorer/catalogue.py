@@ -42,17 +42,21 @@ class Component:
     label: str  # of the component
     is_up: bool
     measures: Mapping[str, float] | None
-    event: str = ""
-    station: str = ""
-    stem: str = ""  # of the file's name, without the component
-    sensor: str = ""  # number
+    place: tuple[object, ...]  # equal for components of one sensor
+    origin: tuple[str, ...] = ()  # event and station
     samples: int = 0
-    step: float | None = None  # s
     key: str = ""  # of an uploaded file
     file: str = ""  # name of this file
     missing: list[str] = field(default_factory=list)  # metadata
     choices: Mapping[str, Any] = field(default_factory=dict)  # of the missing metadata
     vertical: str = ""  # text that adds its vertical component
+
+    def belongs_to(self, group: list[Component]) -> bool:
+        """Whether a component belongs to a group of up to two horizontal ones and a vertical one."""
+        first, same = group[0], [member.label for member in group if member.is_up == self.is_up]
+        is_as_long = abs(self.samples - first.samples) <= 0.01 * max(self.samples, first.samples)
+        has_room = len(same) < (1 if self.is_up else 2) and self.label not in same
+        return self.place == first.place and is_as_long and has_room
 
     def describe(self) -> dict[str, Any]:
         """Return the fields that the page shows."""
@@ -105,13 +109,12 @@ def number_stations(entries: list[dict[str, str]], uploads: UploadStore) -> list
     """Return a number for each entry, equal for components that the list assigns to one station."""
     files = {entry["motion"].partition(":")[2]: entry for entry in entries if entry["motion"].startswith("file:")}
     components = [component for key, entry in files.items() for component in _list_channels(uploads, key, entry)]
-    station_labels: dict[tuple[str, str | None], object] = {}
+    labels: dict[tuple[str, str | None], object] = {}
     for group in [*_group_by_station(_list_shipped()), *_group_by_station(components)]:
         for row in group:
-            label = (row.event, row.station) if row.station else (group[0].key, group[0].texts.get("channel"))
-            station_labels[row.texts["motion"], row.texts.get("channel")] = label
-    record_keys = [(entry["motion"], entry.get("channel")) for entry in entries]
-    return [*map(int, assign_numbers([station_labels.get(key, key) for key in record_keys]))]
+            labels[row.texts["motion"], row.texts.get("channel")] = row.origin or tuple(group[0].texts.items())
+    keys = [(entry["motion"], entry.get("channel")) for entry in entries]
+    return [*map(int, assign_numbers([labels.get(key, key) for key in keys]))]
 
 
 def find_title(texts: Texts, uploads: UploadStore) -> str:
@@ -129,55 +132,44 @@ def find_title(texts: Texts, uploads: UploadStore) -> str:
 
 @functools.cache
 def _list_shipped() -> tuple[Component, ...]:
-    components = []
-    for name in records.names():
+    def describe(name: str) -> Component:
         record = records.info(name)
-        station, is_up = record.title.rpartition(", ")[0], record.direction == "up"
-        texts, stem = {"motion": name}, name.rpartition("-")[0]
-        record_measures = compute_measures(records.load(name))
-        components.append(
-            Component(texts, record.title, record.direction, is_up, record_measures, station=station, stem=stem)
-        )
-    return tuple(components)
+        measures, origin = compute_measures(records.load(name)), (record.title.rpartition(", ")[0],)
+        is_up, place = record.direction == "up", (name.rpartition("-")[0],)
+        return Component({"motion": name}, record.title, record.direction, is_up, measures, place, origin)
+
+    return tuple(map(describe, records.names()))
 
 
 def _list_channels(uploads: UploadStore, key: str, answers: Texts) -> list[Component]:
     """Return the channels of a file, read with the user's answers."""
     dt = PARAMETERS["dt"].read(answers["dt"]) if answers.get("dt") else None
-    known = {name: answers[name] for name in ("dt", "units") if answers.get(name)}
     contents = uploads.describe_file(key, dt, answers.get("units") or None)
-    missing = uploads.describe_file(key)["missing"]
+    known = {each: answers[each] for each in uploads.describe_file(key)["missing"] if answers.get(each)}
     name, has_many = contents["name"], len(contents["channels"]) > 1
     components = []
     for channel in contents["channels"]:
-        texts = {"motion": f"file:{key}"} | ({"channel": str(channel["number"])} if has_many else {})
-        texts |= {argument: known[argument] for argument in missing if argument in known}
+        texts = {"motion": f"file:{key}"} | ({"channel": str(channel["number"])} if has_many else {}) | known
         stem, label, is_up, sensor = _split_component_name(name, channel["name"], channel["azimuth"], has_many)
+        origin = tuple(filter(None, (channel["event"], channel["station"]))) if channel["station"] else ()
+        sensor_place = (sensor, channel["step"], tuple(contents["missing"]))
+        place = (key,) if has_many else (*origin, *sensor_place) if origin else (stem or key, *sensor_place)
+        title = f"{name}, {channel['name']}" if has_many else name
         components.append(
             Component(
-                texts,
-                f"{name}, {channel['name']}" if has_many else name,
-                label,
-                is_up,
-                **{field: channel[field] for field in ("measures", "event", "station", "samples", "step", "choices")},
-                stem=key if has_many else stem,
-                sensor=sensor,
-                key=key,
-                file=name,
-                missing=contents["missing"],
+                texts, title, label, is_up, channel["measures"], place, origin, channel["samples"], key, name,
+                contents["missing"], channel["choices"],
             )
-        )
+        )  # fmt: skip
     return components
 
 
 def _split_component_name(name: str, channel: str, azimuth: float | None, has_many: bool) -> tuple[str, str, bool, str]:
     """Return a file's name without its component, the component's label, whether it is vertical, and its sensor."""
     path = PurePath(name)
-    full_stem = path.stem
-    match = None
-    for candidate in (path.suffix.removeprefix("."), full_stem):
-        match = match or (_COMPONENT.search(candidate) if not has_many else None)
-    stem = full_stem[: match.start()] if match is not None and match.string == full_stem else full_stem
+    candidates = [] if has_many else [path.suffix.removeprefix("."), path.stem]
+    match = next(filter(None, map(_COMPONENT.search, candidates)), None)
+    stem = "" if match is None else path.stem[: match.start()] if match.string == path.stem else path.stem
     channel_match = _COMPONENT.search(channel.strip().removesuffix(_BOREHOLE_SUFFIX))
     is_up = azimuth is None and any(m is not None and m["up"] for m in (channel_match, match))
     label = channel if match is None or azimuth is not None else match[0].strip("-_. ")
@@ -190,42 +182,18 @@ def _group_by_station(components: Iterable[Component]) -> list[list[Component]]:
     """Group the components of one sensor: up to two horizontal ones, followed by a vertical one."""
     groups: list[list[Component]] = []
     for component in components:
-        home_group = next((group for group in groups if _belongs_to(component, group)), None)
-        if home_group is None:
+        home = next((group for group in groups if component.belongs_to(group)), None)
+        if home is None:
             groups.append([component])
         else:
-            home_group.append(component)
+            home.append(component)
     for group in groups:
         group.sort(key=lambda component: component.is_up)
-        vertical = next((component for component in group if component.is_up), None)
-        for component in group:
-            if vertical is not None and not component.is_up:
+        vertical = group[-1]
+        for component in group if vertical.is_up else ():
+            if not component.is_up:
                 component.vertical = _write_vertical(vertical, component)
     return groups
-
-
-def _belongs_to(row: Component, group: list[Component]) -> bool:
-    """Whether a component belongs to a group."""
-    first = group[0]
-    if bool(row.key) != bool(first.key) or sum(member.is_up == row.is_up for member in group) >= (
-        1 if row.is_up else 2
-    ):
-        return False
-    if not row.key or row.key == first.key:
-        return row.stem == first.stem
-    if (
-        row.sensor != first.sensor
-        or row.missing != first.missing
-        or row.step != first.step
-        or any(member.key == row.key for member in group)
-    ):
-        return False
-    if abs(row.samples - first.samples) > 0.01 * max(row.samples, first.samples):
-        return False
-    if row.station and first.station and (row.station, row.event) != (first.station, first.event):
-        return False
-    heads = bool(row.station) and (row.station, row.event) == (first.station, first.event)
-    return heads or (bool(row.stem) and row.stem == first.stem and row.label != first.label)
 
 
 def _write_vertical(vertical: Component, horizontal: Component) -> str:
@@ -238,9 +206,6 @@ def _write_vertical(vertical: Component, horizontal: Component) -> str:
 
 def _describe_group(group: list[Component], reason: str) -> dict[str, Any]:
     first = group[0]
-    origin = ", ".join(part for part in (first.event, first.station) if part)
-    return {
-        "title": origin or first.stem or first.file,
-        "reason": reason,
-        "rows": [component.describe() for component in group],
-    }
+    title = ", ".join(first.origin) or (str(first.place[0]) if len(first.place) > 1 else "")
+    rows = [component.describe() for component in group]
+    return {"title": title or first.file, "reason": reason, "rows": rows}

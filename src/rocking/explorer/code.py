@@ -114,6 +114,7 @@ def case_as_python(case: Case) -> str:
         "duration": case.duration,
         "initial_rotation": case.initial_rotation or None,
         "initial_velocity": case.initial_velocity or None,
+        "friction": case.friction,
     }
     options = "".join(f", {name}={value!r}" for name, value in arguments.items() if value is not None)
     return "\n".join(

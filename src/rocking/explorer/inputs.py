@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from rocking.block import Block
+from rocking.block.friction import Friction
 from rocking.block.single import require_block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
@@ -45,6 +46,7 @@ class Case:
     duration: float | None
     initial_rotation: float
     initial_velocity: float
+    friction: Friction | None
     block_call: str  # Python expression
     block_options: Texts  # of the command
     body: MeshBody | None  # of a mesh
@@ -63,6 +65,7 @@ class Case:
             duration=self.duration,
             initial_rotation=self.initial_rotation,
             initial_velocity=self.initial_velocity,
+            friction=self.friction,
         )
 
 
@@ -98,6 +101,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
         duration=values.get("duration"),
         initial_rotation=values.get("initial_rotation", 0.0),
         initial_velocity=values.get("initial_velocity", 0.0),
+        friction=values.get("friction"),
         block_call=written_block.python,
         block_options=written_block.options,
         body=written_block.body,
@@ -106,6 +110,12 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
         motion_preamble=written_motion.preamble,
         words=written_motion.words,
     )
+
+
+def require_sticking(case: Case) -> None:
+    """Raise `OptionError` if a case has friction, which maps, diagrams and assessments do not support."""
+    if case.friction is not None:
+        raise OptionError("{} is simulated for the response alone; leave it empty here", "friction")
 
 
 def require_rest(restitutions: Iterable[float]) -> None:
@@ -129,6 +139,8 @@ def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str
     block, motion = require_block(response.block), response.motion
     texts = _block_to_texts(block)
     texts |= {"motion": "none"} if motion is None else motion_to_texts(motion, uploads)
+    if response.friction is not None:
+        texts["friction"] = ",".join(map(repr, dict.fromkeys(response.friction)))
     if response.model != "nonlinear":
         texts["model"] = response.model
     if str(response.chattering) != str(chattering_scheme("certified")):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import socket
-import sys
 import threading
-import time
 import webbrowser
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -19,34 +17,33 @@ from urllib.parse import urlencode
 from rocking.core.progress import note
 from rocking.core.threads import set_options
 from rocking.errors import OptionError, describe_install
-from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
 from rocking.response import Response
 
 if TYPE_CHECKING:
     import uvicorn
 
     from rocking.explorer.core import Explorer
+    from rocking.explorer.server import App
     from rocking.explorer.studies import StudyView
 
 #: Address that only this machine can reach.
 LOCAL_ADDRESS: Final = "127.0.0.1"
 
-#: Maximum number of connections, and of connections waiting to be accepted.
+#: Maximum number of connections.
 _MAX_CONNECTIONS: Final = 400
-_BACKLOG: Final = 128
 
 
 def require_packages() -> None:
     """Raise `OptionError` unless the packages of the explorer are installed."""
-    if any(util.find_spec(name) is None for name in ("starlette", "uvicorn", "bokeh")):
+    if any(util.find_spec(name) is None for name in ("starlette", "uvicorn")):
         raise OptionError(f"the explorer needs packages that are not installed: {describe_install('explorer')}")
 
 
 @dataclass(frozen=True)
 class Server:
-    """Listening server with its authentication."""
+    """Listening server with its application."""
 
-    authentication: RequestAuthentication
+    app: App
     server: uvicorn.Server
     socket: socket.socket
     host: str
@@ -55,7 +52,7 @@ class Server:
     def link(self, texts: Mapping[str, str] | None = None, *, path: str = "/") -> str:
         """Return a link that opens the page at a path once, with the texts of a case."""
         query = f"?{urlencode(texts)}" if texts else ""
-        return f"http://{self.host}:{self.port}{path}{query}#token={self.authentication.new_token()}"
+        return f"http://{self.host}:{self.port}{path}{query}#token={self.app.new_token()}"
 
     def run(self) -> None:
         """Serve until interrupted."""
@@ -67,16 +64,11 @@ class Server:
         threading.Thread(target=self.run, name="rocking-explorer", daemon=True).start()
 
     def announce(self, *, open_browser: bool, path: str = "/") -> None:
-        """Print the link to a path, and open it in a browser once the server answers."""
+        """Print the link to a path, and open it in a browser, whose request waits until the server has started."""
         link = self.link(path=path)
         print(f"rocking explorer: {link} (once, in one browser; Ctrl-C ends it)", flush=True)
         if open_browser:
-            threading.Thread(target=self._open_browser, args=(link,), daemon=True).start()
-
-    def _open_browser(self, link: str) -> None:
-        while not self.server.started:
-            time.sleep(0.02)
-        webbrowser.open(link)
+            threading.Thread(target=webbrowser.open, args=(link,), daemon=True).start()
 
 
 def start_listening(
@@ -92,59 +84,40 @@ def start_listening(
     require_packages()
     import uvicorn
 
-    from rocking.explorer.server import App, BoundedProtocol
+    from rocking.explorer.server import App
 
-    application = App(explorer, opening, study, framed_by).asgi
-    listener = _bind_socket(address, port)
-    bound_address, number = (listener.getsockname()[k] for k in (0, 1))
-    host, bound_host = (f"[{name}]" if ":" in name else name for name in (address, bound_address))
-    # Browsers normalise numeric addresses.
-    authentication = RequestAuthentication(application, number, {*LOOPBACK, host, bound_host})
+    app, listener = App(explorer, opening, study, framed_by), _bind_socket(address, port)
     config = uvicorn.Config(
-        authentication,
+        app.asgi,
         log_level="error",
         access_log=False,
         ws="none",
-        http=BoundedProtocol,
         timeout_keep_alive=10,
-        backlog=_BACKLOG,
-        server_header=False,
         limit_concurrency=_MAX_CONNECTIONS,
         timeout_graceful_shutdown=1,
-        proxy_headers=False,
     )
-    return Server(authentication, uvicorn.Server(config), listener, host, number)
+    host = f"[{address}]" if ":" in address else address
+    return Server(app, uvicorn.Server(config), listener, host, listener.getsockname()[1])
 
 
 def _bind_socket(address: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise OptionError(f"{{}} must be a whole number from 0 to 65535, not {port}", "port", value=port)
     try:
-        # An empty address means all addresses.
-        family, kind, _, _, socket_address = socket.getaddrinfo(address or "::", port, type=socket.SOCK_STREAM)[0]
-    except OSError as error:
+        family, _, _, _, target = socket.getaddrinfo(address or "::", port, type=socket.SOCK_STREAM)[0]
+        ip = ip_address(str(target[0]).partition("%")[0])
+        ip = (ip.ipv4_mapped if isinstance(ip, IPv6Address) else None) or ip
+        if ip.is_unspecified:
+            message = f"{{}} {address!r} is every address of this machine: name the one that others shall use"
+            raise OptionError(message, "address", value=address)
+        listener = socket.create_server(target[:2], family=family)
+    except socket.gaierror as error:
         raise OptionError(f"{{}}: this machine has no {address} ({error.strerror})", "address", value=address) from None
-    ip = ip_address(str(socket_address[0]).partition("%")[0])
-    ip = (ip.ipv4_mapped if isinstance(ip, IPv6Address) else None) or ip
-    if ip.is_unspecified:
-        raise OptionError(
-            f"{{}} {address!r} is every address of this machine: name the one that others shall use",
-            "address",
-            value=address,
-        )
+    except OSError as error:
+        message = f"{{}} {port} of {address} cannot be used ({error.strerror}): choose another one"
+        raise OptionError(message, "port", value=port) from None
     if not ip.is_loopback:
         note(f"{address} can be reached from other machines, and what is sent is not encrypted")
-    listener = socket.socket(family, kind)
-    try:
-        if sys.platform != "win32":
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(socket_address)
-        listener.listen(_BACKLOG)
-    except OSError as error:
-        listener.close()
-        raise OptionError(
-            f"{{}} {port} of {address} cannot be used ({error.strerror}): choose another one", "port", value=port
-        ) from None
     return listener
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rocking.analysis.levels import RATIO_VARIABLES, compute_ratios
 from rocking.analysis.overturning import classify_modes
@@ -16,15 +15,15 @@ from rocking.block import Blocks
 from rocking.block.sides import housner_restitution
 from rocking.chattering.duration import critical_amplitude
 from rocking.chattering.maps import UpliftOutcome, classify_uplifts, find_last_exceedance
-from rocking.core.arrays import Flags, Floats, Integers, split_range
+from rocking.core.arrays import Flags, Floats, split_range
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
 from rocking.errors import OptionError
-from rocking.explorer.inputs import Case, require_possible, require_rest
+from rocking.explorer.inputs import Case, require_possible, require_rest, require_sticking
 from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_arguments, write_pulse
 from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, list_names
-from rocking.explorer.payload import phrase
+from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.declared import SCALINGS
 from rocking.inputs.pulses import split_pulse
 from rocking.inputs.quantities import read_number
@@ -84,24 +83,11 @@ _RECORD_POINTS: Final = 256
 _PULSE_POINTS: Final = 32
 
 
-class MapPart(NamedTuple):
-    """Results at some points of a map."""
-
-    stride: int  # of the points in this pass
-    points: Integers  # indices
-    values: NDArray[np.float32]  # a row for each of `QUANTITIES`
-
-
 def list_axes(case: Case) -> list[str]:
     """Return the names of the possible axes of a case."""
-    if case.motion is None:
-        return []
-    is_pulse_motion = is_pulse(case.texts.get("motion", ""))
-    has_frequency = is_pulse_motion and "frequency" in read_pulse_arguments(case.texts["motion"])
-    unusable = set() if has_frequency else {"omega"}
-    if not _has_one_slenderness(case):
-        unusable.add("alpha")
-    return [name for name in AXES if name not in unusable]
+    motion = case.texts.get("motion", "")
+    unusable = set() if is_pulse(motion) and "frequency" in read_pulse_arguments(motion) else {"omega"}
+    return [name for name in AXES if name not in unusable and (name != "alpha" or _has_one_slenderness(case))]
 
 
 def _has_one_slenderness(case: Case) -> bool:
@@ -114,6 +100,7 @@ def read_grid(case: Case, texts: Texts) -> MapGrid:
     """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same for ``y``, and the number of ``points`` of each."""
     if case.motion is None or case.motion.pga == 0.0:
         raise OptionError("a map needs something that shakes the block: choose a record or a pulse", "motion")
+    require_sticking(case)
     x, y = (_read_axis(direction, case, texts) for direction in ("x", "y"))
     if x.name == y.name or {x.name, y.name} in ({"omega", "p"}, {"a", "pga"}):  # vary the same quantity
         raise OptionError("{} and {} vary the same: choose another pair of axes", x.name, y.name)
@@ -126,7 +113,7 @@ def read_grid(case: Case, texts: Texts) -> MapGrid:
     return grid
 
 
-def simulate_grid(grid: MapGrid) -> Generator[MapPart]:
+def simulate_grid(grid: MapGrid) -> Generator[Payload]:
     """Simulate the points of a grid from coarse to fine, and yield them as they are completed."""
     blocks, factors, time_scale = _make_blocks(grid)
     setup = Setup(blocks, grid.case.model, Certified())
@@ -151,8 +138,7 @@ def simulate_grid(grid: MapGrid) -> Generator[MapPart]:
             "peak": compute_ratios(alpha.min(axis=1), *(results[name] for name in RATIO_VARIABLES)),
             "mode": np.where(results["unfinished"], np.nan, classify_modes(results, grid.motion.duration)),
         }
-        values = np.array([quantities[name] for name in QUANTITIES], np.float32)
-        yield MapPart(stride, indices, values)
+        yield Payload({"stride": stride}, {"points": indices.astype(float), **quantities})
 
 
 def _scale_thresholds(grid: MapGrid, thresholds: Floats, factor: float) -> tuple[tuple[float, float], float]:
@@ -223,6 +209,38 @@ def _compute_peak(grid: MapGrid, point: Mapping[str, float]) -> float | None:
     return grid.motion.pga if "omega" in point else None
 
 
+def find_axis_value(case: Case, name: str) -> float:
+    """Return the value of a parameter of a map in the case itself."""
+    block, motion = case.block, case.motion
+    p = min(side.p for side in block.sides)
+    pga = 0.0 if motion is None else motion.pga
+    if name == "omega":
+        return 2.0 * math.pi * float(read_pulse_arguments(case.texts["motion"])["frequency"]) / p
+    if name == "a":
+        return pga / min(block.uplift_thresholds(case.model))
+    values: dict[str, float] = {
+        "p": p,
+        "alpha": math.degrees(min(side.alpha for side in block.sides)),
+        "restitution": block.sides[0].restitution,
+        "pga": pga / STANDARD_GRAVITY,
+    }
+    return values[name]
+
+
+def _choose_ends(case: Case, name: str) -> tuple[float, float]:
+    """Return ends of an axis that contain the case: close ones for the chattering under a sine, else wide ones."""
+    kind, value = AXES[name], find_axis_value(case, name)
+    if case.texts.get("motion", "").startswith("sine:") and kind.close[0] <= value <= kind.close[1]:
+        return kind.close
+    low, high = kind.wide
+    return (low, high) if low <= value <= high else (min(low, 0.5 * value), max(high, float(f"{1.5 * value:.2g}")))
+
+
+def describe_axes() -> list[dict[str, Any]]:
+    """Describe all axes that a map may have."""
+    return [{"name": kind.name, "unit": kind.unit, "label": phrase(f"axis.{kind.name}")} for kind in AXES.values()]
+
+
 def read_polarity(texts: Texts) -> float:
     """Return -1 if the scale of a case reverses its motion, else 1."""
     return math.copysign(1.0, read_number(texts.get("scale", "1"), "scale"))
@@ -239,9 +257,11 @@ def describe_map(grid: MapGrid) -> dict[str, Any]:
     return {
         "notes": notes,
         "shape": list(grid.shape),
+        "axes": list_axes(case),
         "x": _describe_axis(grid.x),
         "y": _describe_axis(grid.y),
         "quantities": list(QUANTITIES),
+        "case": [find_axis_value(case, axis.name) for axis in (grid.x, grid.y)],
         "outcomes": [outcome.name.lower() for outcome in UpliftOutcome],
         "curves": {
             name: [None if math.isnan(v) else v for v in values]
@@ -256,13 +276,16 @@ def _describe_axis(axis: Axis) -> dict[str, Any]:
 
 
 def _read_axis(direction: str, case: Case, texts: Texts) -> Axis:
-    name = texts.get(direction, "")
-    if name not in list_axes(case):
+    possible = list_axes(case)
+    amplitude = "a" if is_pulse(case.texts.get("motion", "")) else "pga"
+    name = texts.get(direction) or (amplitude if direction == "y" else possible[0])
+    if name not in possible:
         reason = "; the slenderness of a mesh follows from its azimuth, which no map varies" if case.body else ""
-        raise OptionError(f"this case is mapped over {', '.join(list_axes(case))}, not over {name[:20]!r}{reason}")
+        message = f"{{}}: this case is mapped over {', '.join(possible)}, not over {name[:20]!r}{reason}"
+        raise OptionError(message, direction, value=name)
     if direction == "x" and name in ("a", "pga"):
-        raise OptionError("amplitudes go upwards: choose another parameter for the axis to the right")
-    return read_range(name, texts, (f"{direction}_from", f"{direction}_to", "points"), AXES[name].close)
+        raise OptionError("{}: amplitudes go upwards; choose another parameter for the axis to the right", "x")
+    return read_range(name, texts, (f"{direction}_from", f"{direction}_to", "points"), _choose_ends(case, name))
 
 
 def read_range(name: str, texts: Texts, keys: tuple[str, str, str], default_ends: tuple[float, float]) -> Axis:

@@ -6,25 +6,21 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, BinaryIO, Final
 
 import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import RockingError
-from rocking.explorer.apart import read_mesh, read_mesh_in_process
 from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.quantities import read_densities, read_number
 from rocking.solid import ResistanceRose, Solid
+from rocking.solid.mesh import compute_properties
 from rocking.solid.solid import Plane, compute_plane
-from rocking.solid.support import compute_directions
+from rocking.solid.support import Sections, compute_directions, compute_sections
 
-if TYPE_CHECKING:
-    from rocking.solid.support import Sections
-
-#: Name and content of a file.
-_File = tuple[str, bytes]
+#: Maximum number of triangles of a mesh; about six seconds of work.
+MAX_TRIANGLES: Final = 500_000
 
 #: Lock while a mesh is read, because this needs much memory.
 _read_lock = threading.Lock()
@@ -121,17 +117,16 @@ def read_options(texts: Mapping[str, str], tolerance: float | None, gravity: flo
     }
 
 
-def read_body(name: str, upload: _File | None, arguments: Mapping[str, Any]) -> MeshBody | RockingError:
-    """Read a mesh, one at a time; errors are returned for the cache, because a second attempt would take as long."""
-    options = {argument: value for argument, value in arguments.items() if argument != "gravity"}
-    written_arguments = "".join(f", {argument}={value!r}" for argument, value in arguments.items())
-    try:
-        with _read_lock:
-            parts, sections = read_mesh(name, options) if upload is None else read_mesh_in_process(*upload, options)
-        solid = Solid(gravity=arguments.get("gravity", STANDARD_GRAVITY), **parts)
-    except RockingError as error:
-        return error
-    return MeshBody(solid, sections, f"Solid.from_mesh({upload[0] if upload else name!r}{written_arguments})")
+def read_body(name: str, stream: BinaryIO | None, arguments: Mapping[str, Any]) -> MeshBody:
+    """Read a mesh, one at a time."""
+    options = {"density": None, "support": None, "tolerance": None, "up": None, "unit": "m", "turn": 0.0, **arguments}
+    gravity = options.pop("gravity", STANDARD_GRAVITY)
+    with _read_lock:
+        parts, surfaces = compute_properties(stream or name, **options, max_faces=MAX_TRIANGLES)
+        sections = compute_sections(surfaces)
+    written = "".join(f", {argument}={value!r}" for argument, value in arguments.items())
+    file = stream.name if stream else name
+    return MeshBody(Solid(gravity=gravity, **parts), sections, f"Solid.from_mesh({file!r}{written})")
 
 
 def _describe_solid(solid: Solid) -> dict[str, Any]:

@@ -51,7 +51,8 @@ def read_motion_values(texts: Texts, values: Values, uploads: UploadStore) -> Wr
         read = _add_vertical(read, name, values, uploads)
     if target is not None:
         if read.motion is None:
-            raise OptionError("there is no motion to scale: choose one, or leave the scaling out")
+            names = [scaling for scaling in SCALINGS if scaling in texts]
+            raise OptionError("{} scales a ground motion: choose one, or leave the scaling out", *names)
         python = f"{read.python}.{_write_scaling(*target)}"
         read = read._replace(motion=_scale_motion(read.motion, *target), python=python)
     return read
@@ -114,6 +115,8 @@ def _read_unscaled(name: str, values: Values, uploads: UploadStore) -> WrittenMo
         )
     if kind == "file":
         return _read_file(key, values, values.get("channel"), uploads)
+    if name not in records.names():
+        raise OptionError(f"{{}}: there is no shipped record {name[:40]!r}", "motion", value=name)
     return WrittenMotion(_load_shipped(name), f"rocking.records.load({name!r})", (name,))
 
 

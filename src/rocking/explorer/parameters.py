@@ -10,14 +10,12 @@ import functools
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
-from rocking import records
 from rocking.core.constants import VERSION
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import OptionError
 from rocking.explorer.payload import load_english_texts
 from rocking.inputs.declared import BLOCK_DESCRIPTIONS, INPUTS, SCALINGS, Input, index_by_name
 from rocking.inputs.pulses import FAMILIES
-from rocking.records.units import UNIT_NAMES
 from rocking.solid.mesh import LENGTH_UNITS as MESH_UNITS
 from rocking.solid.mesh import SHIPPED_MESHES
 
@@ -69,7 +67,6 @@ ASSESSMENT: Final = index_by_name(
     Input("level_from", "assessment", "acceleration", "", "g"),
     Input("level_to", "assessment", "acceleration", "", "g"),
     Input("levels", "assessment", default="16"),
-    Input("friction", "assessment"),
 )
 
 #: Units of lengths, angles and accelerations on the page; the first is the default.
@@ -192,8 +189,9 @@ def field_label(name: str, motion: str = "", texts: Mapping[str, Any] | None = N
         for field in pulse["parameters"]
         if field.name == name
     }
-    if name in inputs:
-        fields = {inputs[name].text or name}
+    by_argument = {each.argument: each for each in inputs.values() if each.argument}
+    if (declared := inputs.get(name) or by_argument.get(name)) is not None:
+        fields = {declared.text or declared.name}
     return f"“{labels[f'field.{fields.pop()}']}”" if len(fields) == 1 else name
 
 
@@ -217,13 +215,7 @@ def specification() -> dict[str, Any]:
         },
         "meshes": [*SHIPPED_MESHES],
         "mesh_kinds": list(MESH_KINDS),
-        "records": [
-            {"name": name}
-            | {key: getattr(records.info(name), key) for key in ("title", "event", "station", "direction")}
-            for name in records.names()
-        ],
         "mesh_units": list(MESH_UNITS),
-        "units": list(UNIT_NAMES),
         "models": ["nonlinear", "linear"],
         "treatments": list(_TREATMENTS),
         "quantities": list(QUANTITIES),

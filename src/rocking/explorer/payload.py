@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import functools
 import json
-import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from html import escape
 from importlib import resources
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.core.tables import to_plain
-
-#: Placeholders of the page for texts.
-_PLACEHOLDER: Final = re.compile(r"\{([a-z]+\.[a-z_]+)\}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,17 +55,14 @@ def phrase(key: str, **values: Any) -> dict[str, Any]:
 
 
 def fill_page(page: str, texts: Mapping[str, Any]) -> str:
-    """Return the page with each ``{key}`` replaced by its text, and with all texts for its scripts.
+    r"""Return the page with all texts for its scripts.
 
     Examples
     --------
-    >>> fill_page('<b title="{save.copy}">{save.copy}</b>TEXTS', {"save.copy": "Copy"})
-    '<b title="Copy">Copy</b>{"save.copy": "Copy"}'
+    >>> fill_page("<script>TEXTS</script>", {"state.rests": "is at rest</script>"})
+    '<script>{"state.rests": "is at rest\\u003c/script>"}</script>'
     """
-    json_texts = json.dumps({key: text for key, text in texts.items() if key}, ensure_ascii=False).replace(
-        "<", "\\u003c"
-    )
-    return _PLACEHOLDER.sub(lambda match: escape(texts[match[1]]), page).replace("TEXTS", json_texts, 1)
+    return page.replace("TEXTS", json.dumps(texts, ensure_ascii=False).replace("<", "\\u003c"), 1)
 
 
 @functools.cache

@@ -16,7 +16,7 @@ from rocking.dynamics.bifurcation import find_period, record_states
 from rocking.dynamics.maps import PeriodOutcome, StroboscopicMap, compute_scale, stroboscopic_map
 from rocking.dynamics.orbits import compute_multipliers
 from rocking.errors import OptionError
-from rocking.explorer.inputs import Case, require_possible
+from rocking.explorer.inputs import Case, require_possible, require_sticking
 from rocking.explorer.maps import AXES, Axis, change_pulse, read_range
 from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_arguments, write_pulse_call
 from rocking.explorer.parameters import Texts
@@ -164,6 +164,7 @@ def describe_orbit(case: Case) -> Payload:
 
     For another motion the header contains only ``offer``: text, amplitude (m/s^2) and frequency (Hz) of a sine.
     """
+    require_sticking(case)
     sine = find_sine(case)
     if sine is None:
         suggested = suggest_sine(case)
@@ -296,16 +297,6 @@ class Sweep:
         return self.sine._replace(frequency=value * find_frequency_parameter(self.case) / (2.0 * math.pi))
 
 
-class SweepPart(NamedTuple):
-    """Results at some values of a sweep."""
-
-    stride: int  # of the indices in this pass
-    direction: str  # up or down
-    indices: list[int]  # of the values
-    steady_states: list[SteadyState]
-    share: float  # of the computation
-
-
 def read_sweep(case: Case, texts: Texts) -> Sweep:
     """Read a sweep: ``sweep`` (``a`` or ``omega``), ``sweep_from``, ``sweep_to``, and ``sweep_points``."""
     sine = find_sine(case)
@@ -313,7 +304,7 @@ def read_sweep(case: Case, texts: Texts) -> Sweep:
         raise OptionError("a diagram needs a sine, of which one period repeats for ever: choose one", "motion")
     name = texts.get("sweep") or "a"
     if name not in ("a", "omega"):
-        raise OptionError(f"a case is swept over a or omega, not over {name[:20]!r}")
+        raise OptionError(f"{{}} must be a or omega, not {name[:20]!r}", "sweep", value=name)
     omega = compute_sweep_values(case, sine)["omega"]
     ends = (0.9, float(f"{max(1.5, 2.5 * omega):.2g}")) if name == "a" else AXES["omega"].close
     sweep = Sweep(case, sine, read_range(name, texts, ("sweep_from", "sweep_to", "sweep_points"), ends))
@@ -321,7 +312,7 @@ def read_sweep(case: Case, texts: Texts) -> Sweep:
     return sweep
 
 
-def simulate_sweep(sweep: Sweep) -> Generator[SweepPart]:
+def simulate_sweep(sweep: Sweep) -> Generator[Payload]:
     """Sweep up and down from rest in decreasing steps, each from the last state unless it overturned."""
     values, maps, computed = sweep.axis.values, {}, 0
     passes = [(stride, direction) for stride in (8, 4, 2, 1) for direction in (1, -1)]
@@ -338,20 +329,17 @@ def simulate_sweep(sweep: Sweep) -> Generator[SweepPart]:
                 start = steady_state.states[-1] if len(steady_state.states) else _FROM_REST
                 steady_states.append(steady_state)
             computed += len(indices)
-            yield SweepPart(stride, "up" if direction > 0 else "down", indices, steady_states, computed / total)
+            header = {"stride": stride, "share": computed / total, "direction": "up" if direction > 0 else "down"}
+            yield _describe_steady_states(sweep, header | {"indices": indices}, steady_states)
 
 
-def pack_sweep_part(sweep: Sweep, part: SweepPart) -> Payload:
-    """Return the payload of a part: the number of states at each value, and their normalised rotations."""
-    states = np.concatenate([steady_state.states for steady_state in part.steady_states])
-    header = {
-        "stride": part.stride,
-        "share": part.share,
-        "direction": part.direction,
-        "indices": part.indices,
-        "counts": [len(steady_state.states) for steady_state in part.steady_states],
-        "words": [_summarise_steady_state(steady_state) for steady_state in part.steady_states],
-        "overturned": [steady_state.outcome == PeriodOutcome.OVERTURNED for steady_state in part.steady_states],
+def _describe_steady_states(sweep: Sweep, header: dict[str, Any], steady_states: list[SteadyState]) -> Payload:
+    """Return the number of states at each value, the states, and their normalised rotations."""
+    states = np.concatenate([steady_state.states for steady_state in steady_states])
+    header |= {
+        "counts": [len(steady_state.states) for steady_state in steady_states],
+        "words": [_summarise_steady_state(steady_state) for steady_state in steady_states],
+        "overturned": [steady_state.outcome == PeriodOutcome.OVERTURNED for steady_state in steady_states],
     }
     return Payload(header, {"states": states.ravel(), "drawn": normalise_states(sweep.case, states)[:, 0]})
 

@@ -16,10 +16,12 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import Certified
 from rocking.errors import OptionError
 from rocking.explorer.inputs import Case
-from rocking.explorer.payload import phrase
+from rocking.explorer.parameters import READING
+from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.notes import block_notes, motion_notes
 from rocking.motion.motion import Motion
 from rocking.response import Response
+from rocking.response.figure import compute_active_span, compute_boundary, compute_course, find_event_times
 from rocking.response.summary import format_outcome, round_ratio
 
 #: Evaluation times of a rotation in a window, and points of a line in a payload.
@@ -38,8 +40,11 @@ _REFINED: Final = Certified(1e-40)
 #: Longest drawn period of ground motion, s, for records whose baseline would drift.
 MAX_DRAWN_PERIOD: Final = 10.0
 
+#: Share of the strong shaking below which a block counts as never at rest: rounding errors.
+_MIN_SHARE: Final = 1e-9
+
 #: Properties of a response that the page shows unchanged.
-_RESPONSE_PROPERTIES: Final = ("duration", "overturned", "overturn_time", "peak_rotation", "peak_time", "time_at_rest")
+_RESPONSE_PROPERTIES: Final = ("duration", "overturned", "overturn_time", "tipping_time", "peak_rotation", "peak_time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +65,13 @@ class SimulatedCase:
     def select_response(self, start: float, end: float) -> Response:
         """Return the response that resolves the impacts in a window."""
         return self.refined if find_unresolved(self.response, start, end) else self.response
+
+    def choose_window(self, window: tuple[float, float] | None) -> tuple[float, float]:
+        """Return a window, s, or by default the time of motion, also if it was chosen for a longer response."""
+        duration = self.response.duration
+        if window is None or window[0] >= duration:
+            return compute_active_span(self.response)
+        return check_window(window, duration)
 
     @functools.cached_property
     def outline(self) -> Floats | None:
@@ -90,17 +102,22 @@ def has_drift(motion: Motion) -> bool:
     return long_enough and motion.coefficients.shape[1] == 2 and not motion.jumps
 
 
-def describe_case(simulated: SimulatedCase) -> dict[str, Any]:
-    """Return the numbers of a case on the page, and the sentence above them."""
-    case, response = simulated.case, simulated.response
+def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> Payload:
+    """Return the numbers of a case on the page, the sentence above them, and its lines in a window (s)."""
+    case, response = shown.case, shown.response
     block, motion = case.block, case.motion
-    return {
+    thresholds = block.uplift_thresholds(case.model)
+    start, end = shown.choose_window(window)
+    visible = shown.select_response(start, end)
+    marks = visible.impacts["time"][(visible.impacts["time"] >= start) & (visible.impacts["time"] <= end)]
+    share = chattering_episodes(response).share_at_rest
+    header = {
         "block": {
             "description": block.description,
             "sides": [vars(side) for side in block.sides],
-            "thresholds_g": [threshold / STANDARD_GRAVITY for threshold in block.uplift_thresholds(case.model)],
+            "thresholds_g": [threshold / STANDARD_GRAVITY for threshold in thresholds],
             "gravity_g": block.gravity / STANDARD_GRAVITY,
-            "outline": _describe_outline(block, simulated.outline),
+            "outline": _describe_outline(block, shown.outline),
             "notes": [*map(str, block_notes(block)), *(case.body.solid.notes if case.body else ())],
             "body": None if case.body is None else case.body.plane(case.azimuth),
         },
@@ -112,18 +129,24 @@ def describe_case(simulated: SimulatedCase) -> dict[str, Any]:
         "impacts": len(response.impacts),
         "rests": int(np.sum(response.events["kind"] == "rest")),
         "proven": int(np.sum(~np.isnan(response.sequences["upper"]))),
-        "share_at_rest": chattering_episodes(response).share_at_rest,
+        "share_at_rest": 0.0 if share < _MIN_SHARE else share,
         "eta_squared": math.prod(side.restitution for side in block.sides),
-        "verdict": describe_outcome(response, block.uplift_thresholds(case.model)),
-    }
+        "verdict": describe_outcome(response, thresholds),
+        "window": {
+            "from": start, "to": end if end > start else start + 1.0, "impacts": len(marks),
+            "unresolved": max(find_unresolved(response, start, end), default=None),
+        },
+    }  # fmt: skip
+    outline = {} if shown.outline is None else {"outline": shown.outline.ravel()}
+    return Payload(header, {**_sample_window(case, visible, start, end, marks), **sample_events(response), **outline})
 
 
 def describe_outcome(response: Response, thresholds: tuple[float, float]) -> dict[str, Any] | str:
     """Describe the outcome of a block with these uplift accelerations (m/s^2) in one sentence, overturning first."""
-    if response.stopped:
+    if response.stopped or response.lost_contact or (response.slips and response.peak_rotation == 0.0):
         sentence = format_outcome(response, "")
         return f"{sentence[0].upper()}{sentence[1:]}."
-    if not len(response.events) and not len(response.impacts) and response.peak_rotation == 0.0:
+    if not response.moved and response.peak_rotation == 0.0:
         if response.motion is None:
             return phrase("verdict.still")
         if response.motion.vertical is not None:
@@ -134,11 +157,9 @@ def describe_outcome(response: Response, thresholds: tuple[float, float]) -> dic
         return phrase("verdict.undecided", overturned=int(perturbed.overturned.sum()), count=len(perturbed.repeats))
     rests = int(np.sum(response.events["kind"] == "rest"))
     if response.overturned:
-        time = response.overturn_time
+        times = {"time": response.overturn_time, "balance": response.tipping_time}
         return (
-            phrase("verdict.overturns_later", time=time, count=rests)
-            if rests
-            else phrase("verdict.overturns", time=time)
+            phrase("verdict.overturns_later", count=rests, **times) if rests else phrase("verdict.overturns", **times)
         )
     if response.unfinished:
         return phrase("verdict.given_up", time=response.duration)
@@ -150,6 +171,53 @@ def describe_outcome(response: Response, thresholds: tuple[float, float]) -> dic
     # Two digits, or four near 100 %, where they matter.
     ratio_phrase = phrase("verdict.percent" if ratio < 0.99 else "verdict.near_percent", value=100.0 * ratio)
     return phrase("verdict.stays", share=ratio_phrase, resting=rest_phrase)
+
+
+def describe_details(shown: SimulatedCase, window: tuple[float, float] | None) -> Payload:
+    """Return the phase plane, the energy and the ground displacement in a window (s); times count from its start."""
+    start, end = shown.choose_window(window)
+    response = shown.select_response(start, end)
+    course = compute_course(response, start, end)
+    x, y = compute_boundary(response)
+    times = np.linspace(start, end, MAX_POINTS // 4)
+    ground = shown.ground
+    moved = np.zeros_like(times) if ground is None else ground.displacement(np.minimum(times, ground.duration))
+    arrays = {
+        "course_time": course.time - start, "course_rotation": course.rotation, "course_velocity": course.velocity,
+        "kinetic": course.kinetic, "potential": course.potential, "jump": course.impact_rows.astype(float),
+        "boundary_x": x, "boundary_y": y, "displacement_time": times - start,
+        "displacement": moved,
+        **{f"course_{kind}": found - start for kind, found in find_event_times(response, start, end).items()},
+    }  # fmt: skip
+    return Payload({"from": start, "needed": response._energy.overturning_energy.tolist()}, arrays)
+
+
+def find_state(shown: SimulatedCase, time: str, window: tuple[float, float] | None) -> dict[str, Any]:
+    """Return the state at a time (text), in the response of a window (s)."""
+    value, duration = READING["at"].read(time), shown.response.duration
+    if not 0.0 <= value <= duration:
+        message = f"{{}} must be within the response, from 0 to {duration:.6g} s, not {value:g} s"
+        raise OptionError(message, "at", value=time)
+    response = shown.select_response(*shown.choose_window(window))
+    rotation, velocity, _ = response.states(value).tolist()
+    rests, motion = response.rest_intervals, shown.case.motion
+    is_at_rest = np.any((rests[:, 0] <= value) & (value < rests[:, 1]))
+    state = "rests" if is_at_rest else "stands" if rotation == 0.0 else "right" if rotation > 0.0 else "left"
+    components = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}
+    grounds = {
+        name: None if part is None else float(clear_rounding(part.acceleration(value), part.pga)) / STANDARD_GRAVITY
+        for name, part in components.items()
+    }
+    return {
+        "time": value,
+        "state": phrase(f"state.{state}"),
+        "rotation": rotation,
+        "over_slenderness": rotation / shown.case.block.sides[0 if rotation >= 0.0 else 1].alpha,
+        "velocity": velocity,
+        "energy": float(response.kinetic_energy(value) + response.potential_energy(value)),
+        "slip": float(response.slip(value)) if response.friction is not None else None,
+        **grounds,
+    }
 
 
 @functools.lru_cache(maxsize=4)
@@ -189,42 +257,20 @@ def check_window(window: tuple[float, float], duration: float) -> tuple[float, f
     return start, end
 
 
-def choose_window(
-    window: tuple[float, float] | None, duration: float, default: tuple[float, float]
-) -> tuple[float, float]:
-    """Return a window, s, or the default if it is missing or was chosen for a longer response."""
-    return default if window is None or window[0] >= duration else check_window(window, duration)
-
-
-def describe_window(simulated: SimulatedCase, start: float, end: float) -> dict[str, Any]:
-    """Describe a window: its ends, number of impacts, and time from the last one to a rest, s."""
-    response = simulated.select_response(start, end)
-    times = response.impacts["time"]
-    count = np.searchsorted(times, end, "right") - np.searchsorted(times, start, "left")
-    unresolved_time = max(find_unresolved(response, start, end), default=None)
-    return {**widen_empty_window(start, end), "impacts": int(count), "unresolved": unresolved_time}
-
-
-def widen_empty_window(start: float, end: float) -> dict[str, float]:
-    """Return distinct ends of the display, s, also for a response of zero duration."""
-    return {"from": start, "to": end if end > start else start + 1.0}
-
-
-def sample_window(simulated: SimulatedCase, start: float, end: float, points: int = MAX_POINTS) -> dict[str, Floats]:
+def _sample_window(case: Case, response: Response, start: float, end: float, impacts: Floats) -> dict[str, Floats]:
     """Return the lines in a window; times count from its start to keep their precision in narrow windows."""
-    response = simulated.select_response(start, end)
-    impact_times = response.impacts["time"]
-    visible = impact_times[(impact_times >= start) & (impact_times <= end)]
-    marks = visible if len(visible) <= _MAX_MARKS else visible[:: math.ceil(len(visible) / _MAX_MARKS)]
-    times = np.sort(np.concatenate([np.linspace(start, end, min(_MAX_TIMES, 4 * points)), marks]), kind="stable")
+    marks = impacts if len(impacts) <= _MAX_MARKS else impacts[:: math.ceil(len(impacts) / _MAX_MARKS)]
+    times = np.sort(np.concatenate([np.linspace(start, end, _MAX_TIMES), marks]), kind="stable")
     times = times[np.diff(times, prepend=-math.inf) > 0.0]
     rotation = response.rotation(times)
-    indices = thin_line(rotation, points)
+    indices = thin_line(rotation, MAX_POINTS)
+    slip = {} if response.friction is None else {"slip": response.slip(times[indices])}
     return {
         "time": times[indices] - start,
         "rotation": rotation[indices],
         "impact": marks - start,
-        **_sample_ground_acceleration(simulated.case, start, end, points),
+        **slip,
+        **_sample_ground_acceleration(case, start, end, MAX_POINTS),
     }
 
 
@@ -265,14 +311,6 @@ def _sample_ground_acceleration(case: Case, start: float, end: float, points: in
     return {"ground_time": corners[indices] - start, "ground_g": acceleration[indices], "weight": weight[indices]}
 
 
-def sample_ground_displacement(simulated: SimulatedCase, start: float, end: float) -> dict[str, Floats]:
-    """Return the displacement of the ground in a window, m."""
-    times = np.linspace(start, end, MAX_POINTS // 4)
-    ground = simulated.ground
-    displacement = np.zeros_like(times) if ground is None else ground.displacement(np.minimum(times, ground.duration))
-    return {"displacement_time": times - start, "displacement": displacement}
-
-
 def sample_events(response: Response) -> dict[str, Floats]:
     """Return the lines common to all windows: impacts with intervals, rests, uplifts, chattering sequences."""
     intervals, ratios = _find_intervals(response)
@@ -295,7 +333,8 @@ def _find_rest_spreads(response: Response) -> Floats:
     if not len(response.sequences):
         return np.empty(0)
     rests = np.searchsorted(response.events["time"], response.sequences["end"])
-    return response.perturbed().event_spreads[rests]
+    spreads = response.perturbed().event_spreads[rests]
+    return np.where(spreads > response.duration, math.inf, spreads)  # undetermined
 
 
 def _find_intervals(response: Response) -> tuple[Floats, Floats]:

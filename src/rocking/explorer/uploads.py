@@ -13,7 +13,7 @@ from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 from rocking.core import checks
-from rocking.errors import BlockError, MotionError, RecordError, RockingError
+from rocking.errors import BlockError, MotionError, RecordError
 from rocking.explorer.meshes import MeshBody, read_body, read_options
 from rocking.explorer.parameters import MESH_KINDS
 from rocking.inputs.notes import motion_notes
@@ -21,16 +21,15 @@ from rocking.motion.motion import Motion
 from rocking.records import formats
 from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request
-from rocking.records.units import UNIT_NAMES, find_unit
+from rocking.records.units import UNIT_NAMES, Unit, find_unit
 from rocking.solid.mesh import SHIPPED_MESHES
 
 V = TypeVar("V")
 
 #: Largest file, bytes: twenty times a long record of three channels.
 MAX_FILE_SIZE: Final = 16 * 2**20
-TOO_LARGE_MESSAGE: Final = (
-    f"a file may be {MAX_FILE_SIZE // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
-)
+_LIMIT: Final = f"{MAX_FILE_SIZE // 2**20} MiB"
+TOO_LARGE: Final = f"a file may be {_LIMIT} large: cut a record into smaller files, or make a mesh coarser"
 
 #: Maximum number of files, forty stations of three components, and their bytes. Further records are rejected, so that
 #: none disappears unnoticed.
@@ -106,57 +105,25 @@ class UploadStore:
         self._motions: dict[str, Motion] = {}
         self._record_motions = RecentCache[Motion](MAX_CACHED_SAMPLES, lambda motion: len(motion.breakpoints))
         self._descriptions = RecentCache[dict[str, Any]](4 * MAX_FILES)
-        self._bodies = RecentCache["MeshBody | RockingError"](_MAX_BODIES)
+        self._bodies = RecentCache[MeshBody](_MAX_BODIES)
 
     def add_file(self, name: str, data: bytes) -> str:
-        """Store a record, and return its key."""
+        """Store a record or a mesh, and return its key."""
         upload = Upload(clean_file_name(name), data)
-        if (lines := max(data.count(b"\n"), data.count(b"\r"))) > _MAX_LINES and b"\0" not in data:
-            raise RecordError(
-                f"{lines} lines, of which at most {_MAX_LINES} are read here; cut the record into smaller files",
-                path=upload.name,
-            )
-        return self._add_upload(upload)
-
-    def add_mesh(self, name: str, data: bytes) -> str:
-        """Store a mesh, and return its key."""
-        upload = Upload(clean_file_name(name), data)
-        if not _is_mesh(upload.name):
-            kinds = ", ".join(MESH_KINDS)
-            raise RecordError(f"is no mesh by its name: files of {kinds} are read here", path=upload.name)
-        return self._add_upload(upload)
-
-    def _add_upload(self, upload: Upload) -> str:
-        key = hashlib.sha256(upload.data).hexdigest()[:_KEY_LENGTH]
-        if len(upload.data) > MAX_FILE_SIZE:
-            raise RecordError(TOO_LARGE_MESSAGE, path=upload.name)
+        lines = max(data.count(b"\n"), data.count(b"\r"))
+        if lines > _MAX_LINES and b"\0" not in data and not is_mesh(upload.name):
+            message = f"{lines} lines, of which at most {_MAX_LINES} are read here; cut the record into smaller files"
+            raise RecordError(message, path=upload.name)
+        if len(data) > MAX_FILE_SIZE:
+            raise RecordError(TOO_LARGE, path=upload.name)
+        key = hashlib.sha256(upload.name.encode() + b"\0" + data).hexdigest()[:_KEY_LENGTH]
         with self._lock:
-            others = {name: file for name, file in self._files.items() if name != key}
-            while (
-                len(others) >= MAX_FILES
-                or sum(len(file.data) for file in others.values()) + len(upload.data) > MAX_BYTES
-            ):
-                # Meshes are in no list on the page, so the oldest one is removed.
-                mesh = next((name for name, file in others.items() if _is_mesh(file.name)), None)
-                if mesh is None:
-                    raise RecordError(
-                        f"it cannot be kept: {MAX_FILES} files and {MAX_BYTES // 2**20} MiB are kept at most; take "
-                        "some out of the list of records first",
-                        path=upload.name,
-                    )
-                del others[mesh], self._files[mesh]
-            # Cached results contain the first name of a content, so the name is not replaced.
-            self._files.setdefault(key, upload)
+            others = [file for name, file in self._files.items() if name != key]
+            if len(others) >= MAX_FILES or sum(len(file.data) for file in others) + len(data) > MAX_BYTES:
+                limits = f"{MAX_FILES} files and {MAX_BYTES // 2**20} MiB are kept at most"
+                raise RecordError(f"it cannot be kept: {limits}; remove records from the list first", path=upload.name)
+            self._files[key] = upload
         return key
-
-    def add_and_describe(self, name: str, data: bytes) -> dict[str, Any]:
-        """Store a file, unless it is unreadable, and describe it."""
-        key = self.add_file(name, data)
-        try:
-            return self.describe_file(key)
-        except RockingError:
-            self.remove(key)
-            raise
 
     def remove(self, key: str) -> None:
         """Remove a file and its results."""
@@ -169,7 +136,7 @@ class UploadStore:
     def list_records(self) -> tuple[str, ...]:
         """Return the keys of the stored records, in order of upload."""
         with self._lock:
-            return tuple(key for key, upload in self._files.items() if not _is_mesh(upload.name))
+            return tuple(key for key, upload in self._files.items() if not is_mesh(upload.name))
 
     def usage(self) -> dict[str, int]:
         """Return number and bytes of the stored files, and their limits."""
@@ -193,14 +160,14 @@ class UploadStore:
     def motion(self, key: str) -> Motion:
         """Return a motion of the program."""
         if key not in self._motions:
-            raise RecordError("this link names a motion of another program: open the page from there again")
+            raise RecordError("{} is a motion of another program: open the page from there again", "motion")
         return self._motions[key]
 
-    def file(self, key: str, kind: str = "record") -> Upload:
-        """Return a stored file."""
+    def file(self, key: str, argument: str = "motion") -> Upload:
+        """Return a stored file, which an argument names."""
         with self._lock:
             if key not in self._files:
-                raise RecordError(f"this {kind} is not here any more: drop its file on the page again")
+                raise RecordError("the file of {} is not here any more: open it again", argument)
             return self._files[key]
 
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
@@ -219,10 +186,7 @@ class UploadStore:
             checks.choice(name, "mesh", BlockError, [*SHIPPED_MESHES])
         options = read_options(texts, tolerance, gravity)
         key = name, upload.name if upload else "", json.dumps(options)
-        body = self._bodies.get(key, lambda: read_body(name, upload, options))
-        if isinstance(body, RockingError):
-            raise body
-        return body
+        return self._bodies.get(key, lambda: read_body(name, upload and upload.stream(), options))
 
     def describe_file(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
         """Describe a file: its format, channels, and arguments that reading requires."""
@@ -279,13 +243,18 @@ def _describe_channel(motion: Motion, missing: list[str]) -> dict[str, Any]:
         return {"notes": list(motion_notes(motion)), "choices": {}, "measures": compute_measures(motion)}
     choices: dict[str, list[tuple[str, dict[str, float]]]] = {}
     if "units" in missing:
-        units = {name: unit for name in UNIT_NAMES if (unit := find_unit(name)) is not None}
-        peaks = {name: motion.pga * unit.multiplier / unit.divisor for name, unit in units.items()}
+        peaks = {name: motion.pga * unit.multiplier / unit.divisor for name, unit in list_units().items()}
         choices["units"] = [(name, {"peak": peak}) for name, peak in peaks.items()]
     if "dt" in missing:
         steps = motion.duration / _PLACEHOLDERS["dt"]
         choices["dt"] = [(f"{step:g}", {"lasts": steps * step}) for step in (0.002, 0.005, 0.01, 0.02)]
     return {"notes": [], "choices": choices, "measures": None}
+
+
+def list_units() -> dict[str, Unit]:
+    """Return the units of accelerations by name, each unit once."""
+    units = {unit: name for name in reversed(UNIT_NAMES) if (unit := find_unit(name)) is not None}
+    return {name: unit for unit, name in reversed(units.items())}
 
 
 def compute_measures(motion: Motion) -> dict[str, float]:
@@ -298,7 +267,8 @@ def compute_measures(motion: Motion) -> dict[str, float]:
     }
 
 
-def _is_mesh(name: str) -> bool:
+def is_mesh(name: str) -> bool:
+    """Whether a file is a mesh by its name."""
     return PurePosixPath(name).suffix.lower().removeprefix(".") in MESH_KINDS
 
 

@@ -121,7 +121,14 @@ class Input:
         names = ("name", "group", "unit", "default", "low", "high", "logarithmic", "values", "step")
         plain = {name: getattr(self, name) for name in names}
         kind = "angle" if self.kind == "tilt" else self.kind
-        return {**plain, "kind": kind, "text": self.text or self.name, "suffix": self.suffix, "units": self._sizes()}
+        return {
+            **plain,
+            "kind": kind,
+            "text": self.text or self.name,
+            "argument": self.argument or self.name,
+            "suffix": self.suffix,
+            "units": self._sizes(),
+        }
 
     @property
     def suffix(self) -> str:
@@ -213,6 +220,9 @@ INPUTS: Final = index_by_name(
     Input("model", "model", "text",
         "Equation of motion: of finite rotations (nonlinear, the default), or linearised for slender blocks.",
         default="nonlinear"),
+    Input("friction", "model", "number",
+        "Coefficient of friction with which slip is simulated, or the static and the kinetic one, as 0.3,0.25.",
+        "", "0.5", 0.05, 1.5, values="one or two"),
     Input("chattering", "treatment", "text",
         "How chattering ends: certified, velocity, bypass, interval, or (under a sine) time; with a limit, as "
         "certified=1e-9 (s), velocity=5e-10 or bypass=1e-3 (over p alpha), interval=1e-9 (s).", default="certified"),

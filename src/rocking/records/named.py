@@ -24,7 +24,7 @@ from rocking.errors import MotionError, OptionError, RecordError
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
 from rocking.records.formats.channel import remove_baseline
-from rocking.records.formats.source import Request, list_archive, split_archive
+from rocking.records.formats.source import Request, list_archive, name_stream, split_archive
 
 #: One motion, several, or a mapping from names to motions.
 Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
@@ -363,7 +363,7 @@ def contents(
     identification, channels = formats.read_content(source, Request.create(dt, units, channel, several=several))
     motions = tuple(component.motion(baseline, highpass) for component in channels)
     motions = motions if factor == 1.0 else tuple(motion.scaled(factor) for motion in motions)
-    name = "standard input" if hasattr(file, "read") else os.fsdecode(file)
+    name = name_stream(file) if hasattr(file, "read") else os.fsdecode(file)
     facts = {"file": name, "format": identification.format, "reason": identification.reason}
     title = f"{name}: {identification.format}, since {identification.reason}"
     entries = [

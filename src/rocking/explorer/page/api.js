@@ -1,12 +1,12 @@
-// Requests to the server: one at a time for each purpose, and the latest wins.
-
-import {headers} from "./secret.js";
-import {phrase} from "./texts.js";
+// Requests to the server, which carry the secret of its link; and work of which only the latest request counts.
 
 /** @typedef {Record<string, string>} Texts */
 /** @typedef {{header: any, arrays: Record<string, Float64Array>}} Payload */
 
-/** What went wrong, in a sentence for people, and the argument that is wrong, where it is one. */
+const KEPT = "rocking-secret";
+let secret = "";
+
+/** What went wrong, in a sentence, and the argument that is wrong, if it is one. */
 export class Problem extends Error {
   /** @param {string} sentence @param {string | null} [argument] */
   constructor(sentence, argument = null) {
@@ -15,45 +15,51 @@ export class Problem extends Error {
   }
 }
 
-/** @param {string} path @param {Texts} texts */
-function address(path, texts) {
-  const query = new URLSearchParams(texts).toString();
-  return query ? `${path}?${query}` : path;
+/** The secret that this origin has stored. A frame may have no storage: then the page keeps the secret until it is closed. */
+function stored() {
+  try { return localStorage.getItem(KEPT) ?? secret; } catch { return secret; }
 }
 
-/** @param {string} path @param {Texts} texts @param {RequestInit} [options] */
-async function answer(path, texts, options) {
+/** Exchange the token of the link for the secret, or use the stored one. */
+export async function openSession() {
+  const token = new URLSearchParams(location.hash.slice(1)).get("token");
+  secret = stored();
+  if (!token) return;
+  history.replaceState(null, "", location.pathname + location.search);
+  const response = await fetch("/api/secret", {method: "POST", headers: {authorization: `Bearer ${token}`}}).catch(() => null);
+  if (!response?.ok) return;
+  secret = await response.text();
+  try { localStorage.setItem(KEPT, secret); } catch { /* see above */ }
+}
+
+/** @param {string} path @param {Texts} [texts] @param {RequestInit} [options] @returns {Promise<Response>} */
+async function answer(path, texts = {}, options = {}) {
+  const query = new URLSearchParams(texts).toString(), used = secret;
   let response;
   try {
-    response = await fetch(address(path, texts), {...options, headers});
+    response = await fetch(query ? `${path}?${query}` : path, {...options, headers: {authorization: `Bearer ${used}`}});
   } catch (error) {
     if (error instanceof DOMException) throw error;
-    throw new Problem(phrase("page.silent"));
+    throw new Problem("The explorer does not answer. Start it again with rocking explore, and open its link.");
   }
   if (response.ok) return response;
-  const text = await response.text();
-  const {problem, argument} = response.headers.get("content-type") === "application/json" ? JSON.parse(text) : {problem: text};
+  secret = stored();
+  if (response.status === 403 && secret !== used) return answer(path, texts, options); // another tab has opened a new link
+  const {problem, argument} = await response.json().catch(() => ({problem: `The server responded with ${response.status}.`}));
   throw new Problem(problem, argument);
 }
 
-/** @param {string} path @param {Texts} texts @param {RequestInit} [options] @returns {Promise<any>} */
-export async function json(path, texts, options) {
-  return (await answer(path, texts, options)).json();
-}
+/** @param {string} path @param {Texts} [texts] @param {RequestInit} [options] @returns {Promise<any>} */
+export const json = async (path, texts, options) => (await answer(path, texts, options)).json();
 
-/** A file that the server makes. @param {string} path @param {Texts} texts @returns {Promise<Blob>} */
-export async function file(path, texts) {
-  return (await answer(path, texts)).blob();
-}
+/** @param {string} path @param {Texts} texts */
+export const file = async (path, texts) => (await answer(path, texts)).blob();
 
-/** Header and arrays; the arrays are views of what came, not copies.
- * @param {string} path @param {Texts} texts @param {RequestInit} [options] @returns {Promise<Payload>} */
-export async function payload(path, texts, options) {
-  return unpacked(await (await answer(path, texts, options)).arrayBuffer());
-}
+/** @param {string} path @param {Texts} texts */
+export const payload = async (path, texts) => unpack(await (await answer(path, texts)).arrayBuffer());
 
-/** @param {ArrayBuffer} buffer @returns {Payload} */
-export function unpacked(buffer) {
+/** Header and arrays, which are views of the buffer. @param {ArrayBuffer} buffer @returns {Payload} */
+function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   /** @type {Record<string, Float64Array>} */
@@ -66,28 +72,20 @@ export function unpacked(buffer) {
   return {header, arrays};
 }
 
-/** The first byte of what is written as JSON. */
-const BRACE = 123;
-
-/** Parts of a stream, each behind its length in 4 bytes: the first says what it is, and any may say what went wrong.
- * @param {string} path @param {Texts} texts @param {AbortSignal} signal */
-export async function* frames(path, texts, signal) {
-  const response = await answer(path, texts, {signal});
-  const reader = /** @type {ReadableStream<Uint8Array>} */ (response.body).getReader();
+/** Payloads of a stream, each behind its length in 8 bytes. @param {string} path @param {Texts} texts @param {AbortSignal} signal */
+export async function* parts(path, texts, signal) {
+  const reader = /** @type {ReadableStream<Uint8Array>} */ ((await answer(path, texts, {signal})).body).getReader();
   /** @type {Uint8Array} */
   let held = new Uint8Array(0);
   for (;;) {
-    while (held.length >= 4) {
+    while (held.length >= 8) {
       const size = new DataView(held.buffer, held.byteOffset).getUint32(0, true);
-      if (held.length < 4 + size) break;
-      signal.throwIfAborted(); // what has come already is of no use, either
-      const part = held.slice(4, 4 + size);
-      if (part[0] === BRACE) {
-        const {problem, argument} = JSON.parse(new TextDecoder().decode(part));
-        if (problem) throw new Problem(problem, argument);
-      }
+      if (held.length < 8 + size) break;
+      signal.throwIfAborted();
+      const part = unpack(/** @type {ArrayBuffer} */ (held.slice(8, 8 + size).buffer));
+      if (part.header.problem) throw new Problem(part.header.problem, part.header.argument);
       yield part;
-      held = held.subarray(4 + size);
+      held = held.subarray(8 + size);
     }
     const {done, value} = await reader.read();
     if (done) return;
@@ -98,37 +96,26 @@ export async function* frames(path, texts, signal) {
   }
 }
 
-/** Work of which one is under way, and of all that is asked for meanwhile only the last is done. */
+/** Work of which one is under way; of all that is requested meanwhile, only the last is done. */
 export class Latest {
-  /** @param {(...given: any[]) => Promise<void>} work @param {(error: unknown) => void} settled is told what went wrong, or null */
+  /** @param {(...given: any[]) => Promise<void>} work @param {(error: unknown) => void} settled receives what went wrong, or null */
   constructor(work, settled) {
     this.work = work;
     this.settled = settled;
     this.busy = false;
-    /** Comes when nothing is under way any more. @type {Promise<void>} */
-    this.idle = Promise.resolve();
     /** @type {any[] | null} */
     this.next = null;
   }
 
   /** @param {any[]} given */
-  ask(...given) {
+  async ask(...given) {
     this.next = given;
-    if (!this.busy) this.idle = this.run();
-    return this.idle;
-  }
-
-  async run() {
+    if (this.busy) return;
     this.busy = true;
     while (this.next) {
       const now = this.next;
       this.next = null;
-      try {
-        await this.work(...now);
-        this.settled(null);
-      } catch (error) {
-        this.settled(error);
-      }
+      try { await this.work(...now); this.settled(null); } catch (error) { this.settled(error); }
     }
     this.busy = false;
   }

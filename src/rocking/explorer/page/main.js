@@ -1,388 +1,193 @@
-// The page: one state, in its address; forms that change it, and five views that show it.
+// The page: one state, in its address; forms that change it, and three tabs that show it.
 
-import {accepted, ends, readAddress, specification, writeAddress, writeNow} from "./parameters.js";
-import {Latest, Problem, json, payload} from "./api.js";
-import {ChatteringPanel} from "./chattering.js";
-import {makeCopying, showCode, showFiles} from "./exports.js";
-import {BlockForm, ModelForm, MotionForm} from "./forms.js";
-import {Cursor} from "./cursor.js";
-import {Examples} from "./examples.js";
-import {Ghosts} from "./ghosts.js";
-import {Histories} from "./histories.js";
-import {PhasePanel} from "./phase.js";
-import {Lecture} from "./lecture.js";
-import {Sheet} from "./sheet.js";
-import {Snapshots} from "./snapshots.js";
-import {RecordList} from "./list.js";
-import {makePrinting} from "./print.js";
-import {angle, caseName, ofG, unitFields, unitsChosen} from "./units.js";
-import {acceptFiles} from "./upload.js";
-import {keepingFocus} from "./focus.js";
-import {begin, settle} from "./visits.js";
-import {counted, legend, make, one, say, tell} from "./words.js";
-import {NONE, fixed, short} from "./numbers.js";
-import {inWords, phrase} from "./texts.js";
+import {Problem} from "./api.js";
+import {one} from "./standalone/dom.js";
+import {BlockForm, ModelForm, MotionForm, announce} from "./forms.js";
+import {RecordList, isMesh, sendFile} from "./records.js";
+import {Shake, figuresOf} from "./shake.js";
+import {View as Assess} from "./assess.js";
+import {View as MapView} from "./map.js";
+import {View as Periodic} from "./periodic.js";
+import {copyButtons, figures} from "./save.js";
+import {readAddress, specification, writeAddress} from "./state.js";
+import {say} from "./texts.js";
+import {angle, caseName, ofG, unitFields} from "./units.js";
+import {short} from "./numbers.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
-const state = readAddress();
-/** Id of the field that has loaded the page again, where the keys go on. @type {string | undefined} */
-const keysAt = history.state?.focus;
+/** How long the case must stay as it is before a map or an assessment is computed again, ms. */
+const PAUSE = 400;
+const TITLES = /** @type {Record<string, string>} */ ({shake: "Shake", map: "Map", periodic: "Periodic motion", assess: "Assess"});
 
-/** What the views share.
- * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, follow: typeof follow, list: RecordList, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
-const page = {state, shown: null, go, problem, restate, follow, list: new RecordList(state), remember: (parts) => { accepted(state, parts); examples.check(); }};
-/** Views that somebody has opened, by name. @type {Record<string, any>} */
-const views = {};
-/** The number of the last view that was asked for. */
-let turn = 0;
-
-const forms = {
-  block: new BlockForm(one("block-form"), changed, () => load.idle),
-  motion: new MotionForm(one("motion-form"), changed),
-  model: new ModelForm(one("model-form"), changed),
-};
-const histories = new Histories(one("histories"), {
-  window: showWindow, asked: () => state.window, load: () => load, cursor: (time) => { if (time === null) cursor.show(); else cursor.hover(time); }, pick: (time) => cursor.set(time),
-});
-const phase = new PhasePanel(page, (time) => cursor.set(time));
-const cursor = new Cursor(page, {mark: (time) => { histories.mark(time); phase.mark(time); }, seek: (time) => { if (state.view === "block") views.block?.seek(time); }});
-const chattering = new ChatteringPanel({window: showWindow, asked: () => state.window}, problem);
-const lecture = new Lecture(page, histories);
-const examples = new Examples(state, revisit, problem);
-new Sheet();
-const ghosts = new Ghosts(histories);
-new Snapshots({problem: (error) => problem(error, "snapshots"), now: () => (page.shown ? {name: caseName(page.shown.header), texts: {...state.good.texts}} : null), open: restate, changed: () => views.compare?.repinned()});
-
-/** Whether a case is drawn, be it the one that the state says or another one. */
-let drawn = false;
-/** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
-const problems = {};
-/** Places where somebody has just done something: what is wrong there is said before what views make of it. */
-const FIRST = ["settings", "files", "snapshots", "exports", "print-head"];
-
-/** Say what is wrong, or that nothing is, and mark the field that is wrong. @param {unknown} error @param {string} [place] id of what holds the field */
-function problem(error, place = "settings") {
-  if (error instanceof DOMException && error.name === "AbortError") return;
-  if (!error && !problems[place]) return;
-  if (error && !(error instanceof Problem)) console.error(error);
-  if (one(place).closest("[hidden]")) error = null; // what is wrong where nobody looks any more is of no use
-  delete problems[place]; // so that the last is the newest
-  problems[place] = error instanceof Problem ? error.message : error ? phrase("page.fault", {error: String(error)}) : null;
-  for (const each of one(place).querySelectorAll("[aria-invalid]")) each.removeAttribute("aria-invalid");
-  for (const each of one(place).querySelectorAll("[data-problem]")) each.removeAttribute("data-problem");
-  const argument = error instanceof Problem && error.argument;
-  for (const each of argument ? one(place).querySelectorAll(`[data-argument="${CSS.escape(argument)}"]`) : []) {
-    if (!each.checkVisibility()) continue;
-    each.setAttribute("aria-invalid", "true");
-    each.setAttribute("aria-errormessage", "problem");
-    const around = each.closest(".number, .choice, label");
-    around?.setAttribute("data-problem", problems[place] ?? "");
-    if (place === "settings") around?.scrollIntoView({block: "nearest"});
+class Page {
+  constructor() {
+    this.state = readAddress();
+    this.list = new RecordList();
+    this.list.read(this.state);
+    /** @type {import("./api.js").Payload | null} */
+    this.shown = null;
+    /** What is wrong at each place, by its id. @type {Map<string, string>} */
+    this.problems = new Map();
+    const changed = (/** @type {Texts} */ texts, /** @type {string[]} */ replaced) => this.changed(texts, replaced);
+    this.forms = {block: new BlockForm(one("block-form"), changed, this.list), motion: new MotionForm(one("motion-form"), changed, this.list, () => this.reload()), model: new ModelForm(one("model-form"), changed)};
+    this.shake = new Shake(this);
+    this.views = /** @type {Record<string, any>} */ ({shake: this.shake, map: new MapView(this), periodic: new Periodic(this), assess: new Assess(this)});
+    for (const button of document.querySelectorAll("[data-tab]")) button.addEventListener("click", () => this.go(/** @type {any} */ (button).dataset.tab === "explore" ? this.explored ?? "map" : /** @type {any} */ (button).dataset.tab));
+    for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => this.go(/** @type {any} */ (button).dataset.view));
+    one("settings").addEventListener("submit", (/** @type {Event} */ event) => event.preventDefault());
+    one("to-settings").addEventListener("click", () => this.sheet(!document.body.classList.contains("sheet")));
+    one("settings").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => { if (event.key === "Escape") this.sheet(false); });
+    addEventListener("popstate", () => { this.state = readAddress(); this.list.read(this.state); this.showForms(); void this.shake.load.ask(); this.go(this.state.view, false); });
+    copyButtons();
+    unitFields(() => writeAddress(this.state));
+    this.takeFiles();
   }
-  one(place === "settings" ? "main" : place).classList.toggle("old", Boolean(error && drawn));
-  one("old").hidden = !(problems.settings && drawn);
-  const wrong = Object.entries(problems).filter(([, each]) => each);
-  const sentence = (wrong.findLast(([each]) => FIRST.includes(each)) ?? wrong.at(-1))?.[1];
-  one("problem").hidden = !sentence;
-  if (sentence) one("problem").textContent = sentence;
-}
 
-/** How long sliders must lie still before all is drawn, ms. */
-const PAUSE = 120;
-let pause = 0;
-/** Texts of the case that is shown. @type {Texts} */
-let texts = state.texts;
-/** Whether the case must be computed; else another window of it is enough. */
-let stale = true;
-/** What was shown when all was drawn last. @type {import("./api.js").Payload | null} */
-let rested = null;
+  async start() {
+    try { await this.reload(); } catch (error) { this.problem(error, "settings"); }
+    this.showForms();
+    void this.shake.load.ask();
+    this.go(this.state.view, false);
+    document.body.inert = false;
+    document.body.dataset.ready = String(performance.now());
+  }
 
-/** Show what the state says: one request after the other, so that no answer overtakes a later one. */
-const load = new Latest(() => (stale || !page.shown || !state.window ? compute() : look()), problem);
+  showForms() { for (const form of Object.values(this.forms)) form.show(this.state.texts); }
 
-/** The whole case. */
-async function compute() {
-  window.clearTimeout(pause);
-  stale = false;
-  const {texts: asked, good} = state;
-  try {
-    const found = await payload("/api/case", {...asked, ...ends(state)});
-    if (state.good !== good) return; // somebody went back meanwhile
-    page.shown = found;
-    drawn = true;
-    texts = asked;
-    if (state.texts === asked) forms.block.known = found.header.block.sides;
-    // It was chosen for a longer response; where two are compared, the other may be longer.
-    if (state.view !== "compare" && state.window && state.window[0] >= found.header.duration) state.window = null;
-    accepted(state, {texts, window: state.window});
+  /** Load the list of records. */
+  async reload() {
+    await this.list.load();
+    this.forms.motion.show(this.state.texts);
+    this.views.assess?.render();
+  }
+
+  /** Take an answer about files. @param {import("./records.js").Row[]} rows @param {string} name @param {string} value */
+  answer(rows, name, value) { return this.forms.motion.answer(rows, name, value).catch((error) => this.problem(error, "view-assess")); }
+
+  /** Texts that stand for all those that they replace. @param {Texts} given @param {string[]} replaced */
+  changed(given, replaced) {
+    const {state} = this, before = state.texts;
+    state.texts = {...Object.fromEntries(Object.entries(before).filter(([name]) => !replaced.includes(name))), ...given};
+    if (replaced.includes("motion") && before.motion !== state.texts.motion) state.window = state.at = null;
+    this.shake.stop();
+    void this.shake.load.ask();
+    const view = this.views[state.view];
+    if (view === this.shake) return;
+    view.leave();
+    window.clearTimeout(this.waiting);
+    this.waiting = window.setTimeout(() => (view.restart ?? view.update).call(view), PAUSE);
+  }
+
+  /** Show another case, in a view. @param {Texts} texts @param {string} [view] */
+  restate(texts, view = this.state.view) {
+    this.state.window = this.state.at = null;
+    writeAddress(this.state);
+    this.changed(texts, Object.keys(this.state.texts));
+    this.showForms();
+    this.go(view);
+    if (view !== "shake") writeAddress(this.state, {step: true});
+  }
+
+  /** The case of the state is shown. */
+  accepted() {
+    const {state, shown} = this;
+    if (!shown) return;
+    writeAddress(state, {soon: true});
     one("to-block").hidden = !specification.block_page;
-    /** @type {HTMLAnchorElement} */ (one("to-block")).href = `/block#${new URLSearchParams(texts)}`;
-    draw();
-    counted("drawn");
-  } catch (error) {
-    stale = true;
-    throw error;
-  } finally {
-    pause = window.setTimeout(() => afterPause.ask(), PAUSE);
+    one("to-block").href = `/block#${new URLSearchParams(state.texts)}`;
+    this.forms.block.show(state.texts, shown.header.block);
+    document.title = `${TITLES[state.view]}: ${caseName(shown.header)} – rocking explorer`;
   }
-}
 
-/** Another window of the case that is shown. */
-async function look() {
-  const {window: asked, good} = state, {header, arrays} = await payload("/api/window", {...texts, ...ends(state)});
-  if (!page.shown || state.good !== good) return; // another case is on its way, or somebody went back
-  accepted(state, {window: asked});
-  page.shown.header.window = header.window;
-  Object.assign(page.shown.arrays, arrays);
-  draw();
-  chattering.window(header.window);
-  phase.update();
-  cursor.show();
-  counted("drawn");
-}
-
-/** What nobody reads while a slider moves. */
-const afterPause = new Latest(async () => {
-  const {shown} = page;
-  if (!shown || shown === rested) return;
-  const {header} = shown, of = texts;
-  if (state.texts === of) forms.block.show(of, header.block.sides);
-  entitle(header);
-  showNotes(header);
-  showLegend(header);
-  chattering.window(header.window);
-  if (state.view === "response") chattering.draw(shown, of);
-  phase.update();
-  cursor.show();
-  await forms.block.mesh.learn(of);
-  if (!ofOwn(state.view)) {
-    if (state.view !== "compare") showFiles(state, (error) => problem(error, "exports"));
-    const {python, command} = await json("/api/code", of);
-    if (texts === of && !ofOwn(state.view)) showCode("case", python, command);
+  /** @param {any} header of the case */
+  summary(header) {
+    one("verdict").textContent = say(header.verdict);
+    figures(one("figures"), figuresOf(header));
+    const sides = header.block.sides.map((/** @type {any} */ {p, alpha, restitution}, /** @type {number} */ k) => `p = ${short(p)} rad/s, α = ${angle(alpha)}, η = ${short(restitution)}; lifts above ${ofG(header.block.thresholds_g[k])}`);
+    one("derived").textContent = sides[0] === sides[1] ? `${sides[0]}.` : `Right: ${sides[0]}. Left: ${sides[1]}.`;
+    const notes = [...header.block.notes, ...(header.motion?.notes ?? [])];
+    one("notes").hidden = !notes.length;
+    one("notes").replaceChildren(...notes.map((note) => Object.assign(document.createElement("li"), {textContent: note})));
   }
-  rested = shown;
-  if (state.texts !== of) return;
-  counted("rested");
-}, (error) => { if (error) problem(error); }); // that all is well with what is shown says nothing of what is in the fields
 
-/** The block is shown at another time: the plots follow, and where it stands still, so does the cursor.
- * @param {number} time @param {boolean} playing */
-function follow(time, playing) {
-  if (playing) { histories.mark(time); phase.mark(time); } else if (time !== state.at) cursor.take(time);
-}
-
-/** @param {[number, number] | null} chosen */
-function showWindow(chosen) {
-  state.window = chosen;
-  void load.ask();
-}
-
-/** A form has changed the case: new texts stand for all those that they replace. @param {Texts} given @param {string[]} replaced */
-function changed(given, replaced) {
-  if (replaced.includes("motion") && state.texts.motion !== given.motion) state.window = state.at = null;
-  const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
-  state.texts = {...Object.fromEntries(kept), ...given};
-  stale = true;
-  views[state.view]?.update?.();
-  examples.check();
-  void load.ask();
-}
-
-/** Other texts altogether: show them in the forms, too. @param {Texts} given */
-function restate(given) {
-  begin();
-  state.window = state.at = null;
-  showForms(given);
-  changed(given, Object.keys(state.texts));
-}
-
-/** @param {Texts} given */
-function showForms(given) {
-  for (const form of Object.values(forms)) form.show(given);
-}
-
-/** Go back or forward in the browser's history. */
-function revisit() {
-  settle();
-  views[state.view]?.leave?.(); // what is under way belongs to the state that is left
-  const units = String(unitsChosen()), before = JSON.stringify(state.texts);
-  Object.assign(state, readAddress());
-  page.list.read();
-  if (JSON.stringify(state.texts) !== before) page.shown = null;
-  cursor.show();
-  if (String(unitsChosen()) !== units) { location.reload(); return; } // every field has its unit from the start
-  showForms(state.texts);
-  void examples.show();
-  if (state.lecture && !lecture.on) void lecture.enter();
-  else if (lecture.on && !state.lecture) lecture.leave(state.view);
-  else void go(state.view);
-}
-
-/** Whether a view shows something else than a response, with files and code of its own. @param {string} name */
-const ofOwn = (name) => name === "map" || name === "periodic" || name === "assessment";
-
-/** The view of a name, whose code is loaded when it is opened first. @param {string} name */
-async function made(name) {
-  if (name === "response" || views[name]) return views[name];
-  const module = await import(`./${name}.js`).catch(() => { throw new Problem(phrase("page.silent")); });
-  return views[name] ??= new module.View(page, histories);
-}
-
-/** Show another view, once its code is there: what is chosen in it is heard from the start. @param {string} name */
-async function go(name) {
-  const here = turn += 1;
-  try {
-    if (name !== "response" && !views[name]) await made(name);
-  } catch (error) {
-    problem(error);
-    return;
+  /** Show a view. @param {string} name @param {boolean} [step] whether it is an entry of the browser's history */
+  go(name, step = true) {
+    window.clearTimeout(this.waiting);
+    const {state} = this;
+    if (state.view !== name) { this.views[state.view].leave(); writeAddress(state); }
+    state.view = name;
+    if (name === "map" || name === "periodic") this.explored = name;
+    const tab = name === "map" || name === "periodic" ? "explore" : name, mark = (/** @type {Element} */ button, /** @type {boolean} */ on) => (on ? button.setAttribute("aria-current", "page") : button.removeAttribute("aria-current"));
+    for (const button of document.querySelectorAll("[data-tab]")) { mark(button, /** @type {any} */ (button).dataset.tab === tab); one(`view-${/** @type {any} */ (button).dataset.tab}`).hidden = /** @type {any} */ (button).dataset.tab !== tab; }
+    for (const button of document.querySelectorAll("[data-view]")) { mark(button, /** @type {any} */ (button).dataset.view === name); one(`view-${/** @type {any} */ (button).dataset.view}`).hidden = /** @type {any} */ (button).dataset.view !== name; }
+    document.body.dataset.view = name;
+    for (const place of this.problems.keys()) if (place !== "settings") this.problem(null, place);
+    writeAddress(state, {step});
+    this.views[name].enter();
+    this.accepted();
   }
-  if (here !== turn) return; // another view was chosen meanwhile
-  state.view = name;
-  for (const button of document.querySelectorAll("[data-view]")) {
-    if (/** @type {HTMLElement} */ (button).dataset.view === name) {
-      button.setAttribute("aria-current", "page");
-      button.scrollIntoView({block: "nearest", inline: "nearest"});
+
+  /** Say what is wrong, or that nothing is, and mark the field. @param {unknown} error @param {string} place id of the element that contains the field */
+  problem(error, place) {
+    if (error instanceof DOMException && error.name === "AbortError") return;
+    if (error && !(error instanceof Problem)) console.error(error);
+    const sentence = error instanceof Problem ? error.message : error ? `The page has a fault: ${error}` : null, argument = error instanceof Problem ? error.argument : null;
+    this.problems.delete(place);
+    if (sentence) this.problems.set(place, sentence);
+    const marked = (/** @type {string} */ root) => one(root).querySelectorAll("[aria-invalid]");
+    for (const each of [...marked(place), ...(this.problems.size ? [] : marked("settings"))]) { each.removeAttribute("aria-invalid"); each.removeAttribute("aria-errormessage"); }
+    if (argument) {
+      const name = CSS.escape(argument), fields = `[data-argument="${name}"], [data-other="${name}"]`;
+      for (const each of [...one(place).querySelectorAll(fields), ...one("settings").querySelectorAll(fields)]) if (each.checkVisibility()) { each.setAttribute("aria-invalid", "true"); each.setAttribute("aria-errormessage", "problem"); }
     }
-    else button.removeAttribute("aria-current");
+    one("main").classList.toggle("stale", this.problems.has("settings") && Boolean(this.shown));
+    one("old").hidden = !(this.problems.has("settings") && this.shown);
+    one("problem").textContent = [...this.problems.values()].at(-1) ?? "";
+    one("problem").hidden = !this.problems.size;
+    if (!error && place === "settings") this.counted("drawn");
   }
-  const parts = {
-    summary: !ofOwn(name) || name === "assessment", "view-histories": name === "response" || name === "block", "view-response": name === "response",
-    "view-phase": name === "response" || name === "block",
-    "view-block": name === "block", "view-map": name === "map", "view-periodic": name === "periodic",
-    "view-compare": name === "compare", "view-records": name === "records", "view-assessment": name === "assessment",
-  };
-  keepingFocus(() => { for (const [id, shown] of Object.entries(parts)) one(id).hidden = !shown; },
-    () => document.querySelector(`[data-view="${name}"]`));
-  one("figures").hidden = one("at-slider").hidden = name === "block";
-  if (name === "block") histories.size(190, 140);
-  else if (name === "response") histories.size(290, 190);
-  writeNow(state);
-  examples.check();
-  for (const [each, view] of Object.entries(views)) if (each !== name) view.leave?.();
-  for (const place of Object.keys(problems)) if (one(place).closest("[hidden]")) problem(null, place);
-  problem(null, "exports"); // another view has other files
-  views[name]?.enter?.();
-  if (page.shown) {
-    entitle(page.shown.header);
-    draw();
+
+  /** Count for whoever waits for it. @param {string} name */
+  counted(name) { document.body.dataset[name] = String(Number(document.body.dataset[name] ?? 0) + 1); }
+
+  /** On a phone the settings are a sheet over the lower half. @param {boolean} open */
+  sheet(open) {
+    document.body.classList.toggle("sheet", open);
+    one("to-settings").setAttribute("aria-expanded", String(open));
+    one("to-settings").textContent = open ? "Close the settings" : "Block and motion";
   }
-  stale = true;
-  rested = null; // files and code are those of the view
-  void load.ask();
-}
 
-/** Draw what a slider changes. */
-function draw() {
-  if (!page.shown) return;
-  const {header, arrays} = page.shown;
-  tell(one("verdict"), inWords(header.verdict));
-  showFigures(header);
-  const [plus, minus] = header.block.thresholds_g;
-  const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
-    phrase("block.side", {p: short(side.p), alpha: angle(side.alpha), eta: short(side.restitution), threshold: ofG([plus, minus][k])}));
-  const {body} = header.block;
-  tell(one("derived"), right === left ? phrase("block.same", {side: right})
-    : body ? phrase("block.towards", {to: short(body.azimuth, 4), fro: short((body.azimuth + 180) % 360, 4), right, left}) : phrase("block.differing", {right, left}));
-  forms.block.mesh.turn(body);
-  if (state.view === "response" || state.view === "block") {
-    const lines = /** @type {any} */ (arrays);
-    ghosts.next(header, lines);
-    histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
+  /** Files that are chosen, or dropped on the page: one record or mesh is used at once, several are listed. */
+  takeFiles() {
+    const input = one("files");
+    one("open-files").addEventListener("click", () => input.click());
+    input.addEventListener("change", () => { const files = [...(input.files ?? [])]; input.value = ""; void this.take(files); });
+    addEventListener("dragover", (event) => event.preventDefault());
+    addEventListener("drop", (event) => { event.preventDefault(); void this.take([...(event.dataTransfer?.files ?? [])]); });
   }
-  views[state.view]?.draw?.();
-}
 
-/** Name the view and the case, for tabs and bookmarks. @param {any} header */
-function entitle({block, motion}) {
-  const view = document.querySelector("[data-view][aria-current]")?.textContent ?? "";
-  const {study} = specification;
-  const shown = study && state.view === "map" ? phrase("page.study", {name: study.name}) : caseName({block, motion});
-  document.title = phrase("page.case_title", {view, shown});
-}
-
-/** @param {any} header */
-function showLegend({motion, overturned, peak_over_slenderness: peak}) {
-  const vertical = motion?.vertical;
-  const entries = [["line", phrase("legend.rotation")], ["rest", phrase("legend.rest")], ["impact", phrase("legend.impact")], ["uplift", phrase("legend.uplift")],
-    ["ground", phrase("legend.ground")], ["beyond", phrase("legend.beyond")]];
-  if (vertical) entries.push(["up", phrase("legend.vertical", {name: vertical.name, peak: ofG(vertical.pga_g)})]);
-  if (overturned || peak > 0.9) entries.push(["over", phrase("legend.over")]);
-  legend("legend", entries);
-}
-
-/** @param {any} header of the case; null before there is one */
-function showFigures(header) {
-  const rows = header ? [
-    [phrase("figure.peak"), header.overturned ? phrase("figure.overturns") : `${short(header.peak_over_slenderness)} α`,
-      header.overturned ? phrase("figure.overturn_time", {time: fixed(header.overturn_time, 3)}) : phrase("figure.peak_at", {angle: angle(header.peak_rotation), time: fixed(header.peak_time, 2)})],
-    [phrase("figure.rests"), phrase("figure.times", {count: header.rests}),
-      header.rests ? (header.proven === header.rests ? phrase("figure.all_proven") : phrase("figure.proven", {count: header.proven})) : phrase("figure.no_rest")],
-    [phrase("figure.impacts"), fixed(header.impacts, 0), phrase(header.rests ? "figure.until" : "figure.resolved")],
-    [phrase("figure.share"), header.share_at_rest === null ? NONE : phrase("figure.percent", {share: short(100 * header.share_at_rest, 2)}), phrase("figure.strong")],
-  ] : [phrase("figure.peak"), phrase("figure.rests"), phrase("figure.impacts"), phrase("figure.share")].map((name) => [name, NONE, "\u00a0"]);
-  const list = one("figures");
-  if (!list.childNodes.length) list.append(...rows.map(([name]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, ["", make("small")])])));
-  const values = list.getElementsByTagName("dd");
-  rows.forEach(([, value, more], k) => {
-    const [number, small] = values[k].childNodes;
-    tell(number, value);
-    tell(small, more);
-  });
-}
-
-/** @param {any} header */
-function showNotes(header) {
-  const notes = [...header.block.notes, ...(header.motion?.notes ?? [])];
-  one("notes").hidden = !notes.length;
-  one("notes").replaceChildren(...notes.map((/** @type {string} */ note) => make("li", {}, [note])));
-}
-
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => { begin(); void go(/** @type {any} */ (button).dataset.view); });
-for (const button of document.querySelectorAll("[data-zoom]")) button.addEventListener("click", () => void histories.zoom(/** @type {any} */ (button).dataset.zoom));
-for (const button of document.querySelectorAll("button.what[aria-controls]")) {
-  button.addEventListener("click", () => {
-    const words = one(/** @type {string} */ (button.getAttribute("aria-controls")));
-    words.hidden = !words.hidden;
-    button.setAttribute("aria-expanded", String(!words.hidden));
-  });
-}
-one("in-words").addEventListener("toggle", () => chattering.words());
-one("settings").addEventListener("submit", (event) => event.preventDefault());
-makeCopying();
-acceptFiles(async (file, use) => {
-  try {
-    const found = await file();
-    if (use === "mesh") forms.block.take(found);
-    else forms.motion.take(found, use === "vertical");
-    if (state.view === "records") void views.records?.loading.ask();
-    say(use === "mesh" ? phrase("file.is_body", {name: found.name}) : phrase("file.is_record", {name: found.name, format: found.format}));
-    problem(null, "files");
-  } catch (error) {
-    problem(error, "files");
+  /** @param {File[]} files */
+  async take(files) {
+    /** @type {string[]} */
+    const refused = [];
+    /** @type {any[]} */
+    const records = [];
+    for (const file of files) {
+      try {
+        const found = await sendFile(file);
+        if (isMesh(file.name)) this.forms.block.take(found); else records.push(found);
+      } catch (error) { if (error instanceof Problem) refused.push(error.message); else this.problem(error, "settings"); }
+    }
+    if (records.length) await this.reload();
+    announce(`${files.length - refused.length} of ${files.length} files were read.`);
+    if (records.length === 1 && files.length === 1 && this.state.view !== "assess") {
+      const row = this.list.rows().find(({key}) => key === records[0].key);
+      if (row) { if (row.missing.length) this.forms.motion.wait(row); else this.restate(this.list.put(this.state.texts, row)); }
+    } else if (records.length) { if (this.state.view === "assess") this.views.assess.render(); else this.go("assess"); }
+    this.problem(refused.length ? new Problem(refused.join("\n")) : null, "main");
+    this.counted("taken");
   }
-}, async (files) => {
-  await go("records");
-  await views.records?.add(files);
-}, (error) => problem(error, "files"));
-makePrinting(page, (error) => problem(error, "print-head"));
-unitFields(async (name) => {
-  await load.idle; // what was changed before belongs into the address that is loaded again
-  writeAddress(state);
-  window.setTimeout(() => {
-    history.replaceState({focus: name}, ""); // the keys go on there
-    location.reload();
-  }, 250);
-});
-window.addEventListener("popstate", revisit);
-await examples.arrive();
-showForms(state.texts);
-showFigures(null);
-await (state.lecture ? lecture.enter() : go(state.view));
-document.body.inert = false;
-if (keysAt) {
-  one(keysAt)?.focus({preventScroll: true});
-  history.replaceState(null, "");
 }
-document.body.dataset.ready = String(performance.now());
+
+void new Page().start();

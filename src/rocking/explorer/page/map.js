@@ -1,19 +1,22 @@
-// A map of the case over two of its parameters, coarse to fine; or of a study.
+// A map of outcomes over two parameters of the case, from coarse to fine; or of a study.
 
-import {Latest, frames, json, payload} from "./api.js";
-import {choose, isTyped} from "./controls.js";
-import {showExports} from "./exports.js";
-import {goOnAt} from "./focus.js";
-import {MapPicture, labelled, quantityLabel} from "./map-picture.js";
-import {MapReading} from "./map-reading.js";
-import {MapZoom} from "./map-zoom.js";
-import {namesOf, pulseOf, specification} from "./parameters.js";
-import {make, one} from "./words.js";
-import {joined, short, typed} from "./numbers.js";
-import {inWords, phrase} from "./texts.js";
+import {Latest, json, parts, payload} from "./api.js";
+import {Chart} from "./chart.js";
+import {make, one} from "./standalone/dom.js";
+import {specification, writeAddress} from "./state.js";
+import {amongst, joined, short, typed} from "./numbers.js";
+import {known, phrase, say} from "./texts.js";
 import {axisUnit} from "./units.js";
+import {isTyped, optionsOf} from "./forms.js";
+import {csv, offer} from "./save.js";
 
-const ENDS = ["x_from", "x_to", "y_from", "y_to"];
+/** Colours of the first outcome, the final fate and the verdict of a study; orange is overturning, and nothing else. */
+export const OUTCOMES = ["#ffffff", "#c9dcf0", "#7fa3cf", "#1d3f73", "#d4660f", "#b0b0b0"];
+export const MODES = /** @type {[number, string][]} */ ([[-3, "#ffffff"], [-1, "#c9dcf0"], [-2, "#7fa3cf"], [0, "#5e2404"], [1, "#b0480a"], [2, "#f08c2e"], [-4, "#ffc58a"]]);
+export const VERDICTS = /** @type {[number, string][]} */ ([[0, "#c9dcf0"], [1, "#d4660f"], [-1, "#b0b0b0"]]);
+/** Dark to light in even steps of lightness. */
+export const RAMP = ["#0b1a3a", "#14346b", "#1f5190", "#3a74a8", "#5f97b8", "#8bb8c6", "#b9d6d4", "#e6efe4", "#fdf3d6"];
+const OVERTURNS = OUTCOMES[4], UNKNOWN = OUTCOMES[5], ENDS = ["x_from", "x_to", "y_from", "y_to"], REPAINT = 120;
 
 export class View {
   /** @param {any} page */
@@ -22,366 +25,297 @@ export class View {
     this.study = specification.study;
     /** @type {AbortController | null} */
     this.running = null;
-    this.latest = new Latest(() => this.run(), (error) => page.problem(error, "view-map"));
+    this.latest = new Latest(() => (this.study ? this.slice() : this.stream()), (error) => page.problem(error, "view-map"));
     /** @type {any} */
     this.about = null;
-    this.waiting = 0;
-    this.complete = false;
-    /** Ends of the axes where none are chosen. @type {Record<string, string>} */
-    this.usual = {};
-    this.picture = new MapPicture({
-      over: (x, y) => this.reading.over(x, y), chosen: (x, y) => { this.reading.put(x, y); void this.open(); }, zoomed: (box) => this.zoom.into(box),
+    /** @type {Record<string, Float64Array>} */
+    this.values = {};
+    this.key = "";
+    this.mark = [NaN, NaN];
+    /** Ends of the axes before each zoom. @type {import("./api.js").Texts[]} */
+    this.before = [];
+    /** Rectangle of a study that is shown. @type {number[] | null} */
+    this.part = null;
+    this.chart = new Chart(one("map"), {
+      label: "Map of outcomes over two parameters", height: 520, both: true, hover: (x, y) => this.say(x === null ? this.mark : [x, y]),
+      pick: (x, y) => { this.put(x, y); void this.open(); }, zoom: (x, y) => this.into([...x, ...y]),
     });
-    this.reading = new MapReading(this);
-    this.zoom = new MapZoom(this);
-    /** @type {Record<string, HTMLSelectElement>} */
-    this.slices = {};
-    this.form();
+    for (const name of ["quantity", "x", "y", "points", ...ENDS]) one(name).addEventListener("change", () => this.chosen(name));
+    one("map").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => this.press(event));
     one("map-open").addEventListener("click", () => this.open());
-    one("map-sine").addEventListener("click", () => this.sine());
+    one("map-out").addEventListener("click", () => this.out());
+    /** @type {Record<string, any>} */
+    this.slices = {};
+    if (this.study) this.studyFields();
   }
 
-  enter() {
-    if (this.known !== this.page.state.map) this.zoom.forget(); // they were those of another map
-    this.known = this.page.state.map;
-    this.update();
-  }
+  enter() { this.update(); }
 
-  leave() {
-    this.running?.abort();
-    this.reading.leave();
-  }
+  leave() { this.running?.abort(); }
 
-  /** @param {string} name @returns {HTMLSelectElement} */
-  select(name) { return one(`map-${name}`); }
-
-  form() {
-    for (const name of ["quantity", "x", "y", "points"]) this.select(name).addEventListener("change", () => this.chosen(name));
-    for (const name of ["x-from", "x-to", "y-from", "y-to"]) one(`map-${name}`).addEventListener("change", () => this.end(name.replace("-", "_")));
-    if (!this.study) return;
-    const tools = one("study-tools");
-    tools.hidden = false;
-    /** @param {string} name @param {string} label @param {string[]} values */
-    const slice = (name, label, values) => {
-      if (values.length < 2) return;
-      const [scale, unit] = axisUnit(this.axis(name.replace(/^fix_|_index$/g, ""))?.unit);
-      const select = /** @type {HTMLSelectElement} */ (make("select", {on: {change: () => { this.page.state.map[name] = select.value; this.update(); }}},
-        values.map((value, k) => make("option", {value: name.startsWith("fix_") ? value : String(k)}, [value.trim() && Number.isFinite(Number(value)) ? joined(short(scale * Number(value), scale === 1 ? 12 : 6), unit) : value]))));
-      this.slices[name] = select;
-      tools.append(make("label", {}, [`${label} `, select]));
-    };
-    tools.append(make("strong", {}, [phrase("map.study", {name: this.study.name})]), make("span", {className: "cursor"}, [this.study.status]));
-    slice("motion_index", phrase("map.motion"), this.study.motions);
-    slice("polarity_index", phrase("map.polarity"), this.study.polarities);
-    slice("scale_index", phrase("map.scale"), this.study.scales.map(String));
-    for (const [name, values] of Object.entries(this.study.fixed)) slice(`fix_${name}`, name, /** @type {number[]} */ (values).map(String));
-    for (const name of ["x-from", "x-to", "y-from", "y-to", "points"]) /** @type {HTMLElement} */ (one(`map-${name}`).parentElement).hidden = true;
-  }
-
-  /** @param {string} name */
-  chosen(name) {
-    const {map} = this.page.state;
-    if (name === "x" || name === "y") this.turn(name, this.select(name).value); else map[name] = this.select(name).value;
-    if (name === "quantity" && this.about && !this.study) {
-      this.fill();
-      if (JSON.stringify(this.asked()) === this.drawn) {
-        this.page.remember({map});
-        this.recolour();
-        this.offer();
-        return;
-      }
-    }
-    this.update();
-  }
-
-  /** What is asked of the server: all but the quantity, since it sends all of them.
-   * @returns {Record<string, string>} */
-  asked() {
-    const {map} = this.page.state, {x, y, points} = map;
-    const ends = Object.fromEntries(ENDS.map((end) => [end, map[end] || this.usual[end]]));
-    return {...this.page.state.texts, x, y, ...ends, points: points ?? "200"};
-  }
-
-  /** An end of an axis was typed. @param {string} end */
-  end(end) {
-    this.page.state.map[end] = this.asSent(end, typed(/** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value));
-    this.update();
-  }
-
-  /** What the server says of an axis. @param {string} name */
-  axis(name) { return (this.study ? this.study.axes : specification.axes).find((/** @type {any} */ each) => each.name === name); }
-
-  /** What one of the axis's own unit is in that of the page. @param {string} end of an axis */
-  scale(end) { return axisUnit(this.axis(this.page.state.map[end[0]])?.unit)[0]; }
-
-  /** An end as the address has it, in the axis's own unit, of one in that of the page. @param {string} end @param {string} text */
-  asSent(end, text) { return scaled(text, 1 / this.scale(end), 12); }
-
-  /** Map over another axis, whose ends are its own. @param {string} which @param {string} name */
-  turn(which, name) {
-    const {map} = this.page.state;
-    if (map[which]) for (const end of ["from", "to"]) delete map[`${which}_${end}`];
-    map[which] = name;
-    this.zoom.forget();
-  }
-
-  /** The case, or what is mapped, has changed. */
   update() {
     this.running?.abort();
-    this.reading.leave();
     void this.latest.ask();
   }
 
-  async run() {
-    this.running = new AbortController();
-    const {signal} = this.running;
-    await (this.study ? this.slice(signal) : this.stream(signal));
+  /** Fields that fix what a slice of a study does not vary. */
+  studyFields() {
+    const {motions, polarities, scales, fixed} = this.study, all = {motion_index: motions, polarity_index: polarities, scale_index: scales, ...Object.fromEntries(Object.entries(fixed).map(([name, values]) => [`fix_${name}`, values]))};
+    for (const [name, values] of Object.entries(all)) {
+      if (values.length < 2) continue;
+      const select = make("select", {"data-argument": name, on: {change: () => { this.page.state.map[name] = select.value; this.update(); }}}, optionsOf(values.map((/** @type {any} */ value, /** @type {number} */ k) => [name.startsWith("fix_") ? String(value) : String(k), typeof value === "number" ? short(value, 6) : value])));
+      this.slices[name] = select;
+      one("map-tools").append(make("label", {}, [`${name.replace(/^fix_|_index$/g, "")} `, select]));
+    }
+    for (const name of [...ENDS, "points"]) one(name).parentElement.hidden = true;
+    one("map-tools").prepend(make("strong", {}, [`Study ${this.study.name} `]), make("span", {class: "soft"}, [this.study.status]));
   }
 
-  /** Axes that the case has, and those that are chosen. */
-  axes() {
-    const {texts, map} = this.page.state;
-    if (this.study) {
-      const varied = this.study.axes.map((/** @type {any} */ each) => each.name);
-      if (!varied.includes(map.x)) this.turn("x", varied[0]);
-      if (!varied.includes(map.y) || map.y === map.x) this.turn("y", varied.find((/** @type {string} */ each) => each !== map.x));
-      return {names: varied, right: varied};
-    }
-    const {family, parts} = pulseOf(texts.motion ?? "");
-    const pulse = Object.hasOwn(specification.pulses, family);
-    const frequency = pulse && "frequency" in parts;
-    const names = specification.axes.map((/** @type {any} */ each) => each.name).filter((/** @type {string} */ name) => name !== "omega" || frequency);
-    const right = names.filter((/** @type {string} */ name) => name !== "a" && name !== "pga");
-    if (!names.includes(map.y)) this.turn("y", pulse ? "a" : "pga");
-    if (!right.includes(map.x)) this.turn("x", frequency ? "omega" : "p");
-    one("map-sine").hidden = family === "sine";
-    return {names, right};
+  /** A field was changed. @param {string} name */
+  chosen(name) {
+    const {map} = this.page.state, text = typed(one(name).value);
+    if (ENDS.includes(name) && text) map[name] = String(Number((Number(text) / this.size(name[0])).toPrecision(12))); else map[name] = text;
+    if (ENDS.includes(name) && !Number.isFinite(Number(map[name]))) map[name] = text; // for the server to refuse
+    if (name === "x" || name === "y") { for (const end of ["from", "to"]) delete map[`${name}_${end}`]; this.before = []; this.part = null; }
+    if (name === "quantity" && !this.study && this.about) { writeAddress(this.page.state); this.paint(); this.files(); return; }
+    this.update();
   }
 
-  fill() {
-    const {map} = this.page.state;
-    const {names, right} = this.axes();
-    for (const [name, select] of Object.entries(this.slices)) {
-      select.value = map[name] ?? select.options[0].value;
-      /** @type {HTMLElement} */ (select.parentElement).hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
-    }
-    const label = (/** @type {string} */ name) => labelled(this.axis(name));
-    for (const [name, values] of Object.entries({x: right, y: names})) {
-      this.select(name).replaceChildren(...values.map((/** @type {string} */ value) => make("option", {value}, [label(value)])));
-      this.select(name).value = map[name];
-    }
-    const quantities = this.study ? this.study.quantities : specification.quantities;
-    this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each}, [quantityLabel(each)])));
-    if (!quantities.includes(map.quantity)) map.quantity = this.first(quantities);
-    this.select("quantity").value = map.quantity;
-    choose(this.select("points"), map.points ?? "200");
-    if (this.study) return;
+  /** Size of the axis's own unit in that of the page. @param {string} which */
+  size(which) { return axisUnit(this.about?.[which].own ?? this.about?.[which].unit)[0]; }
+
+  get quantity() {
+    const {quantity} = this.page.state.map, all = this.study ? this.study.quantities : specification.quantities;
+    return all.includes(quantity) ? quantity : this.study || this.page.state.texts.motion?.startsWith("sine:") ? all[0] : "mode";
+  }
+
+  /** Show what the map has. @param {string[]} axes @param {any[]} all */
+  fill(axes, all) {
+    const label = (/** @type {string} */ name) => { const {label: words, unit} = all.find((each) => each.name === name); return unit ? `${say(words)} (${axisUnit(unit)[1]})` : say(words); };
+    one("quantity").replaceChildren(...optionsOf((this.study ? this.study.quantities : specification.quantities).map((/** @type {string} */ name) => [name, phrase(`quantity.${name}`)])));
+    one("quantity").value = this.quantity;
     for (const which of ["x", "y"]) {
-      const axis = this.axis(map[which]);
-      const wide = map.quantity === "peak" || map.quantity === "mode";
+      const {name, values} = this.about[which];
+      one(which).replaceChildren(...optionsOf(axes.filter((each) => this.study || which === "y" || !["a", "pga"].includes(each)).map((each) => [each, label(each)])));
+      one(which).value = name;
       for (const [k, end] of ["from", "to"].entries()) {
-        const field = /** @type {HTMLInputElement} */ (one(`map-${which}-${end}`)), name = `${which}_${end}`;
-        this.usual[name] = String((wide ? axis.wide : axis.close)[k]);
-        if (!isTyped(field)) field.value = scaled(map[name] || this.usual[name], this.scale(name), 6);
+        const field = one(`${which}_${end}`);
+        if (!isTyped(field)) field.value = String(Number(values[k ? values.length - 1 : 0].toPrecision(6)));
       }
     }
+    one("map-out").disabled = !this.before.length && (Boolean(this.study) || !ENDS.some((end) => this.page.state.map[end]));
   }
 
-  /** The quantity with which a map begins: under a pulse how the first rocking ends; a record goes on, and what counts is the end.
-   * @param {string[]} quantities @returns {string} */
-  first(quantities) {
-    const {family} = pulseOf(this.page.state.texts.motion ?? "");
-    return this.study || Object.hasOwn(specification.pulses, family) ? quantities[0] : "mode";
+  /** An axis in the unit of the page. @param {any} axis */
+  shown(axis) {
+    const [scale, unit] = axisUnit(axis.unit);
+    return {...axis, own: axis.unit, scale, unit, values: axis.values.map((/** @type {number} */ each) => each * scale)};
   }
 
-  /** @param {AbortSignal} signal */
-  async stream(signal) {
-    this.fill();
-    const {map} = this.page.state, asked = this.asked();
-    if (this.complete && this.drawn === JSON.stringify(asked)) {
-      this.page.remember({map});
-      this.recolour();
-      this.offer();
-      return;
-    }
-    const started = performance.now();
-    const body = document.body.dataset;
-    this.drawn = JSON.stringify(asked);
-    body.map = "running";
-    let done = 0;
-    this.complete = false;
-    window.clearTimeout(this.waiting); // that of a map that was given up may be long
-    this.waiting = 0;
-    try {
-      for await (const frame of frames("/api/map", asked, signal)) {
-        if (!this.about || done === 0) {
-          this.about = {...inUnits(JSON.parse(new TextDecoder().decode(frame))), asked};
-          const count = this.about.shape[0] * this.about.shape[1];
-          this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
-          this.covered = new Uint8Array(count).fill(255);
-          this.page.remember({map});
-          this.drawAxes();
-          this.offer();
-          done = 1;
-          continue;
-        }
-        done += this.take(frame);
-        const [rows, columns] = this.about.shape;
-        /** @type {HTMLProgressElement} */ (one("map-progress")).value = done / (rows * columns);
-        this.recolourSoon(started);
-        if (!body.first || body.firstOf !== String(started)) { body.first = String(performance.now() - started); body.firstOf = String(started); }
+  async stream() {
+    this.running = new AbortController();
+    const {signal} = this.running, {texts, map} = this.page.state, {quantity: _quantity, ...asked} = map, key = JSON.stringify([texts, asked]);
+    if (key === this.key) { this.paint(); this.files(); return; }
+    this.key = "";
+    document.body.dataset.map = "running";
+    let covered = new Uint8Array(0), done = 0, painted = 0;
+    for await (const {header, arrays} of parts("/api/map", {...texts, ...asked}, signal)) {
+      if (header.shape) {
+        const [rows, columns] = header.shape;
+        this.about = {...header, x: this.shown(header.x), y: this.shown(header.y)};
+        this.values = Object.fromEntries(header.quantities.map((/** @type {string} */ name) => [name, new Float64Array(rows * columns).fill(NaN)]));
+        covered = new Uint8Array(rows * columns).fill(255);
+        const at = header.case.map((/** @type {number} */ each, /** @type {number} */ k) => each * this.about[k ? "y" : "x"].scale);
+        this.case = at;
+        this.mark = at;
+        one("map-notes").textContent = header.notes.map(say).join(" ");
+        writeAddress(this.page.state);
+        this.fill(header.axes, specification.axes);
+        this.files();
+        continue;
       }
-    } catch (error) {
-      this.drawn = "";
-      throw error;
+      done += this.take(header.stride, arrays, covered);
+      one("map-progress").value = done / covered.length;
+      if (performance.now() - painted > REPAINT) { this.paint(); painted = performance.now(); }
     }
-    this.complete = true;
-    this.recolour();
-    this.offer();
-    body.map = "complete";
-    body.mapTook = String(performance.now() - started);
+    this.key = key;
+    this.paint();
+    this.say(this.mark);
+    this.files();
+    document.body.dataset.map = "complete";
   }
 
-  /** Put a part where it belongs. A coarse point covers those that are still to come, but none that came before it: two
-   * threads compute, and the last part of a level may come after the first of the next. @param {Uint8Array} frame */
-  take(frame) {
-    const view = new DataView(frame.buffer, frame.byteOffset, frame.byteLength);
-    const stride = view.getUint32(0, true), count = view.getUint32(4, true);
+  /** Put points where they belong. A coarse point covers finer ones that are still to come. @param {number} stride @param {Record<string, Float64Array>} arrays @param {Uint8Array} covered */
+  take(stride, {points, ...found}, covered) {
     const [rows, columns] = this.about.shape;
-    const covered = /** @type {Uint8Array} */ (this.covered), all = /** @type {Float32Array[]} */ (this.values);
-    for (let k = 0; k < count; k += 1) {
-      const index = view.getUint32(8 + 4 * k, true);
+    points.forEach((index, k) => {
       const row = Math.floor(index / columns), column = index % columns;
-      const point = all.map((_, q) => view.getFloat32(8 + 4 * count + 4 * (q * count + k), true));
       for (let r = row; r < Math.min(rows, row + stride); r += 1) for (let c = column; c < Math.min(columns, column + stride); c += 1) {
         const at = r * columns + c;
         if (covered[at] < stride) continue;
         covered[at] = stride;
-        point.forEach((value, q) => { all[q][at] = value; });
+        for (const name of Object.keys(found)) this.values[name][at] = found[name][k];
       }
-    }
-    return count;
-  }
-
-  /** Recolour soon, once: at first at every change, later after a part of the time that the map has taken so far, so that
-   * painting takes little from computing, which is done on the same cores. @param {number} started */
-  recolourSoon(started) {
-    if (this.waiting) return;
-    const wait = Math.max(90, 0.2 * (performance.now() - started));
-    this.waiting = window.setTimeout(() => { this.waiting = 0; if (!this.complete) this.recolour(); }, wait);
-  }
-
-  /** What can be saved: the picture, the numbers, and code that computes them again. */
-  offer() {
-    const {python, command = null} = this.about;
-    const name = this.study ? "rocking-study" : "rocking-map";
-    const {quantity} = this.page.state.map;
-    showExports("map", this.study ? python : python[quantity], command, !this.complete ? [] : [
-      [`${name}.svg`, phrase("save.svg"), () => this.picture.file("svg")], [`${name}.png`, phrase("save.png"), () => this.picture.file("png")],
-      [`${name}.csv`, phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
-    ], (error) => this.page.problem(error, "exports"));
-  }
-
-  /** Every point of the map with all that is known of it, in the units of the server. */
-  table() {
-    const {quantities, x: {own: x}, y: {own: y}} = this.about;
-    const head = [x, y].map((axis) => (axis.unit ? `${axis.name}_${axis.unit.replace("°", "deg").replace(/\W+/g, "_")}` : axis.name));
-    const rows = y.values.flatMap((/** @type {number} */ up, /** @type {number} */ row) => x.values.map((/** @type {number} */ right, /** @type {number} */ column) => [
-      right, up, ...(this.values ?? []).map((/** @type {Float32Array} */ all) => Number(all[row * x.values.length + column].toPrecision(7))),
-    ].map((each) => (Number.isNaN(each) ? "" : each === Infinity ? "inf" : String(each))).join(",")));
-    return [...this.meanings(quantities), [...head, ...quantities].join(","), ...rows, ""].join("\n");
-  }
-
-  /** What the codes in a table stand for, as comments at its head. @param {string[]} quantities */
-  meanings(quantities) {
-    /** @type {Record<string, string>} */
-    const measured = {rest: "s from uplift to rest, empty where it never rests", peak: "rotation over slenderness, inf where it overturns"};
-    return quantities.flatMap((name) => {
-      const kinds = this.picture.kinds(name)?.map(([value, text]) => (name === "mode" && value === 2 ? "n overturns after n impacts" : `${value} ${text}`));
-      const words = kinds ? kinds.join("; ") : measured[name];
-      return words ? [`# ${name}: ${words}`] : [];
     });
+    return points.length;
   }
 
-  drawAxes() {
-    this.reading.leave(); // what is pointed at is a point of the map before
-    this.picture.axes(this.about);
-    const notes = (this.about.notes ?? []).map(inWords).join(" ");
-    Object.assign(one("map-notes"), {textContent: notes, hidden: !notes});
-    this.reading.keep();
-    if (this.study) this.zoom.forget();
-    this.zoom.offer();
-  }
-
-  recolour() {
-    const {quantity} = this.page.state.map;
-    if (!this.about || !this.values) return;
-    this.picture.paint(this.values, quantity, {complete: this.complete, label: this.select("quantity").selectedOptions[0].text});
-    this.reading.say();
-  }
-
-  /** @param {AbortSignal} signal */
-  async slice(signal) {
-    this.fill();
-    const asked = {...this.page.state.map};
-    const {header, arrays} = await payload("/api/study", asked, {signal});
-    signal.throwIfAborted();
-    this.page.remember({map: this.page.state.map});
-    this.about = {...inUnits({...header, quantities: [header.quantity], curves: {}}), asked};
-    this.values = [Float32Array.from(arrays.values)];
-    this.drawAxes();
-    this.complete = true;
-    this.recolour();
-    this.offer();
-    /** @type {HTMLProgressElement} */ (one("map-progress")).value = 1;
+  /** A slice of a study. */
+  async slice() {
+    const {map} = this.page.state, names = this.study.axes.map((/** @type {any} */ each) => each.name);
+    if (!names.includes(map.x)) map.x = names[0];
+    if (!names.includes(map.y) || map.y === map.x) map.y = names.find((/** @type {string} */ each) => each !== map.x);
+    const {header, arrays} = await payload("/api/study", {...map, quantity: this.quantity});
+    this.about = {...header, x: this.shown(header.x), y: this.shown(header.y), curves: {}};
+    this.values = {[header.quantity]: arrays.values};
+    for (const [name, select] of Object.entries(this.slices)) {
+      select.value = map[name] ?? select.options[0].value;
+      select.parentElement.hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
+    }
+    this.fill(names, this.study.axes);
+    writeAddress(this.page.state);
+    this.paint();
+    this.files();
     document.body.dataset.map = "complete";
   }
 
-  /** What is asked of the server about a point of the map that is drawn. @param {string} what @param {number[]} at to the right and upwards @returns {[string, Record<string, string>]} */
-  request(what, [x, y]) {
-    const own = (/** @type {any} */ axis, /** @type {number} */ value) => String(axis.own.values[axis.values.indexOf(value)]);
-    const at = {at_x: own(this.about.x, x), at_y: own(this.about.y, y)};
-    return [this.study ? `/api/study/${what}` : `/api/map/${what}`, {...this.about.asked, ...at}];
+  /** Colours of the points, and what they mean. @returns {{colours: (string | null)[], legend: [string, string][]}} */
+  colours() {
+    const {quantity} = this, values = this.values[quantity] ?? new Float64Array(0), kinds = this.kinds(quantity);
+    if (kinds) {
+      const counts = new Map(), last = quantity === "mode" ? 2 : Infinity, of = (/** @type {number} */ each) => Math.min(each, last);
+      for (const each of values) counts.set(of(each), (counts.get(of(each)) ?? 0) + 1);
+      const inks = new Map(kinds.map(([value, , ink]) => [value, ink])), share = (/** @type {number} */ value) => short((100 * (counts.get(value) ?? 0)) / values.length, 2);
+      return {colours: Array.from(values, (each) => inks.get(of(each)) ?? null), legend: kinds.filter(([value]) => counts.has(value)).map(([value, words, ink]) => [ink, `${words}, ${share(value)} %`])};
+    }
+    const finite = values.filter(Number.isFinite), [low, high] = [quantity === "peak" ? 0 : Math.min(...finite), quantity === "peak" ? 1 : Math.max(...finite)];
+    const colours = Array.from(values, (each) => (each === Infinity ? OVERTURNS : Number.isNaN(each) ? UNKNOWN : RAMP[Math.max(0, Math.min(8, Math.floor((9 * (each - low)) / (high - low || 1))))]));
+    const ends = RAMP.map((ink, k) => /** @type {[string, string]} */ ([ink, `${short(low + (k * (high - low)) / 9, 2)} to ${short(low + ((k + 1) * (high - low)) / 9, 2)}`]));
+    return {colours, legend: [...ends, .../** @type {[string, string][]} */ (quantity === "peak" ? [[OVERTURNS, "overturns"]] : []), .../** @type {[string, string][]} */ (finite.length < values.length && quantity !== "peak" ? [[UNKNOWN, "none"]] : [])]};
+  }
+
+  /** Outcomes of a quantity, their texts and colours. @param {string} quantity @returns {[number, string, string][] | null} */
+  kinds(quantity) {
+    if (quantity === "outcome") return this.about.outcomes.map((/** @type {string} */ name, /** @type {number} */ k) => [k, phrase(`outcome.${name}`), OUTCOMES[k]]);
+    const listed = {mode: MODES, overturned: VERDICTS}[quantity];
+    return listed ? listed.map(([value, ink]) => [value, phrase(`${quantity}.${value}`), ink]) : null;
+  }
+
+  /** Ends of an axis, half a cell beyond its values. @param {number[]} values */
+  ends(values) { const last = values.length - 1; return [values[0] - 0.5 * (values[1] - values[0]), values[last] + 0.5 * (values[last] - values[last - 1])]; }
+
+  paint() {
+    if (!this.about || !this.values[this.quantity]) return;
+    const {x, y, curves} = this.about, {colours, legend} = this.colours(), [left, right] = this.ends(x.values), [low, high] = this.ends(y.values);
+    const [across, up] = [x, y].map(({values}) => cells(values)), canvas = make("canvas", {width: across.length, height: up.length}), pen = canvas.getContext("2d"), image = pen.createImageData(across.length, up.length);
+    up.forEach((row, r) => across.forEach((column, c) => {
+      const ink = colours[row * x.values.length + column];
+      if (ink) image.data.set([1, 3, 5].map((at) => parseInt(ink.slice(at, at + 2), 16)).concat(255), 4 * ((up.length - 1 - r) * across.length + c));
+    }));
+    pen.putImageData(image, 0, 0);
+    const box = this.part ?? [left, right, low, high], label = (/** @type {any} */ axis) => (axis.unit ? `${say(axis.label)} (${axis.unit})` : say(axis.label));
+    const layers = [{class: "pixels", picture: canvas.toDataURL(), box: [left, right, low, high]}], mark = (/** @type {string} */ name, /** @type {number[]} */ [a, b]) => [{class: `dot ${name} around`, dots: [[a], [b]]}, {class: `dot ${name}`, dots: [[a], [b]]}];
+    const lines = Object.entries(curves ?? {}).flatMap(([name, values]) => ["curve around", `curve ${name}`].map((look) => ({class: look, line: [x.values, values.map((/** @type {number | null} */ each) => each ?? NaN)]})));
+    this.chart.show({
+      x: {low: box[0], high: box[1], label: label(x)}, y: {low: box[2], high: box[3], label: label(y)}, layers: [...layers, ...lines, ...mark("mark", this.mark), ...(this.case ? mark("case", this.case) : [])],
+      legend: [...legend.map(([ink, words]) => ["swatch", "area", words, ink]), ...(this.case ? [["dot case", "dot", "this case"]] : []),
+        ...Object.keys(curves ?? {}).map((name) => ([`curve ${name}`, "line", name === "exact" ? "exact critical amplitude (slender block)" : "critical amplitude, Eq. 76"]))],
+    });
+  }
+
+  /** Row and column of the value nearest to a place. @param {number[]} at */
+  place([x, y]) {
+    const nearest = (/** @type {number[]} */ values, /** @type {number} */ wanted) => values.reduce((best, each, k) => (Math.abs(each - wanted) < Math.abs(values[best] - wanted) ? k : best), 0);
+    return [nearest(this.about.y.values, y), nearest(this.about.x.values, x)];
+  }
+
+  /** Say what is at a place. @param {number[]} at */
+  say(at) {
+    if (!this.about || !at.every(Number.isFinite)) return;
+    const [row, column] = this.place(at), {x, y} = this.about, index = row * x.values.length + column;
+    const coordinate = (/** @type {any} */ axis, /** @type {number} */ k) => `${say(axis.label)} = ${joined(amongst(axis.values, k), axis.unit)}${axis.names ? ` (${axis.names[k]})` : ""}`;
+    const said = Object.entries(this.values).map(([name, all]) => this.word(name, all[index])).filter(Boolean);
+    one("map-at").textContent = `${coordinate(x, column)}, ${coordinate(y, row)}: ${said.join("; ") || "not computed yet"}.`;
+  }
+
+  /** @param {string} name @param {number} value */
+  word(name, value) {
+    if (Number.isNaN(value)) return "";
+    if (name === "mode" && value > 1) return `overturns after ${short(value)} impacts`;
+    const kind = this.kinds(name)?.find(([each]) => each === value)?.[1];
+    if (kind) return name === "outcome" ? `first rocking: ${kind}` : kind;
+    if (name === "rest") return `rests ${short(value)} s after uplift`;
+    if (name === "peak") return value === Infinity ? "" : `peak ${short(value)} α`;
+    return `${known(`quantity.${name}`) ? phrase(`quantity.${name}`) : name} ${name === "peak_rotation" ? `${short(value)} rad` : short(value)}`;
+  }
+
+  /** Move the mark. @param {number} x @param {number} y */
+  put(x, y) {
+    const [row, column] = this.place([x, y]);
+    this.mark = [this.about.x.values[column], this.about.y.values[row]];
+    this.paint();
+    this.say(this.mark);
   }
 
   /** Open the case at the mark. */
   async open() {
-    if (!this.about) return;
-    const {texts, view} = this.page.state;
+    if (!this.about || !this.mark.every(Number.isFinite)) return;
+    const {texts, map} = this.page.state, {quantity: _quantity, ...asked} = map, [x, y] = [this.mark[0] / this.about.x.scale, this.mark[1] / this.about.y.scale];
     try {
-      const found = await json(...this.request("point", this.reading.mark));
-      if (this.page.state.texts !== texts || this.page.state.view !== view) return; // something else was chosen meanwhile
-      this.page.state.view = "response";
-      this.page.restate(found);
-      await this.page.go("response");
-      goOnAt(one("histories"));
-    } catch (error) {
-      this.page.problem(error, "view-map");
-    }
+      const found = await json(this.study ? "/api/study/point" : "/api/map/point", {...(this.study ? {} : texts), ...asked, at_x: String(x), at_y: String(y)});
+      this.page.restate(found, "shake");
+    } catch (error) { this.page.problem(error, "view-map"); }
   }
 
-  /** The same block under a sine just below the critical amplitude. */
-  sine() {
-    const {shown} = this.page;
-    const [threshold] = shown?.header.block.thresholds_g ?? [0.2];
-    const p = shown?.header.block.sides[0].p ?? 3.6;
-    const {texts} = this.page.state;
-    const block = Object.fromEntries([...namesOf("block"), "model", "gravity"].filter((name) => texts[name]).map((name) => [name, texts[name]]));
-    const motion = `sine:amplitude=${(1.03 * threshold).toPrecision(6)}g,frequency=${(p / Math.PI).toPrecision(6)},cycles=2.5`;
-    this.page.state.map = {};
-    this.zoom.forget();
-    this.page.restate({...block, motion});
+  /** Zoom into a rectangle. @param {number[]} box */
+  into(box) {
+    const {map} = this.page.state;
+    if (this.study) { this.before.push(/** @type {any} */ (this.part)); this.part = box; this.paint(); this.fill(this.study.axes.map((/** @type {any} */ each) => each.name), this.study.axes); return; }
+    this.before.push(Object.fromEntries(ENDS.map((end) => [end, map[end]])));
+    ENDS.forEach((end, k) => {
+      const axis = this.about[end[0]], all = axis.values, width = box[k - (k % 2) + 1] - box[k - (k % 2)], kept = Math.min(Math.max(box[k], all[0]), all[all.length - 1]);
+      map[end] = String(Number((Number(kept.toFixed(Math.max(0, 3 - Math.floor(Math.log10(width))))) / axis.scale).toPrecision(12)));
+    });
+    this.update();
+  }
+
+  out() {
+    if (this.study) { this.part = /** @type {any} */ (this.before.pop() ?? null); this.paint(); this.fill(this.study.axes.map((/** @type {any} */ each) => each.name), this.study.axes); return; }
+    const {map} = this.page.state, ends = this.before.pop() ?? {};
+    for (const end of ENDS) if (ends[end]) map[end] = ends[end]; else delete map[end];
+    this.update();
+  }
+
+  /** @param {KeyboardEvent} event */
+  press(event) {
+    if (!this.about || event.ctrlKey || event.metaKey || event.altKey) return;
+    const way = {ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [1, 0], ArrowDown: [-1, 0]}[event.key], {x, y} = this.about, [left, right, low, high] = [...this.ends(x.values), ...this.ends(y.values)];
+    if (way) {
+      const [row, column] = this.place(this.mark.every(Number.isFinite) ? this.mark : [0.5 * (left + right), 0.5 * (low + high)]), step = event.shiftKey ? 10 : 1, clip = (/** @type {number} */ k, /** @type {number} */ size) => Math.min(size - 1, Math.max(0, k));
+      this.put(x.values[clip(column + step * way[1], x.values.length)], y.values[clip(row + step * way[0], y.values.length)]);
+    } else if (event.key === "Enter") void this.open();
+    else if (["+", "="].includes(event.key)) this.into([this.mark[0] - 0.25 * (right - left), this.mark[0] + 0.25 * (right - left), this.mark[1] - 0.25 * (high - low), this.mark[1] + 0.25 * (high - low)]);
+    else if (event.key === "-" && !one("map-out").disabled) this.out();
+    else return;
+    event.preventDefault();
+  }
+
+  /** Files of the map, and the code that computes it. */
+  files() {
+    const {python, command = null, x, y} = this.about, {quantity} = this, name = `rocking-map-${quantity}-${x.name}-${y.name}`;
+    const table = () => csv([[x.name, y.name, ...Object.keys(this.values)], ...y.values.flatMap((/** @type {number} */ up, /** @type {number} */ row) => x.values.map((/** @type {number} */ right, /** @type {number} */ column) => [right / x.scale, up / y.scale, ...Object.values(this.values).map((all) => all[row * x.values.length + column])]))],
+      Object.keys(this.values).flatMap((each) => { const kinds = this.kinds(each); return kinds ? [`${each}: ${kinds.map(([value, words]) => `${value} ${words}`).join("; ")}`] : []; }).concat([`units of ${x.name} and ${y.name}: ${x.own || "1"}, ${y.own || "1"}; peak is infinite where the block overturns; rest is empty where it never rests`]));
+    offer([[`${name}.svg`, "Figure, SVG", () => this.chart.file("svg")], [`${name}.png`, "Figure, PNG", () => this.chart.file("png")], [`${name}.csv`, "Numbers, CSV", async () => table()]], this.study ? python : python[quantity], command, this.page);
   }
 }
 
-/** A number times a factor, to so many digits; what is none, or stays as it is, is the same text. @param {string} text @param {number} factor @param {number} digits */
-const scaled = (text, factor, digits) => (factor === 1 || !text || Number.isNaN(Number(text)) ? text : String(Number((factor * Number(text)).toPrecision(digits))));
-
-/** What a map is said to be, with its axes in the units of the page; `own` is what the server says of each. @param {any} about */
-function inUnits(about) {
-  const [x, y] = [about.x, about.y].map((own) => {
-    const [scale, unit] = axisUnit(own.unit);
-    return {...own, unit, values: own.values.map((/** @type {number} */ each) => scale * each), own};
+/** Indices of the values for the pixels of a picture: one each if they are even, else in proportion. @param {number[]} values @returns {number[]} */
+function cells(values) {
+  const count = values.length - 1, step = (values[count] - values[0]) / count;
+  if (values.every((each, k) => Math.abs(each - values[0] - k * step) < 1e-3 * step)) return values.map((_, k) => k);
+  const low = values[0] - 0.5 * (values[1] - values[0]), high = values[count] + 0.5 * (values[count] - values[count - 1]), pixels = 800;
+  return Array.from({length: pixels}, (_, k) => {
+    const at = low + ((k + 0.5) / pixels) * (high - low);
+    return values.reduce((best, each, j) => (Math.abs(each - at) < Math.abs(values[best] - at) ? j : best), 0);
   });
-  return {...about, x, y};
 }

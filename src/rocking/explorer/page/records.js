@@ -1,196 +1,107 @@
-// The list of records: searched, sorted, ticked; a click makes one the case's motion; files that leave something out are asked about.
+// The list of records, shipped and opened: what the server knows of each, which are ticked, and what was answered about files.
 
-import {Latest, Problem, json} from "./api.js";
-import {remaking} from "./focus.js";
-import {idOf} from "./list.js";
-import {sendFile} from "./upload.js";
-import {acceleration, velocity} from "./units.js";
-import {counted, make, one, say} from "./words.js";
+import {Problem, json} from "./api.js";
+import {make} from "./standalone/dom.js";
+import {namesOf, specification} from "./state.js";
 import {short} from "./numbers.js";
-import {inWords, phrase} from "./texts.js";
+import {acceleration} from "./units.js";
 
-/** @typedef {import("./list.js").Row} Row */
-/** @typedef {import("./list.js").Group} Group */
+/** @typedef {import("./api.js").Texts} Texts */
+/** @typedef {{texts: Texts, title: string, label: string, is_up: boolean, measures: Record<string, number> | null, key: string, file: string, missing: string[], choices: Record<string, [string, any][]>, vertical: string}} Row */
 
-/** What a heading sorts by. @type {[string, (row: Row) => number | string][]} */
-const COLUMNS = [
-  [phrase("records.record"), (row) => row.title], [phrase("records.pga"), (row) => row.measures?.pga ?? -1], [phrase("records.pgv"), (row) => row.measures?.pgv ?? -1],
-  [phrase("records.significant"), (row) => row.measures?.significant ?? -1], [phrase("records.length"), (row) => row.measures?.duration ?? -1],
-];
+const LARGEST = 16 * 2 ** 20;
+/** Names of the texts of a motion that belong to its record. */
+const OWN = ["motion", "channel", "vertical", "dt", "units"];
 
-export class View {
-  /** @param {any} page */
-  constructor(page) {
-    this.page = page;
-    this.list = page.list;
-    /** Column that the list is sorted by, if any, and whether upwards. @type {[number, boolean] | null} */
-    this.order = null;
-    this.loading = new Latest(async () => { await this.list.load(); remaking(one("view-records"), () => this.render()); counted("listed"); }, (error) => page.problem(error, "view-records"));
-    one("records-search").addEventListener("input", () => this.render());
-    one("records-vertical").addEventListener("change", () => {
-      this.list.rising = /** @type {HTMLInputElement} */ (one("records-vertical")).checked;
-      if (this.list.usage) this.remember(); else void this.reload();
-    });
-    one("records-choose").addEventListener("click", () => one("choose-file").click());
-    one("records-assess").addEventListener("click", () => page.go("assessment"));
+/** What tells a record from others. @param {Texts} texts */
+export const idOf = ({motion, channel}) => `${motion}#${channel ?? ""}`;
+
+export class RecordList {
+  constructor() {
+    /** @type {{title: string, reason: string, rows: Row[]}[]} */
+    this.groups = [];
+    /** Meshes that were opened, by their texts. @type {Record<string, string>} */
+    this.meshes = {};
+    /** Answers about a file, by its key. @type {Record<string, Texts>} */
+    this.answers = {};
+    /** Ids of the ticked records; null: all horizontal ones. @type {Set<string> | null} */
+    this.ticked = null;
+    this.rising = false;
+    /** @type {any} */
+    this.usage = {};
   }
 
-  enter() {
-    one("save").hidden = true;
-    /** @type {HTMLInputElement} */ (one("records-vertical")).checked = this.list.rising;
-    void this.loading.ask();
+  /** Take over what an address says. @param {import("./state.js").State} state */
+  read({texts, assessment: {records}}) {
+    const entries = (records ?? "").split(";").filter(Boolean).map((entry) => /** @type {Texts} */ (Object.fromEntries(new URLSearchParams(entry))));
+    this.ticked = records ? new Set(entries.map(idOf)) : null;
+    if (records) this.rising = entries.some(({vertical}) => vertical);
+    for (const {motion = "", dt, units} of [...entries, texts]) if (dt || units) this.answers[motion.replace("file:", "")] = {...(dt && {dt}), ...(units && {units})};
   }
 
-  leave() { one("save").hidden = false; }
-
-  /** The case has changed. */
-  update() { this.mark(); }
-
-  /** Take files that were dropped or chosen at once, and say what is wrong with those that are refused. @param {File[]} files */
-  async add(files) {
-    /** @type {string[]} */
-    const keys = [];
-    /** @type {string[]} */
-    const refused = [];
-    this.page.problem(null, "records-said");
-    for (const [k, file] of files.entries()) {
-      one("records-said").textContent = phrase("records.reading", {number: k + 1, count: files.length, name: file.name});
-      try { keys.push((await sendFile(file)).key); } catch (error) {
-        if (!(error instanceof Problem)) throw error;
-        refused.push(error.message);
-      }
-    }
-    if (keys.length) this.list.drops.push(keys);
-    const words = phrase("records.read", {done: keys.length, count: files.length});
-    one("records-said").textContent = words;
-    say(words);
-    // It stays whatever becomes of the list.
-    if (refused.length) this.page.problem(new Problem(refused.join("\n")), "records-said");
-    await this.loading.ask();
-    counted("added");
+  async load() {
+    const answers = Object.entries(this.answers).map(([key, texts]) => new URLSearchParams({key, ...texts}).toString()).join(";");
+    const {groups, usage} = await json("/api/list", /** @type {Texts} */ (answers ? {answers} : {}));
+    Object.assign(this, {groups, usage});
   }
 
-  /** What is ticked belongs into the address. */
-  remember() {
-    this.page.state.assessment.records = this.list.entries();
-    this.page.remember({assessment: {...this.page.state.assessment}});
+  rows() { return this.groups.flatMap(({rows}) => rows); }
+
+  /** @param {Texts} texts */
+  find(texts) { return this.rows().find((row) => idOf(row.texts) === idOf(texts)); }
+
+  /** @param {Row} row */
+  has(row) { return Boolean(row.measures) && (this.ticked ? this.ticked.has(idOf(row.texts)) : !row.is_up); }
+
+  /** @param {Row[]} rows @param {boolean} on */
+  tick(rows, on) {
+    this.ticked ??= new Set(this.rows().filter((row) => this.has(row)).map(({texts}) => idOf(texts)));
+    for (const {texts} of rows) if (on) this.ticked.add(idOf(texts)); else this.ticked.delete(idOf(texts));
   }
 
-  /** Load the list after a change of what is known of files; what of them is ticked changes in the address, too. */
-  async reload() {
-    await this.loading.ask();
-    if (this.list.ticked) this.remember();
+  /** Texts of the ticked records for the address. */
+  entries() {
+    return this.rows().filter((row) => this.has(row)).map(({texts, vertical}) => new URLSearchParams({...texts, ...(this.rising && vertical ? {vertical} : {})}).toString()).join(";");
   }
 
-  render() {
-    const {list} = this, {usage} = list;
-    if (!usage) return; // the list has not come yet
-    if (!list.ticked) delete this.page.state.assessment.records; // what was not chosen one by one is all that is known now
-    const wanted = /** @type {HTMLInputElement} */ (one("records-search")).value.toLowerCase().split(/\s+/).filter(Boolean);
-    const seen = (/** @type {Group} */ group, /** @type {Row} */ row) => wanted.every((word) => `${group.title} ${row.title} ${row.label}`.toLowerCase().includes(word));
-    const groups = list.groups.map((/** @type {Group} */ group) => ({...group, rows: group.rows.filter((row) => seen(group, row))})).filter((/** @type {Group} */ group) => group.rows.length);
-    if (this.order) this.sort(groups);
-    const heads = COLUMNS.map(([label], k) => make("th", {scope: "col", ...(this.order?.[0] === k ? {"aria-sort": this.order[1] ? "ascending" : "descending"} : {})}, [
-      make("button", {type: "button", className: "sorting", on: {click: () => this.sorted(k)}}, [label]),
-    ]));
-    one("records-table").replaceChildren(
-      make("thead", {}, [make("tr", {}, [make("td", {}, [""]), ...heads, make("td")])]),
-      ...groups.map((/** @type {Group} */ group) => this.body(group)),
-    );
-    one("records-usage").textContent = phrase("records.shown", {
-      shown: groups.reduce((/** @type {number} */ sum, /** @type {Group} */ each) => sum + each.rows.length, 0), count: list.rows().length,
-      files: usage.files, most: usage.most_files, size: short(usage.bytes / 2 ** 20, 2), most_size: short(usage.most_bytes / 2 ** 20),
-    });
-    this.ask();
-    this.mark();
+  /** Texts of a case with a record as its motion, scaled as before. @param {Texts} texts @param {Row} row @returns {Texts} */
+  put(texts, row) {
+    const gone = [...OWN, ...(texts.motion === "none" ? namesOf("start") : [])];
+    return {...Object.fromEntries(Object.entries(texts).filter(([name]) => !gone.includes(name))), ...row.texts};
   }
 
-  /** Sort the rows of each station, and the stations by their first row. @param {Group[]} groups */
-  sort(groups) {
-    const [column, upwards] = this.order ?? [0, true], key = COLUMNS[column][1];
-    const compare = (/** @type {Row} */ one_, /** @type {Row} */ other) => {
-      const [first, second] = [key(one_), key(other)];
-      return (upwards ? 1 : -1) * (typeof first === "string" ? first.localeCompare(String(second)) : first - Number(second));
-    };
-    for (const {rows} of groups) rows.sort((first, second) => Number(first.is_up) - Number(second.is_up) || compare(first, second));
-    groups.sort((first, second) => compare(first.rows[0], second.rows[0]));
-  }
-
-  /** @param {number} column */
-  sorted(column) {
-    this.order = this.order?.[0] === column ? [column, !this.order[1]] : [column, column === 0];
-    remaking(one("view-records"), () => this.render());
-  }
-
-  /** Rows of one station. @param {Group} group */
-  body({title, reason, rows}) {
-    const {list} = this;
-    const [{key}] = rows;
-    const head = make("tr", {className: "station"}, [make("th", {scope: "rowgroup", colSpan: 6}, [
-      title, ...(reason ? [make("small", {}, [` ${inWords(reason)}`])] : []),
-    ]), make("td", {}, key ? [make("button", {type: "button", "aria-label": phrase("records.take_out_about", {name: title}), on: {click: () => this.remove(rows)}}, [phrase("records.take_out")])] : [])]);
-    return make("tbody", {}, [head, ...rows.map((row) => {
-      const {measures} = row;
-      const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", checked: list.has(row), disabled: !measures, "aria-label": phrase("records.assess_one", {name: row.title}), on: {change: () => {
-        list.tick([row], box.checked);
-        this.remember();
-      }}}));
-      const open = make("button", {type: "button", className: "record", disabled: !measures, "data-record": idOf(row.texts), on: {click: () => this.open(row)}}, [row.title]);
-      const values = measures ? [acceleration(measures.pga), velocity(measures.pgv), phrase("time.seconds", {time: short(measures.significant)}), phrase("time.seconds", {time: short(measures.duration)})] : ["?", "?", "?", "?"];
-      return make("tr", {}, [box, open, ...values, ""].map((cell) => make("td", {}, [cell])));
-    })]);
-  }
-
-  /** Let a record shake the block. @param {Row} row */
-  open(row) {
-    this.page.restate(this.list.casePut(row));
-    say(phrase("records.shakes", {name: row.title}));
-  }
-
-  /** Mark the case's own motion. */
-  mark() {
-    const here = idOf(this.page.state.texts);
-    for (const each of document.querySelectorAll("[data-record]")) {
-      if (/** @type {HTMLElement} */ (each).dataset.record === here) each.setAttribute("aria-current", "true");
-      else each.removeAttribute("aria-current");
-    }
-  }
-
-  /** @param {Row[]} rows */
-  async remove(rows) {
-    try {
-      for (const key of new Set(rows.map((row) => row.key))) await json(`/api/records/${key}`, {}, {method: "DELETE"});
-      if (this.list.ticked) this.list.tick(rows, false);
-    } catch (error) {
-      this.page.problem(error, "records-said");
-    }
-    void this.reload();
-  }
-
-  /** Ask for what the files of each drop do not say: one answer for all, beside what it would make of each. */
-  ask() {
-    const {list} = this, rows = /** @type {Row[]} */ (list.rows());
-    const open = list.drops.flatMap((/** @type {string[]} */ keys) => ["units", "dt"].flatMap((name) => {
-      const asked = [...new Map(rows.filter((row) => keys.includes(row.key) && row.missing.includes(name)).map((row) => [row.key, row])).values()];
-      if (!asked.length) return [];
-      const choices = asked[0].choices[name].map(([value]) => value);
-      const dt = name === "dt", all = asked.length > 1;
-      const named = (/** @type {string} */ value) => (dt ? phrase(all ? "records.all_dt" : "records.one_dt", {value}) : all ? phrase("records.all_units", {value}) : value);
-      const heads = choices.map((value) => make("th", {scope: "col"}, [make("button", {type: "button", on: {click: () => this.answer(asked, name, value)}}, [named(value)])]));
-      const lines = asked.map((row) => make("tr", {}, [make("th", {scope: "row"}, [row.file]),
-        ...row.choices[name].map(([, figures]) => make("td", {}, [phrase(`file.of_${name}`, figures)]))]));
-      return [
-        make("p", {className: "derived"}, [phrase(`records.${name}_missing`, {count: asked.length})]),
-        make("div", {className: "scroll"}, [make("table", {className: "rows asked"}, [make("thead", {}, [make("tr", {}, [make("th", {scope: "col"}, [phrase("records.file")]), ...heads])]), make("tbody", {}, lines)])]),
-      ];
-    }));
-    one("records-missing").replaceChildren(...open);
-    one("records-missing").hidden = !open.length;
-  }
-
-  /** @param {Row[]} rows @param {string} name @param {string} value */
-  answer(rows, name, value) {
-    for (const {key} of rows) this.list.answers[key] = {...this.list.answers[key], [name]: value};
-    void this.reload();
+  /** Vertical components that a record may have, its own first. @param {Row | undefined} row @returns {[string, string][]} */
+  verticals(row) {
+    const text = (/** @type {Row} */ {key, texts: {motion, channel}}) => (!channel ? motion : key === row?.key ? channel : `${motion}#${channel}`);
+    const found = /** @type {[string, string][]} */ (this.rows().filter(({is_up: up, measures}) => up && measures).map((each) => [text(each), each.title]));
+    return found.sort(([one], [other]) => Number(other === row?.vertical) - Number(one === row?.vertical));
   }
 }
+
+/** Send a file; a folder, or a file that is gone, is reported. @param {File} file */
+export async function sendFile(file) {
+  if (file.size > LARGEST) throw new Problem(`${file.name} is larger than 16 MiB; cut a record into smaller files, or make a mesh coarser.`);
+  try { await file.slice(0, 1).arrayBuffer(); } catch { throw new Problem(`${file.name} cannot be read; it may be a folder, or gone.`); }
+  return json("/api/files", {name: file.name}, {method: "POST", body: file});
+}
+
+/** Questions on what files do not say: one answer for all of them. @param {Row[]} rows @param {(rows: Row[], name: string, value: string) => void} answer */
+export function questions(rows, answer) {
+  return ["units", "dt"].flatMap((name) => {
+    const open = [...new Map(rows.filter(({missing}) => missing.includes(name)).map((row) => [row.key, row])).values()];
+    if (!open.length) return [];
+    const result = (/** @type {any} */ {peak, lasts}) => (name === "units" ? `PGA ${acceleration(peak)}` : `lasts ${short(lasts, 4)} s`);
+    const values = open[0].choices[name].map(([value]) => value), other = make("input", {type: "text", size: 6, "aria-label": "Another sampling step, s", on: {change: () => answer(open, name, other.value)}});
+    return [make("div", {class: "missing", role: "group"}, [
+      make("p", {}, [`${open.length === 1 ? open[0].file : `${open.length} files`} ${name === "units" ? "without units" : "without a sampling step"}. Choose the right one:`]),
+      make("table", {class: "rows"}, [
+        make("tr", {}, [make("td"), ...values.map((value) => make("th", {scope: "col"}, [make("button", {type: "button", on: {click: () => answer(open, name, value)}}, [name === "dt" ? `${value} s` : value])]))]),
+        ...open.slice(0, 8).map((row) => make("tr", {}, [make("th", {scope: "row"}, [row.file]), ...row.choices[name].map(([, found]) => make("td", {}, [result(found)]))])),
+      ]),
+      ...(name === "dt" ? [make("label", {}, ["another (s) ", other])] : []),
+    ])];
+  });
+}
+
+/** Whether a file is a mesh by its name. @param {string} name */
+export const isMesh = (name) => specification.mesh_kinds.some((/** @type {string} */ kind) => name.toLowerCase().endsWith(`.${kind}`));

@@ -1,100 +1,80 @@
 // Units in which the page shows lengths, angles and accelerations: chosen once, and part of the address.
 
-import {make, one} from "./words.js";
+import {make, one} from "./standalone/dom.js";
 import {NONE, joined, short, span} from "./numbers.js";
 import {measures, phrase} from "./texts.js";
 
-/** Standard gravity, m/s²: what a g is, whatever gravity a block has. */
-export const G = 9.80665;
-/** What one SI unit is in each unit, and how the page writes that. @type {Record<string, [number, string, string]>} */
+/** Standard gravity, m/s². */
+const G = 9.80665;
+/** Size of an SI unit in each unit, and how the page writes the unit and its rate. @type {Record<string, [number, string, string]>} */
 const KNOWN = {
   m: [1, "m", "m/s"], cm: [100, "cm", "cm/s"], ft: [1 / 0.3048, "ft", "ft/s"], in: [1 / 0.0254, "in", "in/s"],
   deg: [180 / Math.PI, "°", ""], rad: [1, " rad", ""], g: [1 / G, "g", ""], "m/s2": [1, "m/s²", ""],
 };
-const KINDS = /** @type {Record<string, string>} */ ({
-  length: "length_in", position: "length_in", angle: "angle_in", acceleration: "acceleration_in", "acceleration at a period": "acceleration_in",
-});
+/** @type {Record<string, string>} */
+const KINDS = {length: "length_in", position: "length_in", angle: "angle_in", acceleration: "acceleration_in", "acceleration at a period": "acceleration_in"};
+const LABELS = {length_in: "Lengths in", angle_in: "Angles in", acceleration_in: "Accelerations in"};
 
 /** Chosen units by name. @type {Record<string, string>} */
 const chosen = {};
-/** Units by name, the default of each first. @type {Record<string, string[]>} */
+/** @type {Record<string, string[]>} */
 let offered = {};
 
-/** Read the units of the address. @param {Record<string, string[]>} choices @param {URLSearchParams} given */
+/** @param {Record<string, string[]>} choices the default of each first @param {URLSearchParams} given */
 export function readUnits(choices, given) {
   offered = choices;
   for (const [name, units] of Object.entries(choices)) chosen[name] = units.find((each) => each === given.get(name)) ?? units[0];
 }
 
-/** What the address says of the units: nothing of those that are the default. @returns {[string, string][]} */
+/** Units that are not the default, for the address. @returns {[string, string][]} */
 export const unitsChosen = () => Object.entries(chosen).filter(([name, unit]) => unit !== offered[name][0]);
 
-/** A parameter as a field shows it, in the chosen unit. @template {{kind?: string, unit: string, suffix: string, units: Record<string, number>, low: number, high: number}} P
- * @param {P} spec @returns {P} */
+/** A parameter as its field shows it, in the chosen unit. @param {any} spec */
 export function inUnits(spec) {
-  const name = KINDS[spec.kind ?? ""];
-  const unit = name && chosen[name];
-  const scale = unit && spec.units[unit.replace("/", "")];
+  const name = KINDS[spec.kind ?? ""], unit = name && chosen[name], scale = unit && spec.units[unit.replace("/", "")];
   if (!unit || !scale || unit === offered[name][0]) return spec;
-  const units = Object.fromEntries(Object.entries(spec.units).map(([each, size]) => [each, size / scale]));
+  const units = Object.fromEntries(Object.entries(spec.units).map(([each, size]) => [each, Number(size) / scale]));
   return {...spec, own: spec, units, unit: KNOWN[unit][1].trim(), suffix: unit, low: spec.low / scale, high: spec.high / scale};
 }
 
-/** @param {string} name @param {number | null} value in SI units @param {number} [digits] @param {1 | 2} [which] */
-function written(name, value, digits = 3, which = 1) {
+/** @param {string} name @param {1 | 2} [which] @returns {(value: number | null, digits?: number) => string} */
+const writer = (name, which = 1) => (value, digits = 3) => {
   const [scale] = KNOWN[chosen[name]], unit = KNOWN[chosen[name]][which];
-  if (value === null || !Number.isFinite(value)) return NONE;
-  return joined(short(value * scale, digits), unit);
-}
-
-/** @param {number | null} value in m/s² @param {number} [digits] */
-export const acceleration = (value, digits) => written("acceleration_in", value, digits);
+  return value === null || !Number.isFinite(value) ? NONE : joined(short(value * scale, digits), unit);
+};
+/** Quantities in m/s², rad, m and m/s as the page writes them. */
+export const acceleration = writer("acceleration_in"), angle = writer("angle_in"), length = writer("length_in"), velocity = writer("length_in", 2);
+Object.assign(measures, {acceleration, angle, length});
 /** @param {number} value in g @param {number} [digits] */
 export const ofG = (value, digits) => acceleration(value * G, digits);
-/** @param {number} value in rad @param {number} [digits] */
-export const angle = (value, digits) => written("angle_in", value, digits);
-/** @param {number} value in m @param {number} [digits] */
-export const length = (value, digits) => written("length_in", value, digits);
-Object.assign(measures, {acceleration, angle, length});
-/** @param {number | null} value in m/s @param {number} [digits] */
-export const velocity = (value, digits) => written("length_in", value, digits, 2);
-/** An acceleration as the axis of a figure has it: what one m/s² is, and the unit. @returns {[number, string]} */
-export const accelerationAxis = () => [KNOWN[chosen.acceleration_in][0], KNOWN[chosen.acceleration_in][1]];
-/** The same of one g. @returns {[number, string]} */
-export const gAxis = () => [Number((G * KNOWN[chosen.acceleration_in][0]).toPrecision(15)), KNOWN[chosen.acceleration_in][1]];
-/** An angle likewise: what one rad is, and the unit. @returns {[number, string]} */
-export const angleAxis = () => [KNOWN[chosen.angle_in][0], KNOWN[chosen.angle_in][1].trim()];
-/** Units of axes as the server names them: what chooses the page's, and what one is in SI units. @type {Record<string, [string, number]>} */
+
+/** Units of axes as the server names them: what chooses the page's, and their sizes in SI units. @type {Record<string, [string, number]>} */
 const OF_AXES = {"°": ["angle_in", Math.PI / 180], rad: ["angle_in", 1], g: ["acceleration_in", G], "m/s^2": ["acceleration_in", 1], "m/s": ["length_in", 1]};
-/** What one of an axis's unit is in the unit that is chosen, and how the page writes that. @param {string} [unit] @returns {[number, string]} */
+/** Size of an axis's unit in the chosen unit, and how the page writes that. @param {string} [unit] @returns {[number, string]} */
 export function axisUnit(unit = "") {
   const [name, size] = OF_AXES[unit] ?? [];
   if (!name || !size) return [1, unit];
-  const [scale, plain, rate] = KNOWN[chosen[name]], written_ = (name === "length_in" ? rate : plain).trim();
-  return written_ === unit ? [1, unit] : [Number((size * scale).toPrecision(15)), written_];
+  const [scale, plain, rate] = KNOWN[chosen[name]], text = (name === "length_in" ? rate : plain).trim();
+  return text === unit ? [1, unit] : [Number((size * scale).toPrecision(15)), text];
 }
-/** A field's text, with the chosen unit where it is a bare number. @param {string} text */
+/** A field's text, with the chosen unit of accelerations if it is a bare number. @param {string} text */
 export const withUnit = (text) => (text && !Number.isNaN(Number(text)) ? `${Number(text)}${chosen.acceleration_in}` : text);
 
-/** Fields that choose the units; another choice loads the page again, so that all of it is in them. @param {(name: string) => void} write
- * writes the address, and is told which was chosen */
+/** Fields that choose the units; a choice loads the page again. @param {() => void} write writes the address */
 export function unitFields(write) {
   one("units-form").replaceChildren(...Object.entries(offered).map(([name, units]) => {
-    const options = units.map((each) => make("option", {value: each, selected: each === chosen[name]}, [KNOWN[each][1].trim()]));
-    const select = /** @type {HTMLSelectElement} */ (make("select", {id: name, on: {change: () => { chosen[name] = select.value; write(name); }}}, options));
-    return make("label", {className: "field"}, [`${phrase(`units.${name}`)} `, select]);
+    const select = make("select", {id: name, on: {change: () => { chosen[name] = select.value; write(); location.reload(); }}},
+      units.map((each) => make("option", {value: each, selected: each === chosen[name] || null}, [KNOWN[each][1].trim()])));
+    return make("label", {class: "choice"}, [make("span", {}, [LABELS[/** @type {keyof typeof LABELS} */ (name)]]), select]);
   }));
 }
 
-/** What a case is called, from what the server says of it. @param {any} header */
-export function caseName({block: {sides: [{p, alpha}]}, motion}) {
-  return phrase("case.name", {p: short(p), alpha: angle(alpha), motion: motion ? phrase("case.motion", {name: motion.name, pga: ofG(motion.pga_g)}) : phrase("case.still")});
-}
+/** Name of a case. @param {any} header */
+export const caseName = ({block: {sides: [{p, alpha}]}, motion}) => `p = ${short(p)} rad/s, α = ${angle(alpha)}, ${motion ? `${motion.name} ${ofG(motion.pga_g)}` : "no ground motion"}`;
 
-/** What a treatment of chattering is called, with its limit. @param {string} text as the address has it */
+/** Name of a scheme that ends chattering, with its limit. @param {string} text as the address has it */
 export function treatmentName(text) {
-  const [kind, limit] = text.split("="), name = phrase(`treatment.${kind}`), size = Number(limit);
-  if (limit === undefined || kind === "certified") return name;
-  if (kind === "time") return limit === "exact" ? phrase("limit.named", {name, limit: phrase("limit.exact")}) : name;
-  return phrase("limit.named", {name, limit: kind === "interval" ? span(size) : phrase("limit.over", {limit: short(size)})});
+  const [kind, limit] = text.split("="), name = phrase(`treatment.${kind}`);
+  if (limit === undefined || kind === "certified" || kind === "time") return name;
+  return `${name}, ${kind === "interval" ? span(Number(limit)) : `${short(Number(limit))} pα`}`;
 }

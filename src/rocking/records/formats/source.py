@@ -116,12 +116,17 @@ def unreadable_file_error(name: str, error: Exception) -> RecordError:
     return RecordError(text, path=name)
 
 
+def name_stream(stream: object) -> str:
+    """Return the name of a stream's file, or "standard input"."""
+    name = getattr(stream, "name", 0)
+    return "standard input" if isinstance(name, int) or name in ("<stdin>", "<fdopen>") else str(name)
+
+
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     """Read a whole file, or the rest of an open one."""
     read = getattr(path, "read", None)
     if read is not None:  # Python's standard streams are named "<stdin>" or by a number
-        name = str(getattr(path, "name", "<"))
-        name = "standard input" if name.startswith("<") or name.isdecimal() else name
+        name = name_stream(path)
     elif not isinstance(path, (str, bytes, os.PathLike)):
         raise RecordError(f"the path of a record must be a file name, not {path!r}")
     else:

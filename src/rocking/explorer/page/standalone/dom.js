@@ -1,7 +1,7 @@
 // Elements of the page.
 
-/** @template {Element} T @param {string} id @returns {T} */
-export const one = (id) => /** @type {any} */ (document.getElementById(id));
+/** @param {string} id @returns {any} */
+export const one = (id) => document.getElementById(id);
 
 /** @param {Element} element @param {Record<string, any>} given */
 export function put(element, given) {
