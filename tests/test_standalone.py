@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import itertools
 import json
 import re
 import runpy
@@ -121,11 +122,11 @@ def outcome_of(response):
     return [*counts, response.duration, abs(response.peak_rotation), *response.events["time"]]
 
 
-def is_equal(first, second):
-    """Whether counts are equal, and times within 1e-11 s."""
+def has_equal_events(first, second):
+    """Whether uplifts and rests are equal, and times within 1e-11 s."""
     return (
         len(first) == len(second)
-        and first[:3] == second[:3]
+        and first[1:3] == second[1:3]
         and np.allclose(first[3:], second[3:], rtol=0.0, atol=1e-11)
     )
 
@@ -135,17 +136,21 @@ def test_outcomes_are_those_of_the_package(opened):
     rng = np.random.default_rng(20261129)
     cases = [draw_case(rng, kind) for kind in np.resize(KINDS, CASES).tolist()]
     computed = opened().js(OUTCOMES, cases)
-    fallen, sensitive = 0, []
+    fallen, sensitive, recounted = 0, [], 0
     for case, (overturned, *outcome) in zip(cases, computed, strict=True):
         response = simulate_case(case)
         assert bool(overturned) == response.overturned, case
         fallen += overturned
-        if not is_equal(outcome, outcome_of(response)):  # then the package itself differs as much after a last bit
+        expected = outcome_of(response)
+        if not has_equal_events(outcome, expected):  # then the package itself differs as much after a last bit
             sensitive.append(case["motion"])
             neighbours = [simulate_case(case, 1.0 + k * 2.0**-52) for k in (-2, -1, 1, 2)]
-            assert not all(is_equal(outcome_of(each), outcome_of(response)) for each in neighbours), case
+            assert not all(has_equal_events(outcome_of(each), expected) for each in neighbours), case
+        elif outcome[0] != expected[0]:  # a last bit decides after how many impacts a bound on the rest suffices
+            recounted += 1
+            assert abs(outcome[0] - expected[0]) < 0.05 * expected[0], case
     assert 0.2 * CASES < fallen < 0.8 * CASES
-    assert set(sensitive) <= {"ridgecrest-clc-090"} and len(sensitive) <= 0.03 * CASES
+    assert set(sensitive) <= {"ridgecrest-clc-090"} and len(sensitive) <= 0.03 * CASES and recounted <= 0.002 * CASES
 
 
 @pytest.mark.browser
@@ -177,7 +182,7 @@ def test_the_explorer_opens_on_the_page_and_both_share_the_case(built, browser):
     page.js("location.hash = 'width=0.3&height=1.3&offset=0.02&motion=one-sine:amplitude=0.4g,frequency=1'")
     page.until("document.getElementById('more').search.includes('width=0.3&')", "the link has the case")
     page.page.click("#more")
-    page.until("document.body.innerText.includes('overturns')", "the explorer shows the case")
+    page.until("document.body?.innerText.includes('overturns')", "the explorer shows the case")
     page.page.click("#to-block")
     page.until("document.getElementById('headline')?.textContent.includes('It falls.')", "the page shows the case")
     page.until("location.hash.includes('amplitude=3.92266,')", "the case is in the address")
@@ -537,6 +542,21 @@ def test_a_case_in_the_address_is_shown_again(opened):
     page.until("document.body.dataset.settled", "computed")
     page.says("headline", "This page cannot show all of the address: motion, width, amplitude, height, p.")
     assert numbers(page) == {"width": 0.4, "height": 10.0, "amplitude": 3.01, "frequency": 1.0}
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [1280, 794])
+def test_what_is_printed_hides_nothing(opened, width):
+    page = opened(FALLING, width, 1123, color_scheme="dark")
+    page.page.click("[data-panel=map]")
+    page.until("document.body.dataset.map === 'complete'", "the map is computed")
+    page.page.emulate_media(media="print")
+    page.paused(100)
+    tops = [page.page.locator(f"#{name}").bounding_box() for name in ("stage", "strip", "answer", "panel")]
+    assert all(above["y"] + above["height"] <= below["y"] for above, below in itertools.pairwise(tops))
+    assert not page.page.locator("nav, #transport, #close, .buttons, .knob >> visible=true").count()
+    corner = page.js("[...page.panels.map.picture.getContext('2d').getImageData(0, 95, 1, 1).data]")
+    assert corner == [255, 255, 255, 255]  # paper
 
 
 @pytest.mark.browser

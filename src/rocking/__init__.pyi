@@ -57,6 +57,7 @@ from .explorer.launch import explore
 from .inputs.inventory import read_inventory
 from .motion import Motion
 from .motion.scaling import Measure
+from .motion.stochastic import synthesize_motions
 from .records.formats import read
 from .response import Response, gradient
 from .simulation.ensemble import simulate_many
@@ -133,6 +134,7 @@ __all__ = [
     "solid",
     "studies",
     "survey",
+    "synthesize_motions",
     "uniform",
     "validate",
 ]

@@ -240,10 +240,8 @@ class FileOptions(InputOptions):
 
     def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
         """Return the scaled motion of a record or pulse, with notes."""
-        texts, vertical = self.supplied(), self.supplied().get("vertical")
-        # Mistakes in the options are reported before a long file is read.
-        scalings = {name: text for name, text in texts.items() if name in declared.SCALINGS}
-        target = read_scaling(scalings, read_positive_acceleration)
+        vertical = self.supplied().get("vertical")
+        target = self._target()  # mistakes in the options are reported before a long file is read
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
@@ -252,6 +250,11 @@ class FileOptions(InputOptions):
             options = self.metadata() | self.corrections()
             motion = load_motion(name, **options, vertical=vertical, several=several)
         return self._scale(name, motion, target)
+
+    def _target(self) -> tuple[float, Measure] | None:
+        """Return the level and the measure to which motions are scaled, if any."""
+        texts = {name: text for name, text in self.supplied().items() if name in declared.SCALINGS}
+        return read_scaling(texts, read_positive_acceleration)
 
     def _scale(self, name: str, motion: Motion, target: tuple[float, Measure] | None) -> Motion:
         """Return the scaled motion, with notes."""
@@ -269,6 +272,16 @@ class FileOptions(InputOptions):
     def pulses(self) -> dict[str, Motion]:
         """Return the pulses by their texts."""
         return {text: self.motion(text, is_pulse=True) for text in self.supplied().get("pulse", ())}
+
+    def stochastic_motions(self) -> dict[str, Motion]:
+        """Return the stochastic motions by distinct names."""
+        motions: list[Motion] = []
+        for text in self.supplied().get("stochastic", ()):
+            values = bodies.read_pairs(text, "stochastic", lambda name: bodies.STOCHASTIC.get(name, read_number))
+            with bodies.add_option_to_errors("stochastic"):
+                motions += bodies.create_stochastic(values, "{}", "stochastic")
+        named = zip(list_motion_names(motions), motions, strict=True)
+        return {name: self._scale(name, motion, self._target()) for name, motion in named}
 
 
 @_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse")
@@ -339,11 +352,12 @@ class _RecordOptions(FileOptions):
     def read_all(self, names: Sequence[str]) -> LoadedRecords:
         """Return the motions by name."""
         records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
-        if not records and not pulses:
-            message = "at least one record is required: file, folder, or name of a shipped record, or {}"
-            raise OptionError(message, "pulse")
+        stochastic = self.stochastic_motions()
+        if not (records or pulses or stochastic):
+            message = "at least one record is required: file, folder, or name of a shipped record, or {} or {}"
+            raise OptionError(message, "pulse", "stochastic")
         if self.component != "own":
-            return self._read_pairs(records, pulses)
+            return self._load_pairs(records, [*pulses, *stochastic])
         pulse_motions = self.pulses()
         read = functools.partial(self.motion, several=len(records) > 1)
         motions, skipped = read_records(records, read, keep_going=self.keep_going)
@@ -352,17 +366,17 @@ class _RecordOptions(FileOptions):
             raise RecordError(f"none of {len(records)} records could be read; the first: {messages[0]}")
         for message in messages:
             note(f"skipped: {message}")
-        motions |= pulse_motions
+        motions |= pulse_motions | stochastic
         is_single = [*motions] == [*names, *pulses] and len(motions) == 1 and not self.reversed
         return LoadedRecords(self._add_reversed(motions), skipped, is_single)
 
-    def _read_pairs(self, records: Sequence[str], pulses: Sequence[str]) -> LoadedRecords:
+    def _load_pairs(self, records: Sequence[str], pulses: Sequence[str]) -> LoadedRecords:
         """Return both horizontal components of each station, scaled by one factor."""
         supplied = self.supplied()
         if pulses or "channel" in supplied or supplied.get("vertical", OWN) != OWN:
-            message = f"{{}} {self.component} requires records: omit {{}} and {{}}, and use {{}} {OWN} or omit it"
-            raise OptionError(message, "component", "pulse", "channel", "vertical")
-        target = read_scaling({k: v for k, v in supplied.items() if k in declared.SCALINGS}, read_positive_acceleration)
+            message = f"{{}} {self.component} requires records: omit {{}}, {{}} and {{}}, and use {{}} {OWN} or omit it"
+            raise OptionError(message, "component", "pulse", "stochastic", "channel", "vertical")
+        target = self._target()
         if target is not None and target[1].name != "factor":
             target = target[0], replace(target[1], component=self.component)
         options = self.read_values("dt", "units") | self.corrections()
@@ -375,12 +389,12 @@ class _RecordOptions(FileOptions):
         return motions | {f"{name} x -1": -motion for name, motion in motions.items()} if self.reversed else motions
 
 
-@_with_inputs("vertical", "pulse")
+@_with_inputs("vertical", "pulse", "stochastic")
 class UnscaledOptions(_RecordOptions):
     """Several records and pulses with vertical motions, scaled by the analysis itself."""
 
 
-@_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse")
+@_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse", "stochastic")
 class MotionOptions(_RecordOptions):
     """Several records and pulses, scaled."""
 

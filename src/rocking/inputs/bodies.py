@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, TypeVar
 
@@ -18,6 +18,8 @@ from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, COUPLES, FORCES, INPUTS, READERS, BlockDescription
 from rocking.inputs.notes import block_notes, restraint_notes
 from rocking.inputs.quantities import NumberReader
+from rocking.motion.motion import Motion
+from rocking.motion.stochastic import synthesize_motions
 
 Item = TypeVar("Item")
 
@@ -149,6 +151,22 @@ def find_reader(parameter: str) -> NumberReader:
     return READERS.get(kind, READERS["number"])[0]
 
 
+#: Readers of parameters of stochastic motions.
+STOCHASTIC: Final[Mapping[str, NumberReader]] = {
+    "arias_intensity": READERS["velocity"][0],
+    **dict.fromkeys(("duration", "middle_time", "dt"), READERS["duration"][0]),
+    **dict.fromkeys(("frequency", "highpass"), READERS["frequency"][0]),
+    **dict.fromkeys(("frequency_rate", "damping", "count", "seed"), READERS["number"][0]),
+}
+
+
+def create_stochastic(values: Mapping[str, Any], owner: str, *names: str) -> tuple[Motion, ...]:
+    """Create stochastic motions from values by name, which ``names`` are parameters in ``owner``."""
+    check_parameters(synthesize_motions, values, owner, *names)
+    whole = {k: int(v) for k, v in values.items() if k in ("count", "seed") and float(v).is_integer()}
+    return synthesize_motions(**{**values, **whole})
+
+
 def check_parameters(factory: Callable[..., object], provided: Iterable[str], owner: str, *names: str) -> None:
     """Check that names are parameters of a kind and that none is missing; ``names`` are the parameters in ``owner``."""
     parameters = inspect.signature(factory).parameters
@@ -176,9 +194,19 @@ def add_option_to_errors(option: str) -> Iterator[None]:
 
 def create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
     """Create an object from an option with NAME=VALUE pairs."""
-    values: dict[str, Any] = {}
     parameters = inspect.signature(kind).parameters.values()
     flags = {parameter.name for parameter in parameters if isinstance(parameter.default, bool)}
+    values = read_pairs(text, option, find_reader, flags)
+    check_parameters(kind, values, "{}", option)
+    with add_option_to_errors(option):
+        return kind(**values)
+
+
+def read_pairs(
+    text: str, option: str, find_reader: Callable[[str], NumberReader], flags: Collection[str] = ()
+) -> dict[str, Any]:
+    """Return the values of NAME=VALUE pairs."""
+    values: dict[str, Any] = {}
     for part in text.split(","):
         name, equals, value = (parameter.strip() for parameter in part.partition("="))
         name = name.replace("-", "_")
@@ -188,6 +216,4 @@ def create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item
         if name in flags and value not in ("yes", "no"):
             raise OptionError(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
         values[name] = value == "yes" if name in flags else find_reader(name)(value, option)
-    check_parameters(kind, values, "{}", option)
-    with add_option_to_errors(option):
-        return kind(**values)
+    return values

@@ -217,6 +217,9 @@ INPUTS: Final = index_by_name(
     Input("pulse", "", "texts",
         "A pulse as the ground motion, sine:amplitude=0.2g,frequency=2Hz,cycles=5 (see rocking pulses); once for "
         "each."),
+    Input("stochastic", "", "texts",
+        "Stochastic motions, as count=20,arias_intensity=1.2,duration=12s,middle_time=8s,frequency=4Hz, with "
+        "frequency_rate (Hz/s), damping, highpass, dt and seed; several times for several sets."),
     Input("model", "model", "text",
         "Equation of motion: of finite rotations (nonlinear, the default), or linearised for slender blocks.",
         default="nonlinear"),

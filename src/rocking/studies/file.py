@@ -19,9 +19,11 @@ from rocking.engine.schemes import chattering_scheme
 from rocking.errors import MotionError, OptionError, RecordError, StudyError, join_placeholders
 from rocking.inputs import quantities
 from rocking.inputs.bodies import (
+    STOCHASTIC,
     check_parameters,
     create_block,
     create_body,
+    create_stochastic,
     find_description,
     find_reader,
     note_likely_mistakes,
@@ -57,16 +59,8 @@ _RESTRAINT_KEYS: Final = tuple(f"{name}s" if name in FORCES else name for name i
 SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
     "blocks": ("csv", *BLOCK, *_RESTRAINT_KEYS),
     "motions": (
-        "records",
-        "channel",
-        "vertical",
-        "pairs",
-        "units",
-        "dt",
-        "baseline",
-        "highpass",
-        "skip_unreadable",
-        "pulses",
+        *("records", "channel", "vertical", "pairs", "units", "dt", "baseline", "highpass", "skip_unreadable"),
+        *("pulses", "stochastic"),
     ),
     "scales": (*_MEASURES, "period", "damping", "component", "polarity"),
     "simulation": ("model", "chattering", "duration", "friction"),
@@ -78,6 +72,7 @@ _VALUE_TYPES: Final[Mapping[str, tuple[Any, str]]] = {
     **dict.fromkeys(("one_sided", "skip_unreadable", "pairs"), (bool, "true or false")),
     **{f"{name}s": ([dict], f"tables, [[blocks.{name}s]]") for name in FORCES},
     "pulses": ([dict], "tables, [[motions.pulses]]"),
+    "stochastic": ([dict], "tables, [[motions.stochastic]]"),
     **dict.fromkeys(("channel", "baseline"), (str | int, "text or a whole number")),
     "records": ([str], "a list of texts"),
 }
@@ -252,6 +247,15 @@ def _create_pulses(tables: Tables, k: int) -> list[Motion]:
     return _create_objects(tables, table, k, entries, family.quantity, family.create_motion)
 
 
+def _create_stochastic_motions(tables: Tables, k: int) -> list[Motion]:
+    table = "motions.stochastic"
+
+    def create(values: dict[str, Any]) -> tuple[Motion, ...]:
+        return create_stochastic(values, f"[[{table}]]")
+
+    return [*itertools.chain(*_create_objects(tables, table, k, tables.table(table, k), STOCHASTIC.get, create))]
+
+
 def _read_scales(tables: Tables) -> Scales:
     entries = tables.table("scales")
     measures = [name for name in _MEASURES if name in entries]
@@ -299,8 +303,8 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
             motions.append(motion)
             is_sibling = path_exists(path) and Path(path).is_relative_to(folder)
             names.append(str(Path(path).relative_to(folder)) if is_sibling else path)
-    for k in range(len(entries.get("pulses", []))):
-        motions += _create_pulses(tables, k)
+    for name, create in (("pulses", _create_pulses), ("stochastic", _create_stochastic_motions)):
+        motions += itertools.chain(*(create(tables, k) for k in range(len(entries.get(name, [])))))
     if not motions:
         raise tables.create_error("motions", None, "[motions] contains no readable motion: add records or pulses")
     return motions, names + [""] * (len(motions) - len(names)), skipped

@@ -64,7 +64,7 @@ export class Numbers {
       make("details", {}, [make("summary", {}, ["About"]), make("p", {}, [
         `Computed in this browser by the kernels of rocking ${DATA.version} (${DATA.fingerprint}), compiled to WebAssembly that imports no function. In 1,000 random cases of all motions, no outcome `
         + "differed from that of the installed package. The C library of this page differs from glibc by one unit in the last place in 3 % of sines and cosines and 17 % of arc tangents. Therefore times may differ after "
-        + "12 digits and, under a record of five minutes, the number of impacts may differ. The smallest amplitude that overturns the block is searched among amplitudes 0.5 % apart, and then refined.",
+        + "12 digits, the number of impacts before a proven rest may differ and, under a record of five minutes, so may times of rest. The smallest amplitude that overturns the block is searched among amplitudes 0.5 % apart, and then refined.",
       ])]),
     );
   }

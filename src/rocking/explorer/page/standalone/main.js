@@ -10,7 +10,6 @@ import {Workers} from "./workers.js";
 import {DATA, openKernels} from "./kernels.js";
 import {limited, readAddress, writeCase} from "./case.js";
 import {respond, upliftOf} from "./response.js";
-import {groundAt} from "./motions.js";
 import {described, headline, margin, reasons} from "./sentences.js";
 import {one, put} from "./dom.js";
 import {fixed} from "../numbers.js";
@@ -146,13 +145,13 @@ class Page {
 
   /** @param {number} time */
   seek(time) {
-    const {times, rotation, velocity, displacement, from, until} = this.shown.picture;
+    const {times, rotation, velocity, displacement, from, until, ground} = this.shown.picture;
     this.time = Math.min(Math.max(time, from), until);
-    const place = ((this.time - from) / (until - from)) * (times.length - 1);
-    const k = Math.min(times.length - 2, Math.floor(place)), part = place - k;
-    const at = (/** @type {Float64Array} */ values) => values[k] + (values[k + 1] - values[k]) * part;
-    const [acceleration] = groundAt(this.shown.shaking, [this.time]).acceleration;
-    this.scene.paint({rotation: at(rotation), velocity: at(velocity), acceleration, displacement: at(displacement)}, this.time === from && !this.playing);
+    const at = (/** @type {Float64Array} */ values, evenly = times) => {
+      const place = (this.time - evenly[0]) / (evenly[1] - evenly[0]), k = Math.min(Math.max(Math.floor(place), 0), values.length - 2);
+      return values[k] + (values[k + 1] - values[k]) * Math.min(Math.max(place - k, 0), 1);
+    };
+    this.scene.paint({rotation: at(rotation), velocity: at(velocity), acceleration: at(ground.acceleration, ground.times), displacement: at(displacement)}, this.time === from && !this.playing);
     this.strip.follow();
     this.panels[this.panel ?? ""]?.follow?.();
     const slider = /** @type {HTMLInputElement} */ (one("time")), said = `${fixed(this.time, 2)} s`;

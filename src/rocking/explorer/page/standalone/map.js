@@ -51,7 +51,7 @@ export class MapView {
     Object.assign(this.picture, {width: COLUMNS, height: ROWS});
     dragged(this.canvas, (event) => { this.page.rewind(); this.canvas.focus(); this.move(event); return true; }, (event) => this.move(event));
     new ResizeObserver(() => this.paint()).observe(this.canvas);
-    for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", () => { this.colours(); this.paint(); });
+    for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)", "print"]) matchMedia(query).addEventListener("change", () => { this.colours(); this.paint(); });
   }
 
   get chosen() { return KINDS[this.kind]; }

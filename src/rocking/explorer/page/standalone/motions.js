@@ -94,6 +94,14 @@ export function groundAt({pieces, factor}, times) {
   return out;
 }
 
+/** Samples of a record within a window: all of them, so that no peak is missed. Its displacement is drawn otherwise.
+ * @param {import("./kernels.js").Shaking} shaking @param {number} from @param {number} until @returns {{times: Float64Array, acceleration: Float64Array, displacement?: undefined}} */
+export function samplesOf({pieces, factor}, from, until) {
+  const {breaks, rows} = pieces ?? {breaks: [0, 1], rows: []}, first = Math.ceil(from / breaks[1] - 1e-9), end = Math.min(until, breaks[breaks.length - 1]);
+  const times = Float64Array.from({length: Math.floor(end / breaks[1] + 1e-9) - first + 1}, (_, k) => breaks[first + k]);
+  return {times, acceleration: times.map((_, k) => factor * (rows[first + k]?.[0] ?? 0))};
+}
+
 /** A polynomial and its first two integrals from 0. @param {ArrayLike<number>} row @param {number} t */
 function integrals(row, t) {
   let a = 0, v = 0, d = 0;

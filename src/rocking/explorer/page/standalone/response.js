@@ -1,7 +1,7 @@
 // What happens in a case: its response, how certain the outcome is, and the moments that decide it.
 
 import {DATA, GRAVITY} from "./kernels.js";
-import {bodyOf, durationOf, groundAt, shakingOf, startOf} from "./motions.js";
+import {bodyOf, durationOf, groundAt, samplesOf, shakingOf, startOf} from "./motions.js";
 
 /** Relative changes of the motion, or of the tilt, whose outcomes decide whether a case is certain. */
 const CHANGES = [0, -3e-6, -1.5e-6, 1.5e-6, 3e-6];
@@ -26,10 +26,8 @@ export function respond(kernels, given) {
   )).overturned);
   const {overturned, end} = response, duration = durationOf(shaking.pieces);
   const [from, until] = windowOf(given, shaking, response, duration), times = Float64Array.from({length: POINTS}, (_, k) => from + ((until - from) * k) / (POINTS - 1));
-  const traced = kernels.trace(body, shaking, response, times), {displacement} = groundAt(shaking, times);
-  // A record is drawn with all its samples, so that no peak is missed.
-  const corners = given.motion in DATA.records && shaking.pieces ? Float64Array.from(shaking.pieces.breaks).filter((time) => time >= from && time <= until) : times;
-  const ground = {times: corners, acceleration: groundAt(shaking, corners).acceleration};
+  const traced = kernels.trace(body, shaking, response, times), isRecord = given.motion in DATA.records && shaking.pieces;
+  const ground = isRecord ? samplesOf(shaking, from, until) : {times, ...groundAt(shaking, times)}, displacement = ground.displacement ?? new Float64Array(POINTS);
   const flat = overturned ? (response.events[response.events.length - 1].side * Math.PI) / 2 : 0, isOver = (/** @type {number} */ time) => overturned && time >= end;
   const rotation = times.map((time, k) => (isOver(time) ? flat : traced[3 * k])), velocity = times.map((time, k) => (isOver(time) ? 0 : traced[3 * k + 1]));
   const picture = {times, rotation, velocity, displacement, ground, from, until};

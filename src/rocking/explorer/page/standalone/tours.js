@@ -4,7 +4,7 @@ import {make, one} from "./dom.js";
 import {DATA} from "./kernels.js";
 
 /** Step: its words, the address of its case, what is done, the panel that is open, and what is outlined.
- * @typedef {{words: string, case?: string, play?: boolean, ask?: boolean, at?: "gone" | "peak" | "lift", panel?: string, ends?: [string, [number, number]], mark?: string}} Step */
+ * @typedef {{words: string, case?: string, play?: boolean, ask?: boolean, at?: "gone" | "peak" | "lift", panel?: string, map?: string, ends?: [string, [number, number]], mark?: string}} Step */
 /** @type {{title: string, steps: Step[], question: string}[]} */
 const TOURS = DATA.tours ?? [];
 
@@ -39,6 +39,7 @@ export class Tours {
     const before = steps.slice(0, step + 1).findLast((each) => each.case)?.case;
     if (!ended && before && (chosen.case || this.shown !== before)) { page.show(before, Boolean(chosen.ask)); this.shown = before; }
     page.open(chosen.panel ?? "tours");
+    if (chosen.map) page.panels.map.choose(chosen.map);
     const place = chosen.panel ? one(chosen.panel) : this.root;
     this.card?.remove();
     this.card = make("div", {class: "card"}, [make("h2", {}, [title]), make("p", {class: "soft"}, [ended ? "A question" : `Step ${step + 1} of ${steps.length}`]), words, make("p", {class: "buttons"}, buttons)]);
