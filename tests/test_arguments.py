@@ -20,6 +20,8 @@ TAKES_A_MOTION = {
     "simulate_many": lambda motion: rocking.simulate_many(BLOCK, motion),
     "rocking_spectrum": lambda motion: rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0]), motion),
     "fragility": lambda motion: rocking.fragility(BLOCK, motion, levels=[1.0, 2.0], measure="pga"),
+    "assess": lambda motion: rocking.assess(BLOCK, motion),
+    "survey": lambda motion: rocking.survey(BLOCK, motion),
     "incremental_dynamic_analysis": lambda motion: rocking.incremental_dynamic_analysis(BLOCK, motion, measure="pga"),
 }
 

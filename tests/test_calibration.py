@@ -657,7 +657,7 @@ def test_an_error_within_a_table_keeps_what_it_is_about(tmp_path):
     header = sides.replace("p_plus,p_minus", "p_plus_rad_s,p_minus_rad_s").replace("alpha_plus", "alpha_plus_rad")
     header = header.replace("alpha_minus", "alpha_minus_rad")
     ensemble.write_text(f"{header},weight,model\n2,2,0.2,0.2,-0.5,0.9,1,linear\n")
-    with pytest.raises(rocking.errors.BlockError, match="block 0 is in line 2: restitution must be") as caught:
+    with pytest.raises(rocking.errors.BlockError, match="line 2: restitution must be") as caught:
         read_ensemble(ensemble)
     error = caught.value
     assert (error.argument, error.path, error.value) == ("restitution", str(ensemble), -0.5)

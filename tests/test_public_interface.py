@@ -109,7 +109,7 @@ def test_functions_take_few_parameters_in_plain_words() -> None:
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if re.search(r"\.to_|\.export", name)])
 def test_what_is_written_to_a_file_is_called_to_format(name: str) -> None:
     last = name.rpartition(".")[2]
-    assert re.fullmatch(r"to_(csv|netcdf|parquet|nrml|json|excel|dict|dataframe|xarray)", last)
+    assert re.fullmatch(r"to_(csv|netcdf|parquet|nrml|json|excel|html|dict|dataframe|xarray)", last)
     names = list(parameters_of(FUNCTIONS[name]))
     if last not in ("to_dict", "to_dataframe", "to_xarray"):
         assert names[0] == "path"

@@ -247,6 +247,7 @@ def test_whatever_draws_itself_does_so_at_the_size_that_is_wanted(results, every
         assert found.plot(figsize=(3.4, 2.7)).get_size_inches().tolist() == [3.4, 2.7]
 
 
+PULSES = "pulse_amplitude_m_s2,pulse_frequency_Hz,pulse_cycles,pulse_phase_rad"
 HEADERS = {
     ("Basins", "attractors"): "attractor,share,standard_error,period,impacts,rests,multiplier",
     ("Basins", "outcomes"): "angular_velocity_rad_s,rotation_rad,outcome,periods",
@@ -263,16 +264,16 @@ HEADERS = {
     ("ResponseRose", "levels"): "level,anywhere",
     ("RockingSpectrum", "fractiles"): "fractile,alpha_rad,restitution,p_rad_s,period_s,size_m,"
     "fractile_over_alpha,overturned_share",
-    ("RockingSpectrum", "peaks"): "motion,alpha_rad,restitution,p_rad_s,period_s,size_m,"
+    ("RockingSpectrum", "peaks"): f"motion,alpha_rad,restitution,p_rad_s,{PULSES},period_s,size_m,"
     "peak_rotation_rad,peak_over_alpha,overturned",
     ("OverturningMap", "modes"): "amplitude,frequency,mode,peak_rotation_rad",
     ("OverturningMap", "boundaries"): "boundary_frequency,boundary_amplitude,mode_below,mode_above",
-    ("IncrementalDynamicAnalysis", "levels"): "motion,level_m_s2,block,p_rad_s,alpha_rad,restitution,"
+    ("IncrementalDynamicAnalysis", "levels"): f"motion,level_m_s2,block,{PULSES},p_rad_s,alpha_rad,restitution,"
     "peak_rotation_rad,peak_over_alpha,overturned",
     ("IncrementalDynamicAnalysis", "bands"): "motion,block,band_start_m_s2,band_end_m_s2",
     ("MeasureComparison", "measures"): "measure,unit,median_intensity,dispersion,dispersion_low,dispersion_high,"
     "dispersion_of_all",
-    ("MeasureComparison", "intensities"): "measure,motion,block,unit,intensity",
+    ("MeasureComparison", "intensities"): f"measure,motion,block,unit,{PULSES},intensity",
     ("BlockTable", "blocks"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
     "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,outcomes,"
     "fault",

@@ -468,7 +468,8 @@ def test_what_is_no_executor_is_refused_before_a_unit(tmp_path, executor):
 
 
 COLUMNS = [
-    *("motion", "pga_m_s2", "polarity", "block", "p_rad_s", "alpha_rad", "restitution", "overturned"),
+    *("motion", "pga_m_s2", "polarity", "block", "pulse_amplitude_m_s2", "pulse_frequency_Hz", "pulse_cycles"),
+    *("pulse_phase_rad", "p_rad_s", "alpha_rad", "restitution", "overturned"),
     *(
         "peak_rotation_rad",
         "residual_rotation_rad",

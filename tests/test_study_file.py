@@ -395,9 +395,8 @@ def test_the_fragility_of_a_study_of_walls_is_that_of_the_function(walls, run, t
     ("table", "sentence"),
     [
         ("width,height\n1,2,3,6\n", "line 2: this row has 4 cells for 2 columns"),
-        ("width,height,spring\n1,3,2000\n", "column spring"),
-        ("p,alpha,restituton\n2,0.2,0.9\n", "did you mean restitution"),
-        ("p,p,alpha\n2,3,0.2\n", "column p of"),
+        ("width,height,spring\n1,3,2000\n", "line 2: a block with restraints requires its mass"),
+        ("p,p,alpha\n2,3,0.2\n", "line 1: two columns contain p"),
         ("width,height,gyration\n1,3,0.5\n", "width and height and gyration are from different descriptions"),
         ("p,alpha,mass\n2,0.2,100\n", "mass and p and alpha are from different descriptions"),
     ],
@@ -412,7 +411,12 @@ def test_a_table_of_blocks_says_all_of_them_or_is_refused(file, tmp_path, table,
 def test_a_table_may_say_more_than_a_block_needs(file, tmp_path):
     (tmp_path / "blocks.csv").write_text("name,p,alpha,found in\na,2,0.2,1950\nb,3,0.1,1960\n")
     file.write_text(TEXT.replace(GRID, 'csv = "blocks.csv"\n'))
-    assert read_study(file).product.bodies.p[:, 0].tolist() == [2.0, 3.0]
+    blocks = read_study(file).product.blocks
+    assert blocks.p[:, 0].tolist() == [2.0, 3.0]
+    assert {name: values.tolist() for name, values in blocks.labels.items()} == {
+        "name": ["a", "b"],
+        "found_in": ["1950", "1960"],
+    }
 
 
 def test_a_study_gives_the_notes_of_the_commands(run, file, tmp_path):

@@ -22,6 +22,7 @@ from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
+from .assessment.assess import Assessment, assess
 from .block import (
     Block,
     Blocks,
@@ -53,6 +54,7 @@ from .engine.schemes import (
 )
 from .errors import RockingError
 from .explorer.launch import explore
+from .inputs.inventory import read_inventory
 from .motion import Motion
 from .motion.scaling import Measure
 from .motion.stochastic import synthesize_motions
@@ -66,6 +68,7 @@ from .studies import Study, create_study
 __version__: str
 
 __all__ = [
+    "Assessment",
     "AsymptoticTime",
     "Block",
     "Blocks",
@@ -94,6 +97,7 @@ __all__ = [
     "Thrust",
     "VelocityThreshold",
     "analysis",
+    "assess",
     "block",
     "calibrate",
     "calibrate_history",
@@ -117,6 +121,7 @@ __all__ = [
     "overturning_map",
     "pulses",
     "read",
+    "read_inventory",
     "read_tests",
     "records",
     "response",

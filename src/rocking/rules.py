@@ -5,8 +5,9 @@ Every demand is proportional to the motion: at a ratio of 0.5 the rule permits t
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from types import MappingProxyType
@@ -415,19 +416,19 @@ def _compute_min_ratio(
 
 
 def compare_rules(
-    block: Block,
+    block: Block | Sequence[Block],
     motions: Motions,
     *,
     rules: Iterable[str] | None = None,
     model: Model = "nonlinear",
     friction: Friction | None = None,
 ) -> RuleComparison:
-    """Apply rules of thumb to a block under motions, and compare with simulations.
+    """Apply rules of thumb to one or more blocks under motions, and compare with simulations.
 
     Parameters
     ----------
-    block : Block
-        Block.
+    block : Block or sequence of Block
+        One block, or several, each of which is compared.
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions. The table shows the keys of a mapping, or otherwise the names of the motions.
     rules : iterable of str, optional
@@ -472,15 +473,20 @@ def compare_rules(
     names = None if rules is None else checks.items(rules, "rules", OptionError)
     # Raise errors before the simulations.
     compute_intensities([*named_motions.values()], Measure("pga"))
+    blocks = [*block] if isinstance(block, Sequence) else [block]
     ratings = [apply_rules(block, motion, names) for motion in named_motions.values()]
-    ratios = [{name: float(rating.ratio[0]) for name, rating in by_name.items()} for by_name in ratings]
+    ratios = [
+        {name: float(rating.ratio[k]) for name, rating in by_name.items()}
+        for k in range(len(blocks))
+        for by_name in ratings
+    ]
     responses, margins = [], []
-    with Progress("checking", total=len(named_motions)) as bar:
-        for motion in named_motions.values():
-            responses.append(simulate(block, motion, model=model, friction=friction))
-            margins.append(_compute_margin(responses[-1], block, motion, model, friction))
+    with Progress("checking", total=len(ratios)) as bar:
+        for body, motion in itertools.product(blocks, named_motions.values()):
+            responses.append(simulate(body, motion, model=model, friction=friction))
+            margins.append(_compute_margin(responses[-1], body, motion, model, friction))
             bar.advance()
-    return RuleComparison(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
+    return RuleComparison(block, tuple(named_motions) * len(blocks), tuple(responses), tuple(ratios), tuple(margins))
 
 
 def _compute_margin(response: Response, block: Block, motion: Motion, model: Model, friction: Friction | None) -> float:

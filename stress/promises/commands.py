@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 import tempfile
+import zipfile
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -30,6 +31,7 @@ records = ["el-centro-meloland-270", "el-centro-meloland-360"]
 [scales]
 pga = "2:9:6"
 """
+_INVENTORY: Final = "name,width (cm),height (m),room\nvase,24 +- 1,1.1,12\nstele,50,1.6,14\n"
 _TESTS: Final = "motion,overturned,scale\n" + "".join(
     f"el-centro-meloland-270,{int(scale > 1.0)},{scale}\n" for scale in (0.3, 0.6, 0.9, 1.2, 1.5)
 )
@@ -40,6 +42,7 @@ COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "map": ("map", "one-sine", *_BLOCK, "--out", "OUT"),
     "spectrum": ("spectrum", _RECORD, "--alpha", "0.15,0.2", "--p", "1:6:20", "--out", "OUT"),
     "fragility": ("fragility", _RECORD, "ridgecrest-clc-090", *_BLOCK, "--levels", "0.1g:1g:19", "--out", "OUT"),
+    "assess": ("assess", "inventory.csv", _RECORD, "ridgecrest-clc-090", "ridgecrest-tow2-360", "--out", "OUT"),
     "study run": ("study", "run", "study.toml", "OUT"),
     "calibrate": ("calibrate", "tests.csv", "--out", "OUT"),
     "validate": ("validate", "tests.csv", *_BLOCK, "--out", "OUT"),
@@ -78,6 +81,7 @@ def arguments(name: str, folder: Path) -> list[str]:
     words = [*(COMMANDS | PRINTING)[name]]
     (folder / "study.toml").write_text(_STUDY, encoding="utf-8")
     (folder / "tests.csv").write_text(_TESTS, encoding="utf-8")
+    (folder / "inventory.csv").write_text(_INVENTORY, encoding="utf-8")
     if "STUDY" in words:
         shutil.copytree(_study(), folder / "study")
     if any(word.startswith("OUT/") for word in words):
@@ -152,6 +156,10 @@ def _opens(path: Path, content: bytes, whole: bytes) -> bool:
         case ".nc":
             with xr.open_dataset(path, engine="h5netcdf") as dataset:
                 return bool(dataset.load().sizes is not None)
+        case ".html":
+            return content.endswith(b"</html>\n")
+        case ".xlsx":
+            return zipfile.ZipFile(path).testzip() is None
         case ".json":
             return isinstance(json.loads(content), (dict, list))
         case ".jsonl":

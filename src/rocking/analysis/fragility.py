@@ -25,7 +25,6 @@ from rocking.analysis.curve import (
 )
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
-    RATIO_VARIABLES,
     assign_clusters,
     assign_groups,
     check_limit_states,
@@ -48,6 +47,7 @@ from rocking.analysis.risk import Risk, Survival, compute_mean_survival, compute
 from rocking.block.body import Bodies, Body
 from rocking.block.friction import Friction, resolve_friction
 from rocking.core import checks
+from rocking.core.arrays import Flags
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.progress import spell
 from rocking.core.result import Result
@@ -428,11 +428,15 @@ def fragility(
         intensity = stripes[:, None, None, None]
     table = table if "polarity" in table.dims else table.expand_dims("polarity")
     table = table.transpose("level", "motion", "block", "polarity")
-    missing = table.unfinished.values
-    ratio = compute_ratios(slenderness[:, None], *(table[name].values for name in RATIO_VARIABLES))
+    # The outcome after a loss of contact is unknown.
+    lost = table.lost_contact.values if "lost_contact" in table else np.zeros_like(table.unfinished.values)
+    missing = table.unfinished.values | lost
+    ratio = compute_ratios(slenderness[:, None], table.peak_rotation.values, table.overturned.values, missing)
     x, trials = (np.broadcast_to(array, ratio.shape).ravel() for array in (intensity, block_weights[:, None]))
     trial_clusters = np.broadcast_to(cluster_numbers[:, None, None], ratio.shape).ravel()
-    outcomes = create_outcome_table(table, measure, x, ratio, states)
+    outcomes = create_outcome_table(
+        bodies, table.assign(unfinished=table.unfinished | missing), measure, x, ratio, states
+    )
     if weights is not None:
         outcomes["weight"] = trials
     counted = np.arange(ratio.size)
@@ -469,8 +473,14 @@ def fragility(
         several_blocks=bool(np.count_nonzero(block_weights) > 1),
         source="motion" if clusters is None else "cluster",
         undecided=describe_undecided(setup, motions, factors, table.overturned.values),
-        missing=describe_missing(missing),
+        missing="; ".join(filter(None, [describe_missing(table.unfinished.values), _describe_lost(lost)])),
     )
+
+
+def _describe_lost(lost: Flags) -> str:
+    """Describe the number of simulations that end because the ground no longer presses on the block."""
+    count = np.count_nonzero(lost)
+    return f"{count} of {lost.size} simulations ended with a loss of contact and are not counted" if count else ""
 
 
 def fit_fragility(

@@ -30,7 +30,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
-from rocking.core.tables import add_unit, escape_dollars, format_count, format_table
+from rocking.core.tables import add_unit, escape_dollars, format_count, format_table, to_plain
 from rocking.engine.problem import compute_slenderness, compute_thresholds, gather_bodies, never_rests
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, simulate_each
@@ -38,6 +38,7 @@ from rocking.errors import OptionError
 from rocking.motion.motion import Motion, compute_uplift_factors
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, list_motions
+from rocking.simulation.ensemble import find_labels, list_block_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -128,7 +129,7 @@ def incremental_dynamic_analysis(
     options: dict[str, Any] = {"model": model, "friction": friction}
     coefficients = resolve_friction(friction)
     check_friction(bodies, model, coefficients)
-    lowest_uplift = _compute_lowest_uplift(bodies, motion_list, values, measure, model)
+    lowest_uplift = compute_lowest_uplift(bodies, motion_list, values, measure, model)
     if levels is None:
         table = _simulate_until_overturned(bodies, motion_list, measure, lowest_uplift, options)
     else:
@@ -198,6 +199,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         index, coords = self.data.band_motion.values, self.data.coords  # the names of the other table permit a join
         labels = {name: coords[name].values[index] for name in ("motion", "vertical", "record") if name in coords}
         labels["block"] = self.data.band_block.values
+        labels |= {name: coords[name].values[labels["block"]] for name in find_labels(self.data)}
         columns = {name: ("band", values) for name, values in labels.items()}
         return part[[]].assign(columns | {"band_start": part.band_start, "band_end": part.band_end})
 
@@ -217,10 +219,10 @@ class IncrementalDynamicAnalysis(DatasetResult):
     def summary(self) -> str:
         data, levels = self.data, _LevelDescription(self.data.level)
         block_count = data.sizes["block"]
-        has_several_blocks = block_count > 1
+        has_several_blocks, names = block_count > 1, list_block_names(data)
         coordinate = "record" if "record" in data.coords else "motion"
         rows = [
-            [label, *([b] * has_several_blocks), levels.describe_bands(self.bands(block=b, motion=m))]
+            [label, *([names[b]] * has_several_blocks), levels.describe_bands(self.bands(block=b, motion=m))]
             for m, label in enumerate(create_motion_labels(data, coordinate, with_history=False))
             for b in range(block_count)
         ]
@@ -249,6 +251,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
                     "name": str(data.motion.values[m]),
                     **({"vertical": str(data.vertical.values[m])} if "vertical" in data.coords else {}),
                     "block": b,
+                    **{name: to_plain(data[name].values[b]) for name in find_labels(data)},
                     add_unit("overturning_level", units): float(lowest[m, b]),
                     "overturns": [dict(zip(ends, band, strict=True)) for band in self.bands(block=b, motion=m)],
                     "peak_over_alpha": peaks[m, b],
@@ -271,7 +274,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         for m, label in enumerate(create_motion_labels(data, with_history=False)):
             bands = data.level.scale * np.array(self.bands(block=block, motion=m)).reshape(-1, 2)
             motions.append(ScaledMotion(label, levels, peaks[m], np.where(np.isnan(bands), levels[[0, -1]], bands)))
-        block_text = data.blocks if data.sizes["block"] == 1 else f"block {block}"
+        block_text = data.blocks if data.sizes["block"] == 1 else list_block_names(data)[block]
         return draw_ida(
             motions=motions,
             level_label=data.level.label,
@@ -281,7 +284,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         )
 
 
-def _compute_lowest_uplift(
+def compute_lowest_uplift(
     blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model
 ) -> float:
     """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""

@@ -26,7 +26,7 @@ from rocking.motion.description import Origin, create_label
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.response.perturbed import FACTOR_COUNT, RELATIVE_STEP, format_percent, list_factors
-from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
+from rocking.simulation.ensemble import Polarity, body_coordinates, list_labels, simulate_many
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -294,7 +294,12 @@ def check_limit_states(limit_states: Mapping[str, float] | None) -> Mapping[str,
 
 
 def create_outcome_table(
-    table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limit_states: Mapping[str, float]
+    bodies: Bodies,
+    table: xr.Dataset,
+    measure: Measure,
+    intensity: Floats,
+    ratio: Floats,
+    limit_states: Mapping[str, float],
 ) -> pd.DataFrame:
     """Create a table of all simulations (level, motion, block, polarity) with the limits that they exceed."""
     import pandas as pd
@@ -309,6 +314,7 @@ def create_outcome_table(
         {
             **{name: expand(table[name].values[:, None, None]) for name in motion_names},
             "block": expand(np.arange(table.sizes["block"])[:, None]),
+            **{name: expand(values[:, None]) for name, values in list_labels(bodies).items()},
             "polarity": expand(signs),
             measure.column: intensity,
             "peak_rotation_rad": table.peak_rotation.values.ravel(),

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
+
+import numpy as np
 
 from rocking.analysis.levels import MIRROR_NOTE
 from rocking.block.body import Body
@@ -15,7 +20,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.progress import Progress
 from rocking.core.result import Result
 from rocking.core.tables import Column, add_unit, format_count, format_table, records_to_columns, round_decimal
-from rocking.engine.problem import require_body
+from rocking.engine.problem import gather_bodies, require_body
 from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
@@ -23,7 +28,7 @@ from rocking.response import Response
 from rocking.response.mechanics import check_available_friction
 from rocking.response.perturbed import MOTION_PRECISION, choose_steps
 from rocking.response.summary import format_brief_outcome, format_ratio, round_ratio
-from rocking.simulation.ensemble import body_coordinates, collect_verticals
+from rocking.simulation.ensemble import body_coordinates, list_labels, motion_coordinates
 from rocking.simulation.simulate import simulate
 
 #: Columns of the printed table. Files contain all columns.
@@ -40,12 +45,12 @@ _SLIDING_TIME: Final = add_unit("sliding_time", "s")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BlockUnderRecords(Result):
-    """Responses of one block to several motions, named `records`, with reasons for `skipped` ones."""
+class BlocksUnderRecords(Result):
+    """Responses of each block to several motions, named `records`, with reasons for `skipped` ones."""
 
     TABLES = ("records",)
 
-    block: Body
+    block: Body | Sequence[Body]
     records: tuple[str, ...]
     responses: tuple[Response, ...]
     skipped: Mapping[str, str] = field(default_factory=dict, kw_only=True)
@@ -54,36 +59,69 @@ class BlockUnderRecords(Result):
     def rows(self) -> list[dict[str, Any]]:
         """Return a row of results for each record."""
 
+    @property
+    def bodies(self) -> list[Body]:
+        """Blocks in a list."""
+        return [*self.block] if isinstance(self.block, Sequence) else [self.block]
+
     def to_dict(self) -> dict[str, Any]:
-        return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
+        blocks = [str(body) for body in self.bodies]
+        entry = {"block": blocks[0]} if len(blocks) == 1 else {"blocks": blocks}
+        return {**entry, "records": self.rows(), "skipped": dict(self.skipped)}
 
     def _columns(self, table: str) -> list[Column]:
         return records_to_columns(self.rows(), self.skipped)
 
     def _create_labels(self) -> list[dict[str, Any]]:
-        """Create the first columns of each row: record, motion, block."""
-        columns = body_coordinates(self.block.as_bodies())
-        block: dict[str, Any] = {"block": self.block.description}
-        block |= {add_unit(name, attrs["units"]): float(values[0]) for name, (_, values, attrs) in columns.items()}
-        labels = create_record_columns(self.records, [require_motion(response) for response in self.responses])
-        return [label | block for label in labels]
+        """Create the first columns of each row: labels of the block, record, motion, block."""
+        bodies = self.bodies
+        count = len(self.responses) // len(bodies)
+        gathered = gather_bodies(bodies if len(bodies) > 1 else bodies[0])
+        names = [*list_labels(gathered)]
+        columns = {
+            _add_attribute_unit(name, attributes): np.repeat(values, count).tolist()
+            for name, (_, values, attributes) in body_coordinates(gathered).items()
+        }
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        motions = [require_motion(response) for response in self.responses]
+        records = create_record_columns(self.records[:count], motions[:count]) * len(bodies)
+        blocks = [{"block": response.block.description} for response in self.responses]
+        return [
+            {name: row[name] for name in names} | record | block | row
+            for row, record, block in zip(rows, records, blocks, strict=True)
+        ]
+
+    def _list_label_titles(self) -> dict[str, str]:
+        """Return the columns of labels in the printed table."""
+        names = {
+            name: "object" if name == "name" else name for body in self.bodies for name in getattr(body, "labels", {})
+        }
+        if names or len(self.bodies) == 1:
+            return {name: title for name, title in names.items() if name in self._create_labels()[0]}
+        return {"block": "block"}
 
     def _headline(self) -> str:
         """Summarise the number of records that overturn the block."""
         overturned = sum(response.overturned and response.perturbed().is_decided for response in self.responses)
-        return f"{self.block.description}: {format_count(len(self.records), 'record')}, overturned by {overturned}"
+        if len(self.bodies) > 1:
+            count = len(self.responses) // len(self.bodies)
+            pairs = f"{format_count(len(self.bodies), 'block')} under {format_count(count, 'record')}"
+            return f"{pairs}: {overturned} of {len(self.responses)} overturn"
+        text = format_count(len(self.records), "record")
+        return f"{self.bodies[0].description}: {text}, overturned by {overturned}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Survey(BlockUnderRecords):
-    """Responses of a block to several motions, computed by `survey`.
+class Survey(BlocksUnderRecords):
+    """Responses of one or more blocks to several motions, computed by `survey`.
 
     Attributes
     ----------
     available_friction, precision : float
         As for `survey`.
     block, records, responses, skipped
-        Body, names of the motions, their responses, and reasons why records could not be read.
+        One body or several, names of the motions and their responses (for each body in turn), and reasons why records
+        could not be read.
 
     See Also
     --------
@@ -112,10 +150,11 @@ class Survey(BlockUnderRecords):
         return rows
 
     def summary(self) -> str:
-        limit = self.block.coordinate.limit
+        limit = self.bodies[0].coordinate.limit
         ratio_columns = [{f"peak_over_{limit}": float(format_ratio(response))} for response in self.responses]
         rows = [row | ratio_column for row, ratio_column in zip(self.rows(), ratio_columns, strict=True)]
-        titles = {name.format(limit): title.format(limit) for name, title in _TABLE_COLUMNS.items()}
+        titles = self._list_label_titles()
+        titles |= {name.format(limit): title.format(limit) for name, title in _TABLE_COLUMNS.items()}
         if self.available_friction is not None:
             titles |= {_SLIDING_TIME: f"with friction {self.available_friction:g} slides at, s"}
         if any(row["processing"] for row in rows):
@@ -130,16 +169,19 @@ class Survey(BlockUnderRecords):
         return super()._headline() + undecided_text + skipped_text
 
     def to_dict(self) -> dict[str, Any]:
-        parameters = self.block.as_bodies().parameters().items()
-        numbers = {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters}
-        block = {"description": self.block.description, **numbers}
+        blocks = []
+        for body in self.bodies:
+            parameters = body.as_bodies().parameters().items()
+            numbers = {add_unit(name, unit): values[0].tolist() for name, (values, unit) in parameters}
+            blocks.append({"description": body.description, **getattr(body, "labels", {}), **numbers})
+        entry: dict[str, Any] = {"block": blocks[0]} if len(blocks) == 1 else {"blocks": blocks}
         friction = {} if self.available_friction is None else {"available_friction": self.available_friction}
-        return {"block": block, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
+        return {**entry, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RuleComparison(BlockUnderRecords):
-    """Comparison of rules of thumb with simulations for a block under several motions, computed by `check`.
+class RuleComparison(BlocksUnderRecords):
+    """Comparison of rules of thumb with simulations for blocks under several motions, computed by `check`.
 
     Attributes
     ----------
@@ -148,7 +190,8 @@ class RuleComparison(BlockUnderRecords):
     margins : tuple of float
         Reciprocal of the lowest factor on each motion that overturns the block, or NaN.
     block, records, responses, skipped
-        Block, names of the motions, their simulated responses, and reasons why records could not be read.
+        One block or several, names of the motions and their simulated responses (for each block in turn), and reasons
+        why records could not be read.
 
     See Also
     --------
@@ -190,7 +233,8 @@ class RuleComparison(BlockUnderRecords):
 
     def summary(self) -> str:
         rules = [*self.ratios[0]]
-        titles = {"record": "record", add_unit("pga", "g"): "PGA, g", add_unit("pgv", "m/s"): "PGV, m/s"}
+        titles = self._list_label_titles()
+        titles |= {"record": "record", add_unit("pga", "g"): "PGA, g", add_unit("pgv", "m/s"): "PGV, m/s"}
         titles |= {rule: format_rule_name(rule) for rule in rules}
         titles |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
         ratio_columns = [{"peak_over_slenderness": round_ratio(response)} for response in self.responses]
@@ -204,13 +248,14 @@ class RuleComparison(BlockUnderRecords):
         )
         counts = ["", *self._count_disagreements(rules)] if rules else []
         notes = (f"note: {note}" for note in self._list_notes())
-        return "\n".join([str(self.block), explanation, "", table, *counts, *notes])
+        heading = str(self.bodies[0]) if len(self.bodies) == 1 else self._headline()
+        return "\n".join([heading, explanation, "", table, *counts, *notes])
 
     def to_dict(self) -> dict[str, Any]:
         return super().to_dict() | {"notes": self._list_notes()}
 
     def _list_notes(self) -> list[str]:
-        return [] if self.block.as_bodies().is_symmetric else [MIRROR_NOTE]
+        return [] if all(body.as_bodies().is_symmetric for body in self.bodies) else [MIRROR_NOTE]
 
     def _headline(self) -> str:
         return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
@@ -243,20 +288,20 @@ def format_rule_name(rule: str) -> str:
 
 
 def survey(
-    block: Body,
+    block: Body | Sequence[Body],
     motions: Motions,
     *,
     available_friction: float | None = None,
     precision: float = MOTION_PRECISION,
     **options: Any,
 ) -> Survey:
-    """Simulate a block under many motions.
+    """Simulate a block, or each of several blocks, under many motions.
 
     Parameters
     ----------
     block, motions : optional
-        As for `simulate_many`: one block, m motions. The table shows the keys of a mapping, or otherwise the names of
-        the motions.
+        As for `simulate_many`: one or more blocks, m motions. The table shows the keys of a mapping, or otherwise the
+        names of the motions.
     available_friction : float, optional
         Coefficient of friction, to report when a block that never slips would slide.
     precision : float
@@ -290,37 +335,52 @@ def survey(
     1
     """
     named_motions = index_motions(motions)
-    if not require_body(block).coordinate.limit:
-        message = "a survey requires a Block, because only a block has an unstable equilibrium"
-        raise OptionError(f"{message}; got {type(block).__name__}")
+    bodies = [*block] if isinstance(block, Sequence) else [block]
+    for body in bodies:
+        if not require_body(body).coordinate.limit:
+            message = "a survey requires a Block, because only a block has an unstable equilibrium"
+            raise OptionError(f"{message}; got {type(body).__name__}")
     if available_friction is not None:
         check_available_friction(available_friction)
     responses = []
-    with Progress("simulating", total=len(named_motions)) as bar:
-        for motion in named_motions.values():
-            responses.append(simulate(block, motion, **options))
+    with Progress("simulating", total=len(bodies) * len(named_motions)) as bar:
+        for body, motion in itertools.product(bodies, named_motions.values()):
+            responses.append(simulate(body, motion, **options))
             # The response caches the expensive results while the progress bar is shown.
             _create_row(responses[-1], precision)
             bar.advance()
-    return Survey(block, tuple(named_motions), tuple(responses), available_friction, precision)
+    return Survey(block, tuple(named_motions) * len(bodies), tuple(responses), available_friction, precision)
 
 
-def create_folder_names(records: Sequence[str]) -> list[str]:
-    """Create a unique folder name for each record."""
+def create_folder_names(records: Sequence[str], responses: Sequence[Response] = ()) -> list[str]:
+    """Create a unique folder name for each record, after the name of the block of its response."""
     names: dict[str, None] = {}
-    for record in records:
+    blocks = [getattr(response.block, "labels", {}).get("name", "") for response in responses] or [""] * len(records)
+    for block, record in zip(blocks, records, strict=True):
         # Names of pulses contain a colon, which some file systems do not allow.
         stem = Path(record).stem.replace(":", "-") if record != "-" else "standard-input"
+        stem = f"{create_file_stem(str(block))}-{stem}" if block else stem
         alternatives = (f"{stem}-{k}" for k in range(2, len(records) + 2))
         names[stem if stem not in names else next(name for name in alternatives if name not in names)] = None
     return list(names)
 
 
+def create_file_stem(name: str) -> str:
+    """Replace characters of a name that a file system may not allow."""
+    return re.sub(r"[^\w.+#-]+", "-", name).strip("-.") or "object"
+
+
 def create_record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
     """Create columns with the requested name of each record, and the name of its motion as in other analyses."""
     columns = {"record": records, "motion": list_motion_names(motions)}
-    columns |= {name: values for name, (_, values, *_) in collect_verticals(motions).items()}
+    columns |= {
+        _add_attribute_unit(name, *rest): values for name, (_, values, *rest) in motion_coordinates(motions).items()
+    }
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _add_attribute_unit(name: str, attributes: Mapping[str, str] = MappingProxyType({})) -> str:
+    return add_unit(name, attributes.get("units", "1"))
 
 
 def require_motion(response: Response) -> Motion:

@@ -18,7 +18,7 @@ from rocking.block.single import Block, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
-from rocking.core.tables import format_range
+from rocking.core.tables import format_cell, format_range
 from rocking.errors import BlockError, escape_braces
 from rocking.kernels import state
 
@@ -63,6 +63,8 @@ class Blocks:
         `one_sided` is 1, and both columns of all parameters contain the values of side +.
     axes : dict of str to ndarray, or None
         Axes of a grid: p (rad/s), alpha (rad) and restitution if it was an argument. The last one varies fastest.
+    labels : dict of str to ndarray
+        Names and further facts of labelled blocks (`Block.with_labels`), shape (n,); empty otherwise.
 
     Raises
     ------
@@ -88,6 +90,7 @@ class Blocks:
     terms: dict[str, Floats]
     axes: dict[str, Floats] | None
     radii: Floats | None  # m, of the gathered single blocks, NaN for frames; None: of the only body with p and alpha
+    labels: Mapping[str, NDArray[Any]]
 
     def __init__(
         self,
@@ -125,13 +128,14 @@ class Blocks:
         arrays: Mapping[str, Floats],
         axes: dict[str, Floats] | None = None,
         radii: Floats | None = None,
+        labels: Mapping[str, NDArray[Any]] | None = None,
     ) -> Blocks:
         """Set all attributes from valid arrays of shape (n, 2), which become read-only."""
         columns = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
         for values in columns.values():
             values.flags.writeable = False
         self.__dict__.update({name: columns.pop(name) for name in _FIELDS}, gravity=gravity, terms=columns, axes=axes)
-        self.__dict__["radii"] = radii
+        self.__dict__.update(radii=radii, labels=labels or {})
         return self
 
     @classmethod
@@ -293,7 +297,10 @@ class Blocks:
         table = np.array(rows).transpose(2, 0, 1)
         names = (*_FIELDS, *_TERMS)[: len(table)]
         radii = np.array([body._list_radii() for body in bodies])
-        return cls.__new__(cls)._fill(gravities.pop(), dict(zip(names, table, strict=True)), radii=radii)
+        labels = {
+            name: _collect_label(bodies, name) for name in dict.fromkeys(n for body in bodies for n in body.labels)
+        }
+        return cls.__new__(cls)._fill(gravities.pop(), dict(zip(names, table, strict=True)), radii=radii, labels=labels)
 
     @property
     def kind(self) -> str:
@@ -408,10 +415,12 @@ class Blocks:
                 for side in range(2)
             ]
             is_one_sided = bool(self.terms["one_sided"][index, 0])
+        labels = {name: values[index].item() for name, values in self.labels.items()}
         if not is_one_sided and terms == [RestraintTerms(), RestraintTerms()]:
-            return block
+            return block.with_labels(**labels) if labels else block
         text = "block with restraints" + ", rocking one way" * is_one_sided
-        return RestrainedBlock.__new__(RestrainedBlock)._fill(block, terms, text, is_one_sided=is_one_sided)
+        restrained = RestrainedBlock.__new__(RestrainedBlock)._fill(block, terms, text, is_one_sided=is_one_sided)
+        return restrained.with_labels(**labels) if labels else restrained
 
     def __iter__(self) -> Iterator[Block | RestrainedBlock]:
         return (self[index] for index in range(len(self)))
@@ -431,7 +440,8 @@ class Blocks:
             raise BlockError(f"select requires {requirement}, not {checks.short_repr(index)}; {hint}")
         arrays = {name: values[rows] for name, values in self._arrays().items()}
         radii = None if self.radii is None else self.radii[rows]
-        return Blocks.__new__(Blocks)._fill(self.gravity, arrays, radii=radii)
+        labels = {name: values[rows] for name, values in self.labels.items()}
+        return Blocks.__new__(Blocks)._fill(self.gravity, arrays, radii=radii, labels=labels)
 
     def with_p_scaled(self, factors: Floats) -> Blocks:
         """Return blocks of the same shapes with p multiplied by these factors.
@@ -442,8 +452,16 @@ class Blocks:
         scale = factors[:, None]
         terms = {name: values * scale ** _EXPONENTS.get(name, 0) for name, values in self.terms.items()}
         blocks = Blocks(self.p * scale, self.alpha, self.restitution, gravity=self.gravity, **terms)
-        blocks.__dict__["radii"] = None if self.radii is None else self.radii / scale**2
+        blocks.__dict__.update(radii=None if self.radii is None else self.radii / scale**2, labels=self.labels)
         return blocks
+
+
+def _collect_label(bodies: Iterable[Any], name: str) -> NDArray[Any]:
+    """Return a label of all bodies as numbers, NaN if missing, or else as texts."""
+    values = [body.labels.get(name) for body in bodies]
+    if all(value is None or isinstance(value, (int, float)) for value in values):
+        return np.array(values, dtype=np.float64)
+    return np.array(["" if value is None else format_cell(value) for value in values])
 
 
 def resolve_p(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:

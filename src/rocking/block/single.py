@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Never
+from typing import Any, Final, Never, Self
 
 import numpy as np
 
@@ -42,7 +43,40 @@ _MAX_MASS_RATIO: Final = 1e12
 
 
 class Rocking:
-    """Text, stops and arrays shared by free and restrained blocks."""
+    """Text, labels, stops and arrays shared by free and restrained blocks."""
+
+    #: Name and further facts, for example its place, which do not affect the motion.
+    labels: Mapping[str, str | float] = {}
+    description: str
+
+    def with_labels(self, **labels: str | float) -> Self:
+        """Return the block with a name and further facts, which tables, files and figures contain.
+
+        Parameters
+        ----------
+        **labels : str or float
+            Facts by name. ``name`` is also part of the description.
+
+        Returns
+        -------
+        same type
+            The same block with these labels added.
+
+        See Also
+        --------
+        rocking.read_inventory : Read named blocks from a table.
+
+        Examples
+        --------
+        >>> print(Block(width=0.24, height=1.1).with_labels(name="vase", room="12").description)
+        vase: rectangular block, 0.24 m x 1.1 m
+        """
+        labelled = copy.copy(self)
+        text = self.description.removeprefix(f"{self.labels.get('name', '')}: ")
+        combined = {**self.labels, **labels}
+        name = str(combined.get("name", ""))
+        labelled.__dict__.update(labels=combined, description=f"{name}: {text}" if name else text)
+        return labelled
 
     def __str__(self: Body) -> str:
         """Return the description and the parameters in one line."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, get_args
 
@@ -17,8 +17,9 @@ from rocking.calibration.validate import ShakeTest
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.core.tables import add_unit, format_count, read_csv_rows
+from rocking.core.tables import format_count
 from rocking.errors import OptionError, RecordError, RockingError
+from rocking.inputs.inventory import read_labelled, read_rows
 from rocking.inputs.pulses import FAMILIES, named_pulse
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -93,34 +94,24 @@ def read_calibration(
 
 def read_ensemble(path: Path) -> Ensemble:
     """Read the ensemble that `Calibration.to_csv` writes."""
-    table = read_table(path)
-    parameters = ("p", "rad/s"), ("alpha", "rad"), ("restitution", "1")
-    columns = [[add_unit(f"{name}_{side}", unit) for side in ("plus", "minus")] for name, unit in parameters]
-    missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
-    if missing:
+    inventory = read_labelled(path, expected=("weight", "model"))
+    labels = [{name: str(value) for name, value in body.labels.items()} for body in inventory]
+    table = _Table(path, tuple(labels[0]), tuple(zip(inventory.lines, labels, strict=True)))
+    if missing := [name for name in ("weight", "model") if name not in table.columns]:
         raise table.create_error(f"expected the ensemble.csv of a calibration, with columns {' and '.join(missing)}")
     parse = {name: name for name in get_args(Model)}.__getitem__
     models = {table.convert(line, row["model"], parse, "linear or nonlinear") for line, row in table.rows}
     if len(models) > 1:
         raise table.create_error("an ensemble must have one model, not both; correct the column model", line=None)
-    try:
-        blocks = Blocks(*(np.column_stack([table.numbers(side) for side in sides]) for sides in columns))
-    except RockingError as error:
-        error.message = replace(error.message, template=f"block 0 is in line 2: {error.message.template}")
-        error.path = str(path)
-        raise
-    return Ensemble(blocks, table.numbers("weight"), models.pop())
+    blocks = Blocks.from_bodies(inventory)
+    if blocks.terms:
+        raise table.create_error("the blocks of an ensemble have no restraints; remove their columns")
+    return Ensemble(Blocks(blocks.p, blocks.alpha, blocks.restitution), table.numbers("weight"), models.pop())
 
 
 def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Table:
-    """Read a CSV table with distinct columns, whose header cells are converted."""
-    try:
-        text = path.read_text("utf-8-sig")
-    except OSError as error:
-        raise RecordError(f"the file cannot be read: {error.strerror}", path=str(path)) from None
-    except UnicodeDecodeError:
-        raise RecordError("the file is not a text table in UTF-8; save it as CSV", path=str(path)) from None
-    cells = read_csv_rows(text)
+    """Read a CSV table or a workbook with distinct columns, whose header cells are converted."""
+    cells = read_rows(path)
     if len(cells) < 2:
         raise RecordError("the table has no rows below its header", path=str(path))
     (_, header), *rows = cells

@@ -37,6 +37,7 @@ for _module, _commands in {
     "simulate": ("simulate", "check", "records", "pulses"),
     "analysis": ("chatter", "critical", "spectrum", "map", "ida", "measures"),
     "fragility": ("fragility",),
+    "assess": ("assess",),
     "calibrate": ("calibrate", "validate"),
     "mesh": ("mesh",),
     "explore": ("explore",),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -13,6 +14,7 @@ from rocking.analysis.efficiency import compare_measures
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.overturning import overturning_map
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
+from rocking.analysis.survey import create_file_stem
 from rocking.block import Block, Blocks
 from rocking.chattering.report import chattering_report, critical_report
 from rocking.cli.options import (
@@ -28,7 +30,7 @@ from rocking.cli.options import (
     ModelOptions,
     MotionOptions,
     Names,
-    RestrainedOptions,
+    ObjectOptions,
     SlipOptions,
     SlipSchemeOptions,
     UnscaledOptions,
@@ -41,6 +43,7 @@ from rocking.errors import BlockError, OptionError
 from rocking.inputs.bodies import create_block, note_likely_mistakes
 from rocking.inputs.declared import BLOCK_DESCRIPTIONS
 from rocking.inputs.quantities import read_angle, read_array, read_length, read_tilt
+from rocking.simulation.ensemble import list_block_names
 
 #: Descriptions of a block for which the slenderness alone suffices.
 _SLENDER_DESCRIPTIONS: Final = tuple(
@@ -163,31 +166,32 @@ def ida(
     *names: Names,
     rtol: float = 1e-6,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    block: Annotated[RestrainedOptions, BLOCK] = RestrainedOptions(),
+    block: Annotated[ObjectOptions, BLOCK] = ObjectOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
     model: Annotated[SlipOptions, MODEL] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
 
-    The block is a rectangle (--width, --height, or half of each) or described by its parameters (--p, --alpha). By
-    default --levels increase in steps of 5 % to three times the level by which every motion has overturned the block.
-    Bands and gaps between two levels are missed. Closer levels miss fewer. --out contains ida.png, .pdf, .nc,
-    levels.csv, bands.csv (levels that overturn) and result.json.
+    The block is a rectangle (--width, --height, or half of each), described by its parameters (--p, --alpha), or each
+    object of a table (--inventory), with a figure for each. By default --levels increase in steps of 5 % to three times
+    the level by which every motion has overturned the block. Bands and gaps between two levels are missed. Closer
+    levels miss fewer. --out contains ida.png, .pdf, .nc, levels.csv, bands.csv (levels that overturn) and result.json.
 
     Parameters
     ----------
     rtol
         Width of the refined ends of bands, relative to the level.
     """
-    body = block.body()
+    body = block.bodies()
     with output.folder() as folder:
         loaded = motion.read_all(names)
         motions = [*loaded.motions.values()]
         result = incremental_dynamic_analysis(
             body, motions, **measure.arguments(motion.component), **model.arguments(), rtol=rtol
         )
-        _write_and_print(result, "ida", loaded, folder=folder, as_json=output.as_json)
+        blocks = list_block_names(result.data) if isinstance(body, Sequence) else []
+        _write_and_print(result, "ida", loaded, folder=folder, as_json=output.as_json, blocks=blocks)
 
 
 def measures(
@@ -237,9 +241,13 @@ def _write_and_print(
     *,
     folder: Path | None,
     as_json: bool,
+    blocks: Sequence[str] = (),
     **figure: Any,
 ) -> None:
-    """Write an analysis into a folder, if any (figure, tables, dataset, result), and print it, with the records."""
+    """Write an analysis into a folder, if any (figures, tables, dataset, result), and print it, with the records.
+
+    Several blocks have their own figures.
+    """
     result = analysis.to_dict()
     if loaded is not None:
         result |= loaded.to_dict()
@@ -247,7 +255,12 @@ def _write_and_print(
     if folder is not None:
         write_tables(folder, analysis)
         analysis.to_netcdf(folder / f"{stem}.nc")
-        write_results(folder, figures={stem: functools.partial(analysis.plot, **figure)}, result=result)
+        plot: Callable[..., Any] = analysis.plot
+        figures = {stem: functools.partial(plot, **figure)}
+        if blocks:
+            stems = [f"{stem}-{create_file_stem(name)}" for name in blocks]
+            figures = {name: functools.partial(plot, block=k) for k, name in enumerate(stems)}
+        write_results(folder, figures=figures, result=result)
     print_result(result, analysis.summary(), as_json=as_json)
 
 

@@ -116,7 +116,7 @@ def fragility(
             raise OptionError(message, "outcomes", option)
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", OptionError)
-    curve = _read_hazard(hazard, site, years, measure.periods, motion.component)
+    curve = read_hazard(hazard, site, years, measure.periods, motion.component)
     states, intensity_measure = parse_limit_states(limit_states), measure.create_measure(motion.component)
     if output.out is not None:
         check_nrml_names("taxonomy", taxonomy)
@@ -197,7 +197,7 @@ def _save_outcomes_on_failure(folder: Path | None) -> Iterator[None]:
         raise
 
 
-def _read_hazard(
+def read_hazard(
     file: Path | None, site: int, years: float, period: Any, component: ComponentName
 ) -> HazardCurve | None:
     """Read a hazard curve, if any, with notes."""

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import functools
-import inspect
 import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, make_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, TypeVar, cast
@@ -21,12 +19,11 @@ from rocking.errors import (
     MotionError,
     OptionError,
     RecordError,
-    RockingError,
-    escape_braces,
     join_placeholders,
 )
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
+from rocking.inputs.inventory import read_inventory
 from rocking.inputs.notes import motion_notes, vertical_notes
 from rocking.inputs.pulses import named_pulse
 from rocking.inputs.quantities import (
@@ -138,25 +135,48 @@ class RestrainedOptions(BlockOptions):
 
     def body(self) -> Body:
         """Return the block, with its restraints if any."""
-        block, forces = bodies.create_block(self.read_uncertain(*declared.BLOCK)), self._forces()
-        try:
-            body = bodies.create_body(block, self.read_values("restitution", "one_sided", "lean"), forces)
-        except BlockError as error:
-            if not forces or error.argument != "offset":
-                raise
-            raise BlockError(escape_braces(str(error))) from error  # of a restraint, not the --offset of the block
+        texts = self.supplied()
+        block, body = bodies.create_restrained(bodies.read_values(texts), bodies.read_forces(texts))
         bodies.note_likely_mistakes([block], [body])
         return body
 
-    def _forces(self) -> list[Any]:
-        """Return the restraints and loads."""
-        texts = self.supplied()
-        forces = [_create_from_pairs(declared.FORCES[k], text, k) for k in declared.FORCES for text in texts.get(k, ())]
-        for name, couple in declared.COUPLES.items():
-            if name in texts:
-                with _add_option_to_errors(name):
-                    forces.append(couple(INPUTS[name].read(texts[name])))
-        return forces
+
+_INVENTORY_HELP: Final = "CSV or Excel table with an object in each row, instead of a block (rocking assess --help)."
+
+
+@dataclass(frozen=True)
+class _InventoryOptions(BlockOptions):
+    """Block, or objects from a table."""
+
+    inventory: Annotated[Path | None, Parameter(help=_INVENTORY_HELP)] = None
+
+    def objects(self, create: Callable[[], Body]) -> Any:
+        """Return the objects of the table, or else the block that a function creates."""
+        if self.inventory is None:
+            return create()
+        if conflicting := [name for name in self.supplied() if name != "inventory"]:
+            message = f"{{}} replaces the block: omit {join_placeholders(conflicting)}"
+            raise BlockError(message, "inventory", *conflicting)
+        inventory = read_inventory(self.inventory)
+        return inventory if len(inventory) > 1 else inventory[0]
+
+
+@dataclass(frozen=True)
+class FreeObjectOptions(_InventoryOptions):
+    """Block without restraints, or objects from a table."""
+
+    def blocks(self) -> Any:
+        """Return the block, or the objects."""
+        return self.objects(self.block)
+
+
+@dataclass(frozen=True)
+class ObjectOptions(RestrainedOptions, _InventoryOptions):
+    """Block, or objects from a table."""
+
+    def bodies(self) -> Any:
+        """Return the block, or the objects."""
+        return self.objects(self.body)
 
 
 _SAMPLES: Final = 100
@@ -180,7 +200,9 @@ class EnsembleOptions(RestrainedOptions):
         if self.ensemble is None:
             values = self.read_uncertain(*declared.BLOCK, "one_sided", "lean")
             if bodies.find_uncertain(values):
-                blocks = bodies.sample_bodies(values, self.samples or _SAMPLES, self.seed or 0, self._forces())
+                blocks = bodies.sample_bodies(
+                    values, self.samples or _SAMPLES, self.seed or 0, bodies.read_forces(self.supplied())
+                )
                 return {"blocks": blocks, "model": model.model}
             for name in self.supplied("samples", "seed"):
                 message = "{} requires an uncertain size or parameter, as in {} '0.30 +- 0.02'"
@@ -198,42 +220,6 @@ def read_ensemble_arguments(file: Path, model: ModelOptions) -> dict[str, Any]:
 
     ensemble = read_ensemble(file)
     return {"blocks": ensemble.blocks, "weights": ensemble.weights, "model": model.equation or ensemble.model}
-
-
-@contextmanager
-def _add_option_to_errors(option: str) -> Iterator[None]:
-    """Add the option to errors on its parameters, because other options share their names."""
-    try:
-        yield
-    except RockingError as error:
-        raise OptionError(f"{{}}: {escape_braces(str(error))}", option) from error
-
-
-def _create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
-    """Create an object from an option with NAME=VALUE pairs."""
-    parameters = inspect.signature(kind).parameters.values()
-    flags = {parameter.name for parameter in parameters if isinstance(parameter.default, bool)}
-    values = _read_pairs(text, option, bodies.find_reader, flags)
-    bodies.check_parameters(kind, values, "{}", option)
-    with _add_option_to_errors(option):
-        return kind(**values)
-
-
-def _read_pairs(
-    text: str, option: str, find_reader: Callable[[str], NumberReader], flags: Collection[str] = ()
-) -> dict[str, Any]:
-    """Return the values of NAME=VALUE pairs."""
-    values: dict[str, Any] = {}
-    for part in text.split(","):
-        name, equals, value = (parameter.strip() for parameter in part.partition("="))
-        name = name.replace("-", "_")
-        if not equals or name in values:
-            message = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
-            raise OptionError(message + escape_braces(repr(text)), option, value=text)
-        if name in flags and value not in ("yes", "no"):
-            raise OptionError(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
-        values[name] = value == "yes" if name in flags else find_reader(name)(value, option)
-    return values
 
 
 #: Options of `FileOptions`, by the names of arguments.
@@ -291,8 +277,8 @@ class FileOptions(InputOptions):
         """Return the stochastic motions by distinct names."""
         motions: list[Motion] = []
         for text in self.supplied().get("stochastic", ()):
-            values = _read_pairs(text, "stochastic", lambda name: bodies.STOCHASTIC.get(name, read_number))
-            with _add_option_to_errors("stochastic"):
+            values = bodies.read_pairs(text, "stochastic", lambda name: bodies.STOCHASTIC.get(name, read_number))
+            with bodies.add_option_to_errors("stochastic"):
                 motions += bodies.create_stochastic(values, "{}", "stochastic")
         named = zip(list_motion_names(motions), motions, strict=True)
         return {name: self._scale(name, motion, self._target()) for name, motion in named}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,11 +15,11 @@ from rocking.cli.options import (
     BLOCK,
     MODEL,
     RECORDS,
-    BlockOptions,
     FileOptions,
+    FreeObjectOptions,
     MotionOptions,
     Names,
-    RestrainedOptions,
+    ObjectOptions,
     SlipOptions,
     SlipSchemeOptions,
     StartOptions,
@@ -73,18 +73,19 @@ def simulate(
     each: Annotated[bool, Parameter(negative="")] = False,
     energy: Annotated[bool, Parameter(negative="")] = False,
     start: Annotated[_ResponseOptions, MODEL] = _ResponseOptions(),
-    block: Annotated[RestrainedOptions, BLOCK] = RestrainedOptions(),
+    block: Annotated[ObjectOptions, BLOCK] = ObjectOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
     model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Simulate one block under a record and describe its response; for several records, print one line each.
+    """Simulate a block under a record and describe its response; for several of either, print one line for each pair.
 
     The block is a rectangle (--width, --height, or half of each; --offset if its centre of mass is not in the middle),
     or described by its parameters (--p, --alpha) or pivots (--pivots, --height-of-mass, --gyration). It may be
     restrained or pushed (--tendon, --spring, --damper, --thrust, --load), lean, or rock to one side only (--one-sided).
-    For one record --out contains response.png, .pdf, .csv, .nc, events.csv, impacts.csv and result.json; for several,
-    summary.csv, summary.json and (if openpyxl is installed) summary.xlsx.
+    With --inventory each object of a table is simulated. For one block and record --out contains response.png, .pdf,
+    .csv, .nc, events.csv, impacts.csv and result.json; for several, summary.csv, summary.json and (if openpyxl is
+    installed) summary.xlsx.
 
     Parameters
     ----------
@@ -97,27 +98,27 @@ def simulate(
         check_available_friction(start.available_friction)  # checked before the simulation
     choose_steps(start.precision)
     summary_options: dict[str, Any] = {name: getattr(start, name) for name in ("available_friction", "precision")}
-    body = block.body()
+    body = block.bodies()
     options: dict[str, Any] = {**model.arguments(), **start.read_values()}
     for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
         raise OptionError("{} writes files; set their folder with {}", name, "out")
     with output.folder() as folder:
         loaded = motion.read_all(names)
-        if loaded.is_single:
+        if loaded.is_single and not isinstance(body, Sequence):
             ((record, base_motion),) = loaded.motions.items()
             response = run_simulation(body, base_motion, **options)
             result = _write_response(response, record, summary_options, folder, energy)
             text = response.summary(**summary_options)
         else:
             if energy and not each:
-                raise OptionError("{} draws single responses; with several records also use {}", "energy", "each")
+                raise OptionError("{} draws single responses; with several of them also use {}", "energy", "each")
             results = replace(survey(body, loaded.motions, **summary_options, **options), skipped=loaded.skipped)
             if folder is not None:
                 results.to_csv(folder / "summary.csv")
                 results.to_json(folder / "summary.json")
                 with skip_on_error("summary.xlsx"):
                     results.to_excel(folder / "summary.xlsx")
-                folders = create_folder_names(results.records) if each else []
+                folders = create_folder_names(results.records, results.responses) if each else []
                 for name, record, response in zip(folders, results.records, results.responses, strict=False):
                     _write_response(response, record, summary_options, create_subfolder(folder, name), energy)
             result, text = results.to_dict(), results.summary()
@@ -146,22 +147,23 @@ def _write_response(
 def check(
     *names: Names,
     rules: str | None = None,
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    block: Annotated[FreeObjectOptions, BLOCK] = FreeObjectOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
     model: Annotated[SlipOptions, MODEL] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compare rules of thumb with the simulated response of a block under records.
 
-    The block is a rectangle (--width, --height, or half of each) or described by its parameters (--p, --alpha). Numbers
-    are demand divided by capacity: a rule predicts overturning from 1 on. --out contains check.csv and result.json.
+    The block is a rectangle (--width, --height, or half of each), described by its parameters (--p, --alpha), or each
+    object of a table (--inventory). Numbers are demand divided by capacity: a rule predicts overturning from 1 on.
+    --out contains check.csv and result.json.
 
     Parameters
     ----------
     rules
         Some of west,ishiyama,housner,asce_43_05,priestley. By default all.
     """
-    body = block.block()
+    body = block.blocks()
     rule_names = None if rules is None else [name.strip() for name in rules.split(",")]
     with output.folder() as folder:
         loaded = motion.read_all(names)

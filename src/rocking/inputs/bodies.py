@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import inspect
 import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, Final, TypeVar
 
 from rocking.block import Block, Blocks, RestrainedBlock, Restraint
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.distributions import Distribution
 from rocking.core.progress import note
-from rocking.errors import BlockError, OptionError, escape_braces, join_placeholders
+from rocking.errors import BlockError, OptionError, RockingError, escape_braces, join_placeholders
 from rocking.inputs import texts
-from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, INPUTS, READERS, BlockDescription
+from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, COUPLES, FORCES, INPUTS, READERS, BlockDescription
 from rocking.inputs.notes import block_notes, restraint_notes
 from rocking.inputs.quantities import NumberReader
 from rocking.motion.motion import Motion
 from rocking.motion.stochastic import synthesize_motions
+
+Item = TypeVar("Item")
 
 #: Number of bodies that are checked for likely mistakes.
 _MAX_CHECKED: Final = 100
@@ -96,12 +99,41 @@ def write_block_call(values: Mapping[str, Any]) -> str:
     return f"{find_description(values).make.__qualname__}({texts.write_arguments(_convert_arguments(values))})"
 
 
-def create_body(block: Block, values: Mapping[str, Any], restraints: Sequence[Restraint] = ()) -> Body:
+def create_body(
+    block: Block, values: Mapping[str, Any], restraints: Sequence[Restraint] = ()
+) -> Block | RestrainedBlock:
     """Return a block with its restraints, as a wall or leaning if the values require it; by default the block alone."""
     options = {name: values[name] for name in ("one_sided", "lean") if name in values}
     if not restraints and not options:
         return block
     return RestrainedBlock(block, *restraints, **options, restitution=values.get("restitution"))
+
+
+def read_values(texts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of inputs from their texts, without forces; uncertain values are distributions."""
+    return {
+        name: INPUTS[name].read_uncertain(text) for name, text in texts.items() if name in INPUTS and name not in FORCES
+    }
+
+
+def read_forces(texts: Mapping[str, Any]) -> list[Restraint]:
+    """Create the restraints and loads from texts of inputs, of which those of `FORCES` are sequences."""
+    forces = [create_from_pairs(FORCES[name], text, name) for name in FORCES for text in texts.get(name, ())]
+    for name in (name for name in COUPLES if name in texts):
+        with add_option_to_errors(name):
+            forces.append(COUPLES[name](INPUTS[name].read(texts[name])))
+    return forces
+
+
+def create_restrained(values: Mapping[str, Any], forces: Sequence[Restraint]) -> tuple[Block, Block | RestrainedBlock]:
+    """Create a block without and with its restraints."""
+    block = create_block({name: value for name, value in values.items() if name in BLOCK})
+    try:
+        return block, create_body(block, values, forces)
+    except BlockError as error:
+        if not forces or error.argument != "offset":
+            raise
+        raise BlockError(escape_braces(str(error))) from error  # of a restraint, not the --offset of the block
 
 
 def note_likely_mistakes(blocks: Sequence[Block], bodies: Sequence[Body] = ()) -> None:
@@ -149,3 +181,39 @@ def check_parameters(factory: Callable[..., object], provided: Iterable[str], ow
 
 def _convert_arguments(values: Mapping[str, Any]) -> dict[str, Any]:
     return {declared_input.argument or name: values[name] for name, declared_input in INPUTS.items() if name in values}
+
+
+@contextmanager
+def add_option_to_errors(option: str) -> Iterator[None]:
+    """Add the option to errors on its parameters, because other options share their names."""
+    try:
+        yield
+    except RockingError as error:
+        raise OptionError(f"{{}}: {escape_braces(str(error))}", option) from error
+
+
+def create_from_pairs(kind: Callable[..., Item], text: str, option: str) -> Item:
+    """Create an object from an option with NAME=VALUE pairs."""
+    parameters = inspect.signature(kind).parameters.values()
+    flags = {parameter.name for parameter in parameters if isinstance(parameter.default, bool)}
+    values = read_pairs(text, option, find_reader, flags)
+    check_parameters(kind, values, "{}", option)
+    with add_option_to_errors(option):
+        return kind(**values)
+
+
+def read_pairs(
+    text: str, option: str, find_reader: Callable[[str], NumberReader], flags: Collection[str] = ()
+) -> dict[str, Any]:
+    """Return the values of NAME=VALUE pairs."""
+    values: dict[str, Any] = {}
+    for part in text.split(","):
+        name, equals, value = (parameter.strip() for parameter in part.partition("="))
+        name = name.replace("-", "_")
+        if not equals or name in values:
+            message = "{} must be NAME=VALUE pairs separated by commas, with distinct names; got "
+            raise OptionError(message + escape_braces(repr(text)), option, value=text)
+        if name in flags and value not in ("yes", "no"):
+            raise OptionError(f"{{}} must contain {name}=yes or {name}=no; got {value!r}", option, value=text)
+        values[name] = value == "yes" if name in flags else find_reader(name)(value, option)
+    return values

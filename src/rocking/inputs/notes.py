@@ -72,10 +72,15 @@ def motion_notes(motion: Motion) -> tuple[str, ...]:
     ('the peak acceleration is 8.16 g, more than any ground motion has: are the units right?',)
     """
     notes = reading_notes(motion)
-    direction = _find_origin(motion).channel
-    if _VERTICAL.fullmatch(direction):
+    if is_vertical(motion):
+        direction = _find_origin(motion).channel
         notes += (f"the channel {direction!r} looks vertical, but it is taken for a horizontal motion",)
     return notes + vertical_notes(motion)
+
+
+def is_vertical(motion: Motion) -> bool:
+    """Return whether the name of a motion's channel is that of a vertical component."""
+    return _VERTICAL.fullmatch(_find_origin(motion).channel) is not None
 
 
 def vertical_notes(motion: Motion) -> tuple[str, ...]:

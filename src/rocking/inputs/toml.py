@@ -83,15 +83,6 @@ class Tables:
         return heading_line or 1
 
 
-@contextlib.contextmanager
-def locate_errors(file: Path, line: int) -> Iterator[None]:
-    """Add to an error the line of a file."""
-    try:
-        yield
-    except RockingError as error:
-        raise relocate_error(error, StudyError, file, line) from None
-
-
 def relocate_error(error: RockingError, error_type: type[_Error], file: Path, line: int) -> _Error:
     """Return an error with the same data, and with a line of a file before its own location."""
     message = error.text().removesuffix(error.message.text()) + error.message.template

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, Final
@@ -220,9 +221,15 @@ def compute_significant_span(motion: MotionMeasures, start: float = 0.05, end: f
     return _compute_time_at_energy(motion, energy, start), _compute_time_at_energy(motion, energy, end)
 
 
+@functools.cache
+def _compute_gauss_rule(count: int) -> tuple[Floats, Floats]:
+    """Return nodes and weights of Gauss's rule."""
+    return np.polynomial.legendre.leggauss(count)
+
+
 def _integrate_square(coefficients: Floats, widths: Floats) -> Floats:
     """Integrate the squared polynomials over their widths, exactly, by Gauss's rule with degree + 1 points."""
-    nodes, weights = np.polynomial.legendre.leggauss(coefficients.shape[-1])
+    nodes, weights = _compute_gauss_rule(coefficients.shape[-1])
     values = piecewise.evaluate_pieces(coefficients[..., np.newaxis, :], 0.5 * widths[..., np.newaxis] * (nodes + 1.0))
     energy: Floats = 0.5 * widths * (values**2 @ weights)
     return energy

@@ -19,6 +19,7 @@ from rocking.plot.canvas import (
     PALE,
     FigureOptions,
     add_labels,
+    add_text,
     choose_styles,
     compute_cell_edges,
     open_page,
@@ -194,6 +195,10 @@ _PANEL_SIZE: Final = (3.5, 2.9)
 _PANELS_PER_ROW: Final = 2
 
 
+#: Maximum number of blocks with names.
+_MAX_NAMED_BLOCKS: Final = 20
+
+
 def draw_blocks(
     p: Floats,
     alpha: Floats,
@@ -201,9 +206,13 @@ def draw_blocks(
     panels: Mapping[str, Floats],
     value_label: str,
     missing_label: str,
+    block_names: Sequence[str] = (),
     **options: Unpack[FigureOptions],
 ) -> Figure:
-    """Draw a number for each block as the colour of a marker, in one or several panels with one colour scale."""
+    """Draw a number for each block as the colour of a marker, in one or several panels with one colour scale.
+
+    Up to 20 blocks are named.
+    """
     if options.get("ax") is not None and len(panels) > 1:
         raise OptionError(f"{len(panels)} panels require a separate figure; omit ax, or select one panel")
     names, columns = [*panels], min(len(panels), _PANELS_PER_ROW)
@@ -220,6 +229,8 @@ def draw_blocks(
             if not is_finite.all():
                 style = {"color": ACCENT, "marker": "x", "linewidth": 0.7, "label": missing_label, **size}
                 axes.scatter(p[~is_finite], degrees[~is_finite], **style)
+            for k, text in enumerate(block_names if len(block_names) <= _MAX_NAMED_BLOCKS else ()):
+                add_text(axes, escape_dollars(text), (p[k], degrees[k]), (5.0, 3.0), fontsize="small", color=INK)
             add_labels(axes, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
                 axes.set_title(escape_dollars(name), color=INK)

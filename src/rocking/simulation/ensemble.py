@@ -25,7 +25,7 @@ from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
 from rocking.motion.scaling import FACTOR, SCALING_MEASURES, Measure, MeasureName
-from rocking.records.named import Motions, list_motion_names, list_motions
+from rocking.records.named import Motions, list_motion_names, list_motions, make_names_unique
 from rocking.response.perturbed import FACTOR_COUNT, RELATIVE_STEP, list_factors
 
 if TYPE_CHECKING:
@@ -67,6 +67,17 @@ SLIPS: Final[Mapping[str, tuple[str, str]]] = {
     "largest_slip": ("m", "largest displacement of the base relative to the ground in size"),
     "residual_slip": ("m", "displacement of the base relative to the ground at the end"),
 }
+
+#: Names of coordinates and results that labels of blocks must not replace.
+_RESERVED: Final = {
+    *VARIABLES, *TIMES, *SLIPS, "motion", "record", "file", "vertical", "scale", "level", "polarity", "block", "weight",
+    "limit_state", "fractile", "change", "median", "dispersion", "exceeded", "outcomes", "fault",
+    "low", "high", "known",
+}  # fmt: skip
+
+#: Units of parameters of pulses.
+_PULSE_UNITS: Final = {"amplitude": "m/s^2", "frequency": "Hz", "duration": "s", "phase": "rad"}
+
 _SHARE_MEANING: Final = "share of the simulation and its repeats within 3e-6 of the motion that overturn"
 
 
@@ -261,7 +272,7 @@ def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     variables = {name: (dimensions, values, variable_attributes.get(name, {})) for name, values in outcomes.items()}
     coordinates = {
         "motion": ("motion", list_motion_names(product.motions)),
-        **collect_verticals(product.motions),
+        **motion_coordinates(product.motions),
         "scale": ("scale", product.scales.values, product.scales.attributes),
         "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in product.signs]),
         **body_coordinates(product.bodies),
@@ -285,15 +296,50 @@ def collect_verticals(motions: Sequence[Motion]) -> dict[str, Any]:
     return {"vertical": ("motion", names)} if any(motion.vertical for motion in motions) else {}
 
 
+def motion_coordinates(motions: Sequence[Motion]) -> dict[str, Any]:
+    """Return vertical components, files, and parameters of pulses as coordinates of ``motion``, if there are any."""
+    descriptions = [motion.description for motion in motions]
+    coordinates = collect_verticals(motions)
+    if any(files := ["" if item.origin is None else item.origin.file for item in descriptions]):
+        coordinates["file"] = ("motion", files)
+    for name in dict.fromkeys(name for item in descriptions for name in item.parameters):
+        is_velocity = name == "amplitude" and all("Mavroeidis" in item.family for item in descriptions)
+        unit = "m/s" if is_velocity else _PULSE_UNITS.get(name.partition("_")[0], "1")
+        values = [item.parameters.get(name, math.nan) for item in descriptions]
+        coordinates[f"pulse_{name}"] = ("motion", values, {"units": unit})
+    return coordinates
+
+
 def body_coordinates(bodies: Bodies) -> dict[str, Any]:
-    """Return parameters with units as coordinates of ``block``, one for each side if the sides differ."""
+    """Return labels, and parameters with units, as coordinates of ``block``, one for each side if the sides differ."""
     columns = bodies.parameters()
     are_equal = all(np.array_equal(values[:, 0], values[:, 1], equal_nan=True) for values, _ in columns.values())
-    coordinates = {}
+    coordinates: dict[str, Any] = {name: ("block", values, {}) for name, values in list_labels(bodies).items()}
     for name, (values, units) in columns.items():
         for k, suffix in enumerate(("",) if are_equal else ("_plus", "_minus")):
             coordinates[f"{name}{suffix}"] = ("block", values[:, k], {"units": units})
     return coordinates
+
+
+def list_labels(bodies: Bodies) -> dict[str, NDArray[Any]]:
+    """Return the labels of blocks by the name of their coordinate, which differs from the names of results."""
+    labels = bodies.labels if isinstance(bodies, Blocks) else {}
+    return {
+        f"object_{name}" if name in {*_RESERVED, *bodies.parameters()} else name: values
+        for name, values in labels.items()
+    }
+
+
+def find_labels(data: xr.Dataset) -> list[str]:
+    """Return the coordinates that are labels of blocks; parameters have units."""
+    block_coordinates = [str(name) for name, values in data.coords.items() if values.dims == ("block",)]
+    return [name for name in block_coordinates if "units" not in data[name].attrs and name not in ("block", "weight")]
+
+
+def list_block_names(data: xr.Dataset) -> list[str]:
+    """Return distinct names of blocks for texts and figures: their own, or else numbers from 1."""
+    names = data["name"].values if "name" in find_labels(data) else [""] * data.sizes["block"]
+    return make_names_unique([str(name) or f"block {k}" for k, name in enumerate(names, start=1)])
 
 
 def simulate_many(

@@ -15,7 +15,6 @@ from rocking.block.body import Bodies
 from rocking.block.friction import resolve_friction
 from rocking.core import checks
 from rocking.core.progress import note
-from rocking.core.tables import format_count, read_csv_rows
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import MotionError, OptionError, RecordError, StudyError, join_placeholders
 from rocking.inputs import quantities
@@ -30,9 +29,10 @@ from rocking.inputs.bodies import (
     note_likely_mistakes,
 )
 from rocking.inputs.declared import BLOCK, COUPLES, FORCES, INPUTS, SUPPORTS, read_noted_acceleration
+from rocking.inputs.inventory import read_inventory
 from rocking.inputs.notes import motion_notes
 from rocking.inputs.pulses import find_family
-from rocking.inputs.toml import Tables, locate_errors
+from rocking.inputs.toml import Tables
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.named import OWN, expand_record_names, load_motion, path_exists
@@ -76,9 +76,6 @@ _VALUE_TYPES: Final[Mapping[str, tuple[Any, str]]] = {
     **dict.fromkeys(("channel", "baseline"), (str | int, "text or a whole number")),
     "records": ([str], "a list of texts"),
 }
-
-#: Parameters that may differ between the two sides, in table columns with these suffixes.
-_SIDE_SUFFIXES: Final = ("_plus", "_minus")
 
 
 @dataclass(frozen=True)
@@ -190,7 +187,8 @@ def _read_bodies(tables: Tables) -> Bodies:
     if "csv" in entries:
         if len(entries) > 1:
             raise tables.create_error("blocks", "csv", "{} cannot be combined with other keys", "csv")
-        return _read_blocks_csv(tables, tables.file.parent / entries["csv"])
+        with tables.locating_errors("blocks", key="csv"):
+            return Blocks.from_bodies(read_inventory(tables.file.parent / entries["csv"]))
     with tables.locating_errors("blocks"):
         find_description(entries)
     axes: dict[str, Any] = {}
@@ -256,37 +254,6 @@ def _create_stochastic_motions(tables: Tables, k: int) -> list[Motion]:
         return create_stochastic(values, f"[[{table}]]")
 
     return [*itertools.chain(*_create_objects(tables, table, k, tables.table(table, k), STOCHASTIC.get, create))]
-
-
-def _read_blocks_csv(tables: Tables, file: Path) -> Blocks:
-    try:
-        rows = read_csv_rows(file.read_text("utf-8-sig"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text table in UTF-8; save it as CSV"
-        raise tables.create_error("blocks", "csv", f"{file} cannot be read: {reason}") from None
-    if len(rows) < 2:
-        message = f"{file} contains no blocks; a heading and a row for each block are required"
-        raise tables.create_error("blocks", "csv", message)
-    headings, known_names = rows[0][1], [name + suffix for name in BLOCK for suffix in ("", *_SIDE_SUFFIXES)]
-    for name in headings:
-        suggestion = "" if name in known_names else checks.suggest(name, known_names, "")
-        if suggestion or name in _RESTRAINT_KEYS or (name in known_names and headings.count(name) > 1):
-            fault = suggestion or ("it belongs under [blocks]" if name in _RESTRAINT_KEYS else "it occurs twice")
-            raise tables.create_error("blocks", "csv", f"column {name} of {file} cannot be read; {fault}")
-    blocks = []
-    for line, row in rows[1:]:
-        with locate_errors(file, line):
-            if len(row) != len(headings):
-                cells_text, columns_text = format_count(len(row), "cell"), format_count(len(headings), "column")
-                raise StudyError(f"this row has {cells_text} for {columns_text}; correct it")
-            cells, values = dict(zip(headings, row, strict=True)), {}
-            for name in BLOCK:
-                sides = [cells[name + suffix] for suffix in _SIDE_SUFFIXES if name + suffix in cells]
-                if text := cells.get(name, ",".join(sides)):
-                    values[name] = INPUTS[name].read(text)
-            blocks.append(create_block(values))
-    note_likely_mistakes(blocks)
-    return Blocks.from_bodies(blocks)
 
 
 def _read_scales(tables: Tables) -> Scales:

@@ -235,6 +235,8 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
     bodies, scales = product.bodies, product.scales
     arrays = {f"{bodies.kind}/{name}": values for name, (values, _) in bodies.parameters().items()}
     arrays[f"{bodies.kind}/gravity"] = np.array(bodies.gravity)
+    if isinstance(bodies, Blocks):
+        arrays |= {f"labels/{name}": values for name, values in bodies.labels.items()}
     for k, motion in enumerate(product.motions):
         arrays |= _motion_to_arrays(motion, f"motions/{k}")
     measure = None if scales.measure is None else {"name": scales.measure.name, **scales.measure.options()}
@@ -256,14 +258,15 @@ def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
         raise StudyError("the study contains an unknown kind of body: import its module first")
     values = {name.partition("/")[2]: array for name, array in arrays.items() if name.startswith(f"{kind}/")}
     motions = dict.fromkeys(name.split("/")[1] for name in arrays if name.startswith("motions/"))
-    texts = {name: json.loads(str(array)) for name, array in arrays.items() if array.dtype.kind == "U"}
+    texts = {name: json.loads(str(array)) for name, array in arrays.items() if name.startswith(("scales/m", "rules/"))}
+    labels = {name.partition("/")[2]: array for name, array in arrays.items() if name.startswith("labels/")}
     measure, chattering = texts["scales/measure"], chattering_scheme(texts["rules/chattering"])
     bodies, friction = (
         BODIES_TYPES[kind](**{**values, "gravity": float(values["gravity"])}),
         texts.get("rules/friction"),
     )
-    if "sizes/radii" in arrays:
-        bodies.__dict__["radii"] = arrays["sizes/radii"]
+    if isinstance(bodies, Blocks):
+        bodies.__dict__.update(radii=arrays.get("sizes/radii"), labels=labels)
     return Product(
         bodies,
         tuple(_motion_from_arrays(arrays, f"motions/{k}") for k in motions),

@@ -50,7 +50,14 @@ from rocking.engine.problem import compute_slenderness
 from rocking.engine.tasks import OUTCOME, describe_missing
 from rocking.errors import FitError, OptionError, StudyError, describe_install
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, body_coordinates, collect_verticals, create_dataset
+from rocking.simulation.ensemble import (
+    Product,
+    body_coordinates,
+    collect_verticals,
+    create_dataset,
+    find_labels,
+    list_block_names,
+)
 from rocking.studies.folder import Store
 from rocking.studies.units import OUTCOMES, format_key
 
@@ -339,7 +346,8 @@ class BlockTable(DatasetResult):
             return np.asarray(np.mean([parameters[key] for key in keys], axis=0))
 
         selected = {names[k]: panels[k] for k in select_evenly(len(names), 4)}
-        labels = {"value_label": label, "missing_label": missing}
+        labels: dict[str, Any] = {"value_label": label, "missing_label": missing}
+        labels["block_names"] = list_block_names(self.data) if "name" in find_labels(self.data) else []
         title = title or escape_dollars(self.data.description)
         return draw_blocks(
             average("p"), average("alpha"), panels=selected, **labels, title=title, ax=ax, figsize=figsize

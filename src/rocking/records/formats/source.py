@@ -144,6 +144,15 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     return Source(name, raw, data)
 
 
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Read a text table in UTF-8, or the first sheet of a workbook as comma-separated text."""
+    source = open_source(path)
+    try:
+        return source.data.decode()
+    except UnicodeDecodeError:
+        raise source.error("the file is not a text table in UTF-8; save it as CSV") from None
+
+
 def split_archive(name: str) -> tuple[str, str] | None:
     """Return the ZIP archive and the member of a name such as records.zip/file.at2, or None."""
     for match in re.finditer(r"(?i)\.zip[/\\]", name):

@@ -1,0 +1,1 @@
+"""Assessment of named objects under records: computation, and its report as one HTML page."""

@@ -1,0 +1,339 @@
+"""Report of an assessment as one HTML page with figures, which prints on A4 with a page for each object."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
+from html import escape
+from importlib import metadata
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from rocking.analysis.risk import describe_extrapolated_shares
+from rocking.assessment.chart import Chart
+from rocking.core.constants import STANDARD_GRAVITY, VERSION
+from rocking.core.tables import format_count, write_text
+
+#: Rules of thumb beside the simulations.
+RULES: Final = ("west", "ishiyama")
+
+#: Maximum number of names in a sentence.
+_MAX_NAMES: Final = 5
+
+
+def write_page(assessment: Any, path: str | Path, command: str) -> None:
+    """Write the report of an assessment."""
+    style = Path(__file__).with_name("report.css").read_text("utf-8")
+    title = f"Assessment of {format_count(len(assessment.objects), 'object')}"
+    parts = [_write_overview(assessment, title)]
+    parts += [_write_object(assessment, k) for k in range(len(assessment.objects))]
+    parts += [_write_records(assessment), _write_method(assessment, command)]
+    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
+    body = "\n".join(parts)
+    write_text(path, f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>\n{style}</style></head>\n{body}\n</html>\n')
+
+
+def _write_overview(assessment: Any, title: str) -> str:
+    """Write the summary table, the figure of all objects, and failures."""
+    header, rows = assessment.tabulate()
+    labels = assessment.labels
+    position = header.index("object") + 1
+    header = [*header[:position], *labels, *header[position:]]
+    linked = []
+    for k, row in enumerate(rows):
+        values = [assessment.label(name, k) for name in labels]
+        linked.append([*row[:position], *values, *row[position:]])
+    anchors = {(k, position - 1): f"object-{k + 1}" for k in range(len(rows))}
+    hazard = "" if assessment.hazard is None else f" The hazard curve is {escape(repr(assessment.hazard.name))}."
+    basis = "return period of overturning" if assessment.hazard is not None else "median intensity"
+    confidence = f"{100 * assessment.confidence:g} %"
+    failures = [f"<li><b>{escape(name)}</b>: {escape(why)}</li>" for name, why in assessment.failures.items()]
+    failed = f'<div class="failed"><h3>Not assessed</h3><ul>{"".join(failures)}</ul></div>' if failures else ""
+    return f"""<h1>{title} under {format_count(len(assessment.motions), "ground motion")}</h1>
+<p>Intensity measure: {escape(assessment.measure.label)}.{hazard} Intervals have {confidence} confidence. Objects are
+ranked by their {basis}. The ranks in brackets are possible within the intervals.</p>
+{_write_table(header, linked, anchors=anchors)}
+{failed}
+<h3>Median intensity of overturning</h3>
+{_draw_overview(assessment)}
+<p class="soft">Dots are medians, bars their {confidence} intervals. Without a fitted curve the bar extends from the
+highest level at which the object stands under all motions to the level at which all motions overturn it; an arrow
+marks a bar without an end. The intervals contain the differences between the ground motions, not the errors of the
+model, of the sizes that are taken as known, and of the selection of the motions.</p>"""
+
+
+def _write_object(assessment: Any, k: int) -> str:
+    """Write the page of one object."""
+    item, data = assessment.objects[k], assessment.data
+    labels = {name: assessment.label(name, k) for name in assessment.labels}
+    details = [escape(item.body.description.removeprefix(f"{item.name}: "))]
+    details += [f"{escape(name)}: {escape(value)}" for name, value in labels.items() if value]
+    scale, unit = assessment.measure.display_factor, assessment.measure.display_unit
+    suffix = f", {unit}" if unit else ""
+    rules = [rule for rule in RULES if np.isfinite(data[rule].values[k]).all()]
+    longest = scale * item.levels[-1]
+    header = [
+        "record",
+        "PGA, g",
+        "as recorded",
+        "peak/slenderness",
+        f"overturns at{suffix}",
+        "",
+        *map(str.title, rules),
+    ]
+    rows, marks = [], {}
+    for m, name in enumerate(_shorten_names(assessment.motions)):
+        low, high = (scale * float(data[end].values[k, m]) for end in ("stands_up_to", "overturns_at"))
+        outcome, peak = _describe_outcome(data, k, m), float(data.peak_over_alpha.values[k, m])
+        text = f"&gt; {low:.2g}" if math.isinf(high) else f"{low:.2g} to {high:.2g}"
+        recorded = scale * float(data[assessment.measure.name].values[m])
+        ratios = [f"{float(data[rule].values[k, m]):.2f}" for rule in rules]
+        pga = f"{float(data.pga.values[m]) / STANDARD_GRAVITY:.3g}"
+        peak_text = "" if math.isinf(peak) else f"{peak:.2f}"
+        bar = Chart.draw_bar((low, min(high, longest)), recorded, longest, has_end=high < math.inf)
+        rows.append([escape(name), pga, escape(outcome), peak_text, text, bar, *ratios])
+        marks[m] = outcome.startswith("overturns")
+    statements = "".join(f"<li>{escape(text)}</li>" for text in describe_object(assessment, k))
+    table = _write_table(header, rows, marked=marks, dense=True, is_html=True)
+    return f"""<section id="object-{k + 1}"><h2>{k + 1}. {escape(item.name)}</h2>
+<p class="soft">{"; ".join(details)}</p>
+{_draw_fragility(assessment, item)}
+<ul>{statements}</ul>
+<h3>Each record</h3>
+{table}
+<p class="soft">Bars extend from the highest level at which the object stands to the lowest level at which it overturns;
+triangles mark the record as it is. Ratios of rules are demand divided by capacity: 1 or more predicts overturning.</p>
+</section>"""
+
+
+def _describe_outcome(data: Any, k: int, m: int) -> str:
+    if data.unfinished.values[k, m]:
+        return "not finished"
+    if data.undecided.values[k, m]:
+        return "undecided"
+    if data.overturned.values[k, m]:
+        return "overturns"
+    if data.peak_over_alpha.values[k, m] > 0.0:
+        return "stands"
+    return "slides" if "largest_slip" in data and data.largest_slip.values[k, m] > 0.0 else "does not move"
+
+
+def describe_object(assessment: Any, k: int) -> list[str]:
+    """Describe the results of an object and their certainty, one statement each."""
+    item, data, measure = assessment.objects[k], assessment.data, assessment.measure
+    names = np.array(_shorten_names(assessment.motions))
+    overturned, total = data.overturned.values[k], len(names)
+    listed = _list_names(names[overturned])
+    text = f"Under the records as they are it overturns in {overturned.sum()} of {total}{listed}"
+    undecided = data.undecided.values[k]
+    if undecided.any():
+        text += (
+            f"; {undecided.sum()} of the {total} outcomes are undecided, because they change within 3e-6 of the motion"
+        )
+    statements = [f"{text}."]
+    scale, unit = measure.display_factor, f" {measure.display_unit}".rstrip()
+    low, high = item.first_levels
+    first = int(np.argmin(high))
+    if math.isinf(high[first]):
+        statements.append(f"No record overturns it up to {scale * item.levels[-1]:.3g}{unit}, the highest level.")
+    else:
+        bounds = f"between {scale * low[first]:.3g} and {scale * high[first]:.3g}{unit}"
+        if low[first] == 0.0:
+            bounds = f"at or below {scale * high[first]:.3g}{unit}, the lowest level"
+        text = f"Scaled records first overturn it {bounds} ({names[first]})"
+        censored = int(np.isinf(high).sum())
+        text += f"; {censored} of {total} do not up to {scale * item.levels[-1]:.3g}{unit}" if censored else ""
+        statements.append(f"{text}.")
+    median, interval, dispersion = assessment.format_curve(item)
+    if item.curve is None:
+        statements.append(f"No fragility curve: {item.fault}.")
+    else:
+        simulations = format_count(int(item.curve.trials.sum()), "simulation")
+        interval = f"{100 * assessment.confidence:g} % interval {interval}"
+        text = f"Half of the motions overturn it at {median}{unit} ({interval}), with a dispersion of {dispersion}, "
+        statements.append(f"{text}from {simulations}.")
+    statements += _describe_rate(assessment, item)
+    if item.samples > 1:
+        statements.append(
+            f"Its size is uncertain: the curve is of {item.samples} sampled sizes; records have the mean."
+        )
+    statements += _describe_sliding(item, data, k)
+    for rule in RULES:
+        ratios = data[rule].values[k]
+        if np.isfinite(ratios).all():
+            right = int(np.count_nonzero((ratios >= 1.0) == overturned))
+            unsafe = int(np.count_nonzero((ratios < 1.0) & overturned))
+            statements.append(
+                f"The rule {rule.title()} is right for {right} of {total} records, and unsafe for {unsafe}."
+            )
+    notes = []
+    if item.fragility is not None and item.curve is not None:
+        has_ends = item.curve.bounded and not math.isinf(item.curve.dispersion_interval[1])
+        notes = [item.fragility.missing, item.fragility.undecided] if has_ends else [*item.fragility.notes]
+    texts = [*statements, *(f"{note}." for note in notes if note)]
+    return [f"{text[0].upper()}{text[1:]}".replace("< ", "less than ").replace("> ", "more than ") for text in texts]
+
+
+def _describe_rate(assessment: Any, item: Any) -> list[str]:
+    """Describe how often the site overturns an object."""
+    if assessment.hazard is None:
+        return []
+    years = format_count(assessment.years, "year")
+    period, interval, probability = assessment.format_rate(item)
+    if item.rate is None:
+        return [f"It overturns once in {period} years, because the outcomes only bound the rate."]
+    text = (
+        f"At the site it overturns once in {period} years (interval {interval}), and within {years} with probability "
+    )
+    return [f"{text}{probability}.", *(f"{share}." for share in describe_extrapolated_shares(item.rate))]
+
+
+def _describe_sliding(item: Any, data: Any, k: int) -> list[str]:
+    """Describe the friction that an object requires, or its slip."""
+    threshold = item.uplift / item.body.gravity
+    if item.friction is None:
+        text = (
+            f"It lifts off at {threshold:.3g} g. With a coefficient of friction below {threshold:.3g} it would slide "
+        )
+        return [text + "instead of rock; the simulations do not include sliding."]
+    text = f"With a coefficient of friction of {np.max(item.friction):g} it "
+    slip = np.nanmax(data.largest_slip.values[k]) if "largest_slip" in data else math.nan
+    slides = f"slides by up to {1000.0 * slip:.2g} mm under the records as they are" if slip > 0.0 else "does not slide"
+    if item.slides_first:
+        return [f"{text}slides instead of rocking from rest, because friction is below {threshold:.3g}; it {slides}."]
+    return [f"{text}lifts off at {threshold:.3g} g, and {slides}."]
+
+
+def _shorten_names(names: Iterable[str]) -> list[str]:
+    """Return names of files without their folders, if they remain distinct."""
+    long_names = [*names]
+    short_names = [Path(name).name for name in long_names]
+    return short_names if len({*short_names}) == len(long_names) else long_names
+
+
+def _list_names(names: Sequence[str]) -> str:
+    if not len(names):
+        return ""
+    more = f" and {len(names) - _MAX_NAMES} more" if len(names) > _MAX_NAMES else ""
+    return f" ({', '.join(names[:_MAX_NAMES])}{more})"
+
+
+def _write_records(assessment: Any) -> str:
+    """Write the table of the ground motions."""
+    data = assessment.data
+    columns = {
+        "step, s": ("step", 1.0), "duration, s": ("duration", 1.0), "D5-95, s": ("significant_duration", 1.0),
+        "PGA, g": ("pga", STANDARD_GRAVITY), "PGV, m/s": ("pgv", 1.0), "Arias, m/s": ("arias", 1.0),
+    }  # fmt: skip
+    if assessment.measure.name not in ("pga", "pgv", "arias"):
+        columns[assessment.measure.label] = (assessment.measure.name, 1.0 / assessment.measure.display_factor)
+    further = [name for name in data.coords if data[name].dims == ("motion",) and name not in ("motion", "file")]
+    rows = []
+    for m, name in enumerate(_shorten_names(assessment.motions)):
+        numbers = [
+            f"{float(data[key].values[m]) / divisor:.4g}".replace("nan", "-") for key, divisor in columns.values()
+        ]
+        texts = [str(data[key].values[m]) for key in further]
+        file = str(data["file"].values[m]) if "file" in data.coords else ""
+        file = "" if file in name else file
+        rows.append([name, file, *texts, str(data["format"].values[m]), *numbers, str(data.processing.values[m])])
+    header = ["record", "file", *map(str, further), "format", *columns, "corrections"]
+    kept = [k for k, title in enumerate(header) if title in columns or any(row[k] for row in rows)]
+    table = _write_table([header[k] for k in kept], [[row[k] for k in kept] for row in rows], dense=True)
+    return f'<section id="records"><h2>Ground motions</h2>\n{table}</section>'
+
+
+def _write_method(assessment: Any, command: str) -> str:
+    """Write assumptions, versions and the command."""
+    options = assessment.data.attrs
+    versions = [f"rocking {VERSION}", f"Python {platform.python_version()}"]
+    versions += [f"{name} {metadata.version(name)}" for name in ("numpy", "scipy")]
+    polarity = {"both": "Original and reversed motions", "+": "Original motions", "-": "Reversed motions"}
+    model = f"Rigid blocks, {assessment.model} model, events located and chattering certified."
+    assumptions = [
+        model,
+        f"{polarity[options['polarity']]}; a symmetric object responds equally to both, which count once.",
+        "Fragility: lognormal curve by maximum likelihood; motions are independent, unless they were grouped.",
+        "An undecided outcome changes if the motion is scaled by less than 3e-6.",
+        "Objects are numbered by rank, from 1.",
+    ]
+    items = "".join(f"<li>{escape(text)}</li>" for text in assumptions)
+    shown = f"<p>Command: <code>{escape(command)}</code></p>" if command else ""
+    time = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")
+    return f"""<section id="method"><h2>Method and versions</h2><ul>{items}</ul>{shown}
+<p>{escape(", ".join(versions))}; written {time}.</p></section>"""
+
+
+def _draw_overview(assessment: Any) -> str:
+    """Draw the median of each object with its interval."""
+    scale = assessment.measure.display_factor
+    rows, ends = [], list[float]()
+    for k, item in enumerate(assessment.objects):
+        curve = item.curve
+        low, high = (float(end) for end in (item.first_levels[0].min(), item.first_levels[1].max()))
+        median = math.nan
+        if curve is not None:
+            median, (low, high) = curve.median, curve.median_interval
+        rows.append((f"{k + 1}. {item.name}", scale * low, scale * median, scale * high))
+        ends += [end for end in rows[-1][1:] if 0.0 < end < math.inf]
+    return Chart.draw_intervals(rows, (min(ends), max(ends)), assessment.measure.label)
+
+
+def _draw_fragility(assessment: Any, item: Any) -> str:
+    """Draw the fragility curve with its band and the simulated shares, and the hazard curve."""
+    scale = assessment.measure.display_factor
+    chart = Chart(
+        (0.0, 1.05 * scale * item.levels[-1]), (0.0, 1.0), assessment.measure.label, "probability of overturning"
+    )
+    x = np.linspace(0.0, item.levels[-1], 121)
+    if item.curve is not None:
+        if item.curve.bounded:
+            chart.add_band(scale * x, *item.curve.band(x))
+        chart.add_line(scale * x, item.curve.probability(x), "curve")
+    chart.add_points(scale * item.levels, item.share.mean(axis=1))
+    return chart.write()
+
+
+def _write_table(
+    header: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    marked: Mapping[int, bool] = MappingProxyType({}),
+    anchors: Mapping[tuple[int, int], str] = MappingProxyType({}),
+    dense: bool = False,
+    is_html: bool = False,
+) -> str:
+    """Write a table of texts, or of HTML. The outcome (third cell) of some rows is marked; some cells are links."""
+    cells = [[cell if is_html else escape(cell) for cell in row] for row in rows]
+    kinds = [_choose_kind([row[k] for row in cells]) for k in range(len(header))]
+    heading = "".join(f"<th{kind}>{escape(title)}</th>" for kind, title in zip(kinds, header, strict=True))
+    lines = []
+    for k, row in enumerate(cells):
+        entries = [
+            f'<a href="#{anchors[k, j]}">{cell}</a>' if (k, j) in anchors else cell for j, cell in enumerate(row)
+        ]
+        styles = [' class="overturns"' if j == 2 and marked.get(k) else kind for j, kind in enumerate(kinds)]
+        pairs = zip(styles, entries, strict=True)
+        lines.append(f"<tr>{''.join(f'<td{style}>{entry}</td>' for style, entry in pairs)}</tr>\n")
+    table = f"<thead><tr>{heading}</tr></thead><tbody>\n{''.join(lines)}</tbody>"
+    return f'<div class="wide"><table{" class=dense" if dense else ""}>{table}</table></div>'
+
+
+def _choose_kind(cells: Sequence[str]) -> str:
+    """Return the class of a column: of numbers, or of other short texts such as intervals."""
+    if all(_is_number(cell) for cell in cells):
+        return ' class="number"'
+    return ' class="fixed"' if all(len(cell) <= 18 for cell in cells) else ""
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell or "nan")
+    except ValueError:
+        return cell == "-"
+    return True
