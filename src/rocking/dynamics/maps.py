@@ -216,7 +216,7 @@ def check_magnitudes(values: Floats, name: str) -> None:
 def describe_input(subject: Body | Motion) -> str:
     """Describe a body or a motion with its parameters in one line."""
     if isinstance(subject, Motion):
-        return ", ".join(part for part in (subject.label, subject.description.numbers) if part)
+        return ", ".join(part for part in (subject.label, subject.description.parameter_text) if part)
     return f"{subject.description}, {format_sides(subject.sides)}"
 
 
