@@ -1,6 +1,7 @@
 """Tables of objects: names, units, uncertainties and further columns, carried to every output."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -224,3 +225,10 @@ def test_figures_of_several_objects_have_their_names(run, tmp_path):
     code, _, err = run("simulate", "--inventory", path, "--width", "1", *pulse)
     assert code == 2
     assert "--inventory replaces the block: omit --width" in err
+
+
+@pytest.mark.parametrize("heading", ["mu", "Friction coefficient", "friction"])
+def test_the_coefficient_of_friction_may_have_its_usual_headings(tmp_path: Path, heading: str) -> None:
+    path = tmp_path / "objects.csv"
+    path.write_text(f"name,width,height,{heading}\nvase,0.24,1.1,0.3\n")
+    assert rocking.read_inventory(path)[0].labels == {"name": "vase", "friction": "0.3"}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.curve import FragilityCurve, format_median_interval
+from rocking.analysis.curve import FragilityCurve, format_interval
 from rocking.analysis.fragility import Fragility, fragility
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.incremental import compute_lowest_uplift
@@ -47,6 +47,9 @@ if TYPE_CHECKING:
 _SEARCH_COUNT: Final = 10
 _LAST_SHARE: Final = 0.9
 _MAX_PGA: Final = 5.0 * STANDARD_GRAVITY
+
+#: Largest ratio of an end of an interval to the levels that is stated as a number.
+_MAX_RATIO: Final = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +211,9 @@ class Assessment(Result):
             return [f"{scale * low.min():.2g} to {scale * np.max(high):.2g}", "-", "-"]
         ends = curve.median_interval
         median, interval = format_digits(scale * curve.median, (scale * ends[0], scale * ends[1]))
-        if math.isinf(ends[1]) or ends[0] == 0.0:
-            interval = format_median_interval(curve, scale)
+        bounds = item.levels[0] / _MAX_RATIO, item.levels[-1] * _MAX_RATIO
+        if not bounds[0] <= ends[0] <= ends[1] <= bounds[1]:
+            interval = format_interval([scale * end for end in ends], 2, (scale * bounds[0], scale * bounds[1]))
         return [median, interval, format_digits(curve.dispersion, curve.dispersion_interval)[0]]
 
     def format_rate(self, item: ObjectAssessment) -> list[str]:

@@ -39,7 +39,7 @@ from rocking.inputs.quantities import (
 from rocking.inputs.texts import write_option_name
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import ComponentName, IntensityName, Measure
-from rocking.records.components import load_pairs
+from rocking.records.components import collect_pairs
 from rocking.records.named import OWN, expand_record_names, list_motion_names, load_motion, load_vertical
 
 if TYPE_CHECKING:
@@ -380,9 +380,13 @@ class _RecordOptions(FileOptions):
         if target is not None and target[1].name != "factor":
             target = target[0], replace(target[1], component=self.component)
         options = self.read_values("dt", "units") | self.corrections()
-        pairs = load_pairs(records, vertical="vertical" in supplied, keep_going=self.keep_going, **options)
+        with_vertical = "vertical" in supplied
+        pairs, skipped = collect_pairs(records, vertical=with_vertical, keep_going=self.keep_going, **options)
+        for message in skipped.values():
+            note(f"skipped: {message}")
         named = dict(zip(list_motion_names(pairs), pairs, strict=True))
-        return LoadedRecords(self._add_reversed({k: self._scale(k, m, target) for k, m in named.items()}), {}, False)
+        motions = {name: self._scale(name, motion, target) for name, motion in named.items()}
+        return LoadedRecords(self._add_reversed(motions), skipped, False)
 
     def _add_reversed(self, motions: dict[str, Motion]) -> dict[str, Motion]:
         """Add the reversed motions if required."""

@@ -32,8 +32,11 @@ from rocking.records.units import normalise_spelling
 SIDE_SUFFIXES: Final = ("_plus", "_minus")
 _DEVIATION: Final = "_sd"
 
-#: Headings of the name of an object, if no column is called name.
-_NAMES: Final = ("object", "object_name", "item", "title")
+#: Other headings of some labels, used if no column has the label itself.
+_SYNONYMS: Final = {
+    "name": ("object", "object_name", "item", "title"),
+    "friction": ("mu", "friction_coefficient", "coefficient_of_friction"),
+}
 
 #: Inputs by the names that headings may have.
 _KNOWN: Final = {name + suffix: name for name in (*BLOCK, *SUPPORTS) for suffix in ("", *SIDE_SUFFIXES, _DEVIATION)}
@@ -121,7 +124,8 @@ def read_inventory(path: str | Path, *, keep_going: bool = False) -> Inventory:
         "alpha". The inputs are those of the command line, for example width and height, p and alpha, or pivots_plus,
         pivots_minus, height_of_mass and gyration, with offset, restitution, mass, lean, one_sided, spring, damper,
         tendon, thrust and load. A number may have its own unit (24cm). Its standard deviation follows "+-", or is in a
-        column such as width_sd. All other columns, such as name, location or friction, become labels of the blocks.
+        column such as width_sd. All other columns, such as name, location or friction (also mu), become labels of the
+        blocks.
     keep_going : bool
         Whether to skip rows that describe no block. By default the first one raises an error.
 
@@ -217,9 +221,10 @@ def _read_rows(file: Path, expected: Collection[str]) -> tuple[list[_Heading], l
         raise RecordError(message, path=str(file))
     line, cells = rows[first]
     headings = candidates[first]
-    if not any(heading.name == "name" for heading in headings):
-        k = next((k for k, heading in enumerate(headings) if heading.name in _NAMES), None)
-        headings = [_Heading("name") if j == k else heading for j, heading in enumerate(headings)]
+    for label, synonyms in _SYNONYMS.items():
+        if label not in (names := [heading.name for heading in headings]):
+            k = next((k for k, name in enumerate(names) if name in synonyms), None)
+            headings = [_Heading(label) if j == k else heading for j, heading in enumerate(headings)]
     for k, heading in enumerate(headings):
         if heading.name in [other.name for other in headings[:k]]:
             if heading.input or heading.name == "name":

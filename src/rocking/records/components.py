@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from rocking.core.progress import note
+from rocking.core.tables import format_count
 from rocking.errors import MotionError, RecordError, escape_braces
 from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
@@ -80,7 +81,7 @@ class Components:
         """
         if len(self.horizontals) != 2:
             names = ", ".join(motion.name for motion in self.horizontals) or "none"
-            text = f"{self.station} has {len(self.horizontals)} horizontal components, not two: {names}"
+            text = f"{self.station} has {format_count(len(self.horizontals), 'horizontal component')}, not two: {names}"
             raise RecordError(escape_braces(text))
         return self.horizontals[0], self.horizontals[1]
 
@@ -189,17 +190,24 @@ def load_pairs(
     >>> first.name, first.orthogonal.name
     ('ridgecrest-clc-090', 'ridgecrest-clc-360')
     """
-    motions, reasons = list[Motion](), list[str]()
+    motions, reasons = collect_pairs(names, vertical=vertical, **options)
+    for reason in reasons.values():
+        note(f"skipped: {reason}")
+    return motions
+
+
+def collect_pairs(names: Any, *, vertical: bool, **options: Any) -> tuple[tuple[Motion, ...], dict[str, str]]:
+    """Return the motions of `load_pairs`, and for each station without a pair the reason."""
+    motions, reasons = list[Motion](), dict[str, str]()
     for group in group_components(names, **options):
         try:
             motions += group.motions(vertical=vertical)
         except (RecordError, MotionError) as error:
-            reasons.append(str(error))
-    for reason in reasons:
-        if not motions:
-            raise RecordError(f"there is no pair of horizontal components; the first: {escape_braces(reason)}")
-        note(f"skipped: {reason}")
-    return tuple(motions)
+            reasons[group.station] = str(error)
+    if not motions:
+        reason = escape_braces(next(iter(reasons.values()), "there are no records"))
+        raise RecordError(f"there is no pair of horizontal components; the first: {reason}")
+    return tuple(motions), reasons
 
 
 def _create_components(station: str, event: str, motions: list[Motion]) -> Components:
