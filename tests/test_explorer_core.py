@@ -693,7 +693,7 @@ MAPS = [
     ),
     ({**_BLOCK, "motion": _PULSE}, {"x": "omega", "y": "restitution"}),
     ({**_BLOCK, "motion": ONE, "pgv": "0.9"}, {"x": "omega", "y": "restitution"}),
-    ({**_SIDES, "motion": "el-centro-meloland-270", "scale": "-2"}, {"x": "p", "y": "pga"}),
+    ({**_SIDES, "motion": "el-centro-meloland-270", "scale": "-2"}, {"x": "p", "y": "pga", "y_to": "0.7"}),
     ({**_SIDES, "motion": ONE, "scale": "-2"}, {"x": "omega", "y": "restitution"}),
     (
         {**_BLOCK, "motion": "el-centro-meloland-360", "chattering": "velocity=0.05"},
@@ -703,7 +703,7 @@ MAPS = [
     (SINE, {"x": "restitution", "y": "omega"}),
     (SINE, {"x": "omega", "y": "pga", "y_from": "0.2", "y_to": "2"}),
     ({**SINE, "restitution": "0.9,0.92"}, {"x": "p", "y": "a", "y_from": "1.01", "y_to": "1.1"}),
-    ({**STATUE, "motion": "el-centro-meloland-270"}, {"x": "alpha", "y": "pga"}),
+    ({**STATUE, "motion": "el-centro-meloland-270"}, {"x": "alpha", "y": "pga", "y_to": "0.6"}),
     ({**STATUE, "offset": "0.03", "motion": "el-centro-meloland-270"}, {"x": "p", "y": "pga", "y_to": "0.5"}),
     ({**ECCENTRIC[0], "motion": "one-sine:amplitude=4,frequency=1"}, {"x": "p", "y": "a", "y_to": "3"}),
     ({**ECCENTRIC[1], "motion": "one-sine:amplitude=4,frequency=1"}, {"x": "restitution", "y": "a", "y_to": "3"}),

@@ -18,7 +18,6 @@ NUMBERS = {
     "overturn_time": "overturn_time_s",
     "duration": "duration_s",
     "impacts": "impacts_resolved",
-    "time_at_rest": "time_at_rest_s",
 }
 
 

@@ -41,7 +41,7 @@ ROUTES: Final[dict[str, dict[str, int]]] = {
     "/page/main.js": {"GET": 200},
     "/page/index.html": {"GET": 404},
     "/page/nothing.js": {"GET": 404},
-    "/page/..%2fserver.py": {},
+    "/page/..%2fserver.py": {"GET": 404},
     "/api/start": {"GET": 200},
     "/api/case?p=2&alpha=0.2&motion=one-sine:amplitude=3,frequency=1": {"GET": 200},
     "/api/case?p=nothing": {"GET": 422},
