@@ -213,7 +213,7 @@ def test_what_is_no_pair_or_unreadable_is_said(tmp_path: Path, capsys: pytest.Ca
     with notes_for("everybody"):
         (group,) = group_components(tmp_path)
     assert "contains 'velocity'" in capsys.readouterr().err
-    assert "has 1 horizontal components, not two: Town Hall 090" in refusal(lambda: group.pair)
+    assert "has 1 horizontal component, not two: Town Hall 090" in refusal(lambda: group.pair)
     assert "no record could be read; the first: " in refusal(lambda: group_components(tmp_path / "nga.vt2"))
 
 

@@ -165,7 +165,7 @@ def overturning_map(
     """
     levels = checks.increasing_numbers(amplitudes, "amplitudes", OptionError)
     ratios = checks.increasing_numbers(frequencies, "frequencies", OptionError)
-    checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, OptionError)
+    checks.check_grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, OptionError)
     relative_width = checks.between(rtol, "rtol", OptionError, 1e-15, 0.5)
     require_block(block)
     if all(side.restitution == 1.0 for side in block.sides):

@@ -127,7 +127,7 @@ def rocking_spectrum(
     if not isinstance(bodies, Blocks):
         raise OptionError(f"a spectrum requires blocks, because only blocks have a size; got {bodies.kind}")
     if (axes := bodies.axes) is not None and p is None and size is None and weights is None:
-        checks.grid_size({"motions": len(motions), "blocks": len(bodies)}, OptionError)
+        checks.check_grid_size({"motions": len(motions), "blocks": len(bodies)}, OptionError)
         names, shape = (*(name for name in axes if name != "p"), "p"), [*map(len, axes.values())]
         table = simulate_many(bodies, motions, **options)
         outcomes = [np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in RATIO_VARIABLES]
@@ -140,7 +140,7 @@ def rocking_spectrum(
     if p is not None or size is not None:
         p_values = checks.positive_numbers(resolve_p(p, size, bodies.gravity), "p", OptionError)
     count, n = len(p_values), len(bodies)
-    checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, OptionError)
+    checks.check_grid_size({"motions": len(motions), "blocks": n, "p": count}, OptionError)
     resized = bodies.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(p_values / median, n))
     table = simulate_many(resized, motions, **options)
     table = table.transpose("motion", "block")

@@ -174,7 +174,7 @@ class Blocks:
         axes = {name: np.atleast_1d(checks.numbers(axis, name, BlockError)) for name, axis in arguments.items()}
         if any(axis.ndim != 1 or axis.size == 0 for axis in axes.values()):
             raise BlockError("each parameter of a grid must be a number or a sequence of at least one number")
-        checks.grid_size({name: axis.size for name, axis in axes.items()}, BlockError)
+        checks.check_grid_size({name: axis.size for name, axis in axes.items()}, BlockError)
         blocks = cls(*(column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")), gravity=gravity)
         return blocks._fill(blocks.gravity, blocks._arrays(), axes)
 

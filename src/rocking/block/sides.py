@@ -352,14 +352,14 @@ def compute_eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
     """
     distances = np.tan(alpha)  # divided by the height of the centre of mass
     half_width, offset = 0.5 * distances.sum(axis=1), 0.5 * (distances[:, 1] - distances[:, 0])
-    gyration = square_gyration(half_width, 1.0, offset)[:, None]
+    gyration_square = compute_gyration_square(half_width, 1.0, offset)[:, None]
     radius = np.hypot(distances, 1.0)
-    inertia = gyration + radius**2
+    inertia = gyration_square + radius**2
     p = np.sqrt(radius / inertia * (4.0 / 3.0) * np.hypot(half_width, 1.0)[:, None])
-    numerator = gyration + 1.0 - np.prod(distances, axis=1, keepdims=True)
+    numerator = gyration_square + 1.0 - np.prod(distances, axis=1, keepdims=True)
     return p, numerator / inertia[:, ::-1]
 
 
-def square_gyration(half_width: Number, half_height: float, offset: Number) -> Number:
+def compute_gyration_square(half_width: Number, half_height: float, offset: Number) -> Number:
     """Return the squared radius of gyration, m^2, of a rectangle with an offset centre of mass."""
     return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset

@@ -19,13 +19,13 @@ from rocking.block.sides import (
     check_pair,
     check_parameter,
     choose_restitutions,
+    compute_gyration_square,
     compute_rigid_bodies,
     create_even_sides,
     create_sides,
     describe_missing_body,
     format_sides,
     housner_restitution,
-    square_gyration,
 )
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
@@ -184,7 +184,7 @@ class Block(Rocking):
             alpha = math.atan2(b, h)
             sides = create_even_sides(g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha))
         else:
-            sides = create_sides((b - s, b + s), h, square_gyration(b, h, s), g, restitution)
+            sides = create_sides((b - s, b + s), h, compute_gyration_square(b, h, s), g, restitution)
             description += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
         self._fill(sides, g, description, mass, (b, h, s))
 

@@ -127,7 +127,7 @@ def items(value: object, name: str, error: Error) -> list[Any]:
     return [*value]
 
 
-def grid_size(sizes: Mapping[str, int], error: Error, max_points: int = 10_000_000) -> None:
+def check_grid_size(sizes: Mapping[str, int], error: Error, max_points: int = 10_000_000) -> None:
     """Raise `error` if the product of the sizes of a grid's axes, by name, exceeds `max_points`."""
     points = math.prod(sizes.values())
     if points > max_points:

@@ -182,7 +182,7 @@ def basins(
     x, v = checks.axis(positions, "positions", OptionError), checks.axis(velocities, "velocities", OptionError)
     check_magnitudes(x, "positions")
     check_magnitudes(v, "velocities")
-    checks.grid_size({"positions": len(x), "velocities": len(v)}, OptionError)
+    checks.check_grid_size({"positions": len(x), "velocities": len(v)}, OptionError)
     max_periods = checks.integer(n_periods, "n_periods", OptionError, minimum=1)
     grid = _BasinGrid(strobe, x, v, max_periods)
     grid.follow_all()

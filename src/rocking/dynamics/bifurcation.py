@@ -227,7 +227,7 @@ def bifurcation_diagram(
     recorded_count = checks.integer(recorded_periods, "recorded_periods", OptionError, minimum=2)
     parameter_name = checks.text(parameter, "parameter", OptionError)
     sizes = {"values": parameters.size, "starts": len(initial_states), "recorded": recorded_count}
-    checks.grid_size(sizes, OptionError)
+    checks.check_grid_size(sizes, OptionError)
 
     is_afresh, directions = selected == "afresh", ("up", "down") if selected == "both" else (selected,)
     indices = {d: range(parameters.size)[:: -1 if name == "down" else 1] for d, name in enumerate(directions)}

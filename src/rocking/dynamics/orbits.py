@@ -127,7 +127,7 @@ class PeriodicOrbit(Result):
         return f"{stable}{symmetric} orbit of {format_count(self.period, 'period')} {events}"
 
     @property
-    def _multipliers(self) -> str:
+    def _multiplier_text(self) -> str:
         """Format the multipliers with three digits."""
         texts = []
         for multiplier in self.multipliers:
@@ -137,7 +137,7 @@ class PeriodicOrbit(Result):
         return ", ".join(texts)
 
     def _headline(self) -> str:
-        return f"{self._description}, multipliers {self._multipliers}"
+        return f"{self._description}, multipliers {self._multiplier_text}"
 
     def summary(self) -> str:
         coordinate, (x, v) = self.body.coordinate, self.state
@@ -147,7 +147,7 @@ class PeriodicOrbit(Result):
             Row("motion", f"{self.motion.label}, one period of {self._map.forcing_period:.6g} s"),
             Row(coordinate.name, f"{x:.12g}", coordinate.unit, " at the start of a period"),
             Row("velocity", f"{v:.12g}", f"{coordinate.unit}/s"),
-            Row("multipliers", self._multipliers),
+            Row("multipliers", self._multiplier_text),
         ]
         return format_rows(rows, 20)
 

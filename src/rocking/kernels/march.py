@@ -167,7 +167,7 @@ def rest_until_uplift(
     if state.uplifts == 0:
         state.first_uplift = state.last_uplift_time
     state.uplifts += 1
-    if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
+    if has_vertical(ground) and is_pushed_off_both_sides(ground, block, state, state.offset):
         h = piece_length(ground, state.piece) - state.offset
         A, d = scratch.ground, scratch.auxiliary
         if block.next_side[0] != 0 and is_side_uncertain(ground, block, state.piece, state.offset, h, A, d):
@@ -371,7 +371,7 @@ def process_impact(
 ) -> int:
     """Process an impact and the decision on rest; DONE if the march ends there."""
     normalize_offset(ground, state)
-    if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
+    if has_vertical(ground) and is_pushed_off_both_sides(ground, block, state, state.offset):
         acceleration = abs(restoring_acceleration(ground, block, state.side, state.piece, state.offset))
         depth = 0.5 * state.v * state.v / acceleration  # distance below zero rotation without ground
         state.rounding_decisions += depth <= _AMBIGUOUS_DISTANCE * state.peak
@@ -399,7 +399,7 @@ def process_impact(
 
 
 @inlined
-def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -> bool:
+def is_pushed_off_both_sides(ground: Ground, block: Record, state: Record, offset: float) -> bool:
     """Return whether a block at zero rotation is pushed off to both sides."""
     side_acceleration = restoring_acceleration(ground, block, state.side, state.piece, offset)
     other_acceleration = restoring_acceleration(ground, block, block.next_side[state.side], state.piece, offset)
@@ -418,7 +418,7 @@ def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Rec
         d[k] = -(k + 1) * c[k + 1]
     lowest_time = find_first_root(d, 0, order - 1, h)
     lowest, _, _ = evaluate_series(c, order, lowest_time)
-    is_near = lowest <= _AMBIGUOUS_DISTANCE * state.peak and is_weightless(
+    is_near = lowest <= _AMBIGUOUS_DISTANCE * state.peak and is_pushed_off_both_sides(
         ground, block, state, state.offset + lowest_time
     )
     return bool(is_near or lowest <= _CONTACT_ROUNDING * state.peak)

@@ -339,12 +339,12 @@ def signed_side(side: int) -> int:
 
 @inlined
 def resting_side(block: Record, side: int) -> int:
-    """Return the side of a body at rest on a side, which identifies one of two facing stops (see `stop_at_rest`)."""
+    """Return the side of a body at rest on a side, which identifies one of two facing stops."""
     return -1 - side if block.two_stops else AT_REST
 
 
 @inlined
-def stop_at_rest(resting: int) -> int:
+def find_stop_of_resting_side(resting: int) -> int:
     """Return the stop at which a body rests (0 without two stops); ``resting`` is its `resting_side`."""
     return -1 - resting
 

@@ -26,7 +26,7 @@ from rocking.kernels.ground import (
     write_local_series,
 )
 from rocking.kernels.restraints import apply_tendon_law, plastic_at_node
-from rocking.kernels.state import AT_REST, Record, Records, stop_at_rest
+from rocking.kernels.state import AT_REST, Record, Records, find_stop_of_resting_side
 from rocking.kernels.trace import Trail
 
 
@@ -57,7 +57,7 @@ def find_next_uplift(
     plus, minus = rest_threshold(block, 0), rest_threshold(block, 1)
     restraint_plus, restraint_minus = block.restraint_threshold[0], block.restraint_threshold[1]
     if block.two_stops:  # only the stop at which the body rests
-        plus, minus = (plus, np.inf) if stop_at_rest(resting) == 0 else (np.inf, minus)
+        plus, minus = (plus, np.inf) if find_stop_of_resting_side(resting) == 0 else (np.inf, minus)
     while True:
         next_piece = next_piece_beyond(ground, piece, (-plus, minus), (-restraint_plus, restraint_minus))
         if next_piece > piece:
@@ -79,7 +79,7 @@ def find_next_uplift(
             # If rounding puts a passing at the end of the piece, the next one decides, because the motion may turn
             # back.
             if offset + passage < length:
-                side = stop_at_rest(resting) if block.two_stops else 0
+                side = find_stop_of_resting_side(resting) if block.two_stops else 0
                 if block.next_side[0] != 0:  # the body rests on both sides
                     side = find_uplift_side(ground, block, piece, offset + passage, length - offset - passage, A, d)
                 return Uplift(piece, offset + passage, side, jump_minus if side == 1 else jump_plus)

@@ -35,7 +35,7 @@ def iterate_directions(first: MotionMeasures, second: MotionMeasures) -> Iterato
     return (_Component(breakpoints, c * rows[0] + s * rows[1]) for c, s in _DIRECTIONS)
 
 
-def rotate_peaks(first: MotionMeasures, second: MotionMeasures, integrations: int) -> Floats:
+def compute_directional_peaks(first: MotionMeasures, second: MotionMeasures, integrations: int) -> Floats:
     """Compute peak acceleration, velocity or displacement (0, 1 or 2 integrations) in each direction, shape (180,)."""
     breakpoints, components = piecewise.align_pieces(first, second)
     widths, histories = np.diff(breakpoints), [*components]
@@ -44,7 +44,7 @@ def rotate_peaks(first: MotionMeasures, second: MotionMeasures, integrations: in
     return _find_peaks(widths, histories[0], histories[1])
 
 
-def rotate_spectral_acceleration(
+def compute_directional_spectrum(
     first: MotionMeasures, second: MotionMeasures, period: float, damping: float
 ) -> Floats:
     """Compute the pseudo-spectral acceleration in each direction, m/s^2, shape (180,)."""

@@ -16,7 +16,11 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import add_unit
 from rocking.errors import MotionError, OptionError, escape_braces
 from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
-from rocking.motion.pairs import iterate_directions, rotate_peaks, rotate_spectral_acceleration
+from rocking.motion.pairs import (
+    compute_directional_peaks,
+    compute_directional_spectrum,
+    iterate_directions,
+)
 
 #: Intensity measures of the analyses.
 IntensityName = Literal[
@@ -263,10 +267,10 @@ class Measure:
         reduce, name = (np.median if self.component == "rotd50" else np.max), self.motion_measure_name
         if self.period is not None:
             periods = np.ravel(self.period).tolist()
-            values = [rotate_spectral_acceleration(motion, orthogonal, period, self.damping) for period in periods]
+            values = [compute_directional_spectrum(motion, orthogonal, period, self.damping) for period in periods]
             return float(reduce(_average(values)))
         if name in ("pga", "pgv", "pgd"):
-            return float(reduce(rotate_peaks(motion, orthogonal, ("pga", "pgv", "pgd").index(name))))
+            return float(reduce(compute_directional_peaks(motion, orthogonal, ("pga", "pgv", "pgd").index(name))))
         return float(reduce([self._compute(rotated) for rotated in iterate_directions(motion, orthogonal)]))
 
     def find_factor(self, level: Any, value: Any) -> Any:

@@ -226,30 +226,30 @@ def draw_spectrum(
     widths = {share: 1.8 if share == middle else 0.9 for share in drawn_fractiles}
     labelled, has_singles = select_evenly(len(curves), _MAX_NAMED_CURVES), len(curves) <= _MAX_CURVES_WITH_MOTIONS
     with open_page((5.6, 4.8), **options) as page:
-        peaks, *shares = panels = page.create_panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
+        peak_axes, *share_axes = panels = page.create_panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
         for k, (style, curve) in enumerate(zip(choose_styles(len(curves)), curves, strict=True)):
-            peaks.plot([], [], linewidth=1.4, label=escape_dollars(curve.label) if k in labelled else "", **style)
+            peak_axes.plot([], [], linewidth=1.4, label=escape_dollars(curve.label) if k in labelled else "", **style)
             if has_singles:
                 singles = np.where(np.isfinite(curve.singles), curve.singles, np.nan)
-                peaks.plot(x, singles.T, color=style["color"], linewidth=0.5, alpha=0.35)
+                peak_axes.plot(x, singles.T, color=style["color"], linewidth=0.5, alpha=0.35)
             for share, width in widths.items():
                 fractile = curve.fractiles[[*fractiles].index(share)]
-                _draw_peaks(peaks, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
-            for panel in shares:
+                _draw_peaks(peak_axes, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
+            for panel in share_axes:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         if len(labelled) < len(curves):
-            peaks.plot([], [], linestyle="none", label=f"({len(labelled)} of {len(curves)} named)")
+            peak_axes.plot([], [], linestyle="none", label=f"({len(labelled)} of {len(curves)} named)")
         if len(motions) > 1:
             if has_singles:
-                peaks.plot([], [], color=GREY, linewidth=0.5, label=f"each of {len(motions)} motions")
+                peak_axes.plot([], [], color=GREY, linewidth=0.5, label=f"each of {len(motions)} motions")
             for share, width in widths.items():
                 label = "median" if share == 0.5 else f"{100 * share:g} % of the motions are below"
-                peaks.plot([], [], color=INK, linewidth=width, label=label)
-        peaks.grid(True, which="both")
+                peak_axes.plot([], [], color=INK, linewidth=width, label=label)
+        peak_axes.grid(True, which="both")
         set_log_axis(panels[-1], x)
-        peaks.set_ylim(bottom=0.0)
-        add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
-        for panel in shares:
+        peak_axes.set_ylim(bottom=0.0)
+        add_labels(peak_axes, "" if share_axes else x_label, "peak rotation / slenderness")
+        for panel in share_axes:
             panel.grid(True, which="both")
             panel.set_ylim(-0.03, 1.03)
             add_labels(panel, x_label, "share overturned")
@@ -291,13 +291,13 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
     standing_levels = np.concatenate([motion.levels[np.isfinite(motion.peak)] for motion in motions])
     last = max(float(motion.levels[-1]) for motion in motions)
     with open_page((7.0, 4.2), **options) as page:
-        curves, *strips = page.create_panels("AB", sharey=True, width_ratios=(2.0, 1.0))
+        curve_axes, *strip_axes = page.create_panels("AB", sharey=True, width_ratios=(2.0, 1.0))
         for k, motion in enumerate(motions):
             style = CURVES[k] if has_few else {"color": GREY, "linewidth": 0.6}
             peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
             label, size = (names[k], 5.0) if has_few else ("each motion", 3.0)
-            curves.plot(peak, motion.levels, label=label, marker=".", markersize=size, markeredgewidth=0.0, **style)
-            for panel in strips:
+            curve_axes.plot(peak, motion.levels, label=label, marker=".", markersize=size, markeredgewidth=0.0, **style)
+            for panel in strip_axes:
                 for band in motion.bands:
                     # Lines at the ends keep the thinnest strip visible.
                     color = style["color"] if has_few else INK
@@ -311,11 +311,11 @@ def draw_ida(*, motions: Sequence[ScaledMotion], level_label: str, **options: Un
                 level = reached[int(np.ceil(share * len(motions))) - 1]
                 label = f"level that suffices for {100 * share:g} % of them"
                 finite_level = np.where(np.isfinite(level), level, np.nan)
-                curves.plot(peaks, finite_level, color=ACCENT, linestyle=linestyle, label=label)
-        curves.set(xlim=(0.0, None), ylim=(0.0, min(1.5 * float(standing_levels.max(initial=0.0)) or last, last)))
-        curves.grid(True)
-        add_labels(curves, "peak rotation / slenderness", level_label)
-        for panel in strips:
+                curve_axes.plot(peaks, finite_level, color=ACCENT, linestyle=linestyle, label=label)
+        curve_axes.set(xlim=(0.0, None), ylim=(0.0, min(1.5 * float(standing_levels.max(initial=0.0)) or last, last)))
+        curve_axes.grid(True)
+        add_labels(curve_axes, "peak rotation / slenderness", level_label)
+        for panel in strip_axes:
             panel.set_xticks(range(len(motions)), [str(k + 1) for k in range(len(motions))] if has_few else names)
             panel.tick_params("x", labelrotation=0 if has_few else 90, labelsize="small")
             panel.set_xlim(-0.7, len(motions) - 0.3)

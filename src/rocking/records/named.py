@@ -224,12 +224,12 @@ def _unfold(name: str) -> list[str]:
     return []
 
 
-def _scale_files(name: str, line: int, row: list[str], files: list[int], factor: int) -> Iterator[str]:
+def _scale_files(name: str, line: int, row: list[str], file_columns: list[int], factor_column: int) -> Iterator[str]:
     """Yield the files in a row of a selection with their factor."""
-    text = row[factor].strip() if len(row) > factor else ""
+    text = row[factor_column].strip() if len(row) > factor_column else ""
     if not _FACTOR.fullmatch(f"- x {text}"):
         raise RecordError(f"the scale factor must be a number; got {text!r}", path=name, line=line, value=text)
-    for cell in (row[k].strip() for k in files if len(row) > k and row[k].strip()):
+    for cell in (row[k].strip() for k in file_columns if len(row) > k and row[k].strip()):
         sibling = str(Path(name).parent / cell)
         yield f"{sibling if path_exists(sibling) else cell} x {text}"
 

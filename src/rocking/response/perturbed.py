@@ -119,7 +119,7 @@ class PerturbedSimulations(Result):
     @property
     def is_decided(self) -> bool:
         """Whether the outcome is the same for all factors."""
-        return len({_merge(repeat.outcome) for repeat in self.repeats}) == 1
+        return len({_count_unmoved_as_standing(repeat.outcome) for repeat in self.repeats}) == 1
 
     @property
     def peak_range(self) -> tuple[float, float]:
@@ -164,7 +164,11 @@ class PerturbedSimulations(Result):
     @property
     def agreeing_repeats(self) -> list[Repeat]:
         """Simulations with the outcome of factor 1."""
-        return [repeat for repeat in self.repeats if _merge(repeat.outcome) == _merge(self._middle.outcome)]
+        return [
+            repeat
+            for repeat in self.repeats
+            if _count_unmoved_as_standing(repeat.outcome) == _count_unmoved_as_standing(self._middle.outcome)
+        ]
 
     @property
     def outcome(self) -> str:
@@ -242,7 +246,7 @@ def format_percent(share: float) -> str:
     return f"{float(mantissa):g}e{int(exponent)}"
 
 
-def _merge(outcome: str) -> str:
+def _count_unmoved_as_standing(outcome: str) -> str:
     return STANDS if outcome == UNMOVED else outcome
 
 

@@ -203,7 +203,7 @@ def _read_bodies(tables: Tables) -> Bodies:
     with tables.locating_errors("blocks"):
         if "p" in entries and axes.keys() <= {*BLOCK}:
             return Blocks.grid(**axes)
-        checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
+        checks.check_grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
         rows = [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
         blocks = [create_block(row) for row in rows]
         restraints = [[value for value in row.values() if isinstance(value, Restraint)] for row in rows]
