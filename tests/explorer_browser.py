@@ -110,9 +110,16 @@ class Watched:
 
         The time is that of a machine that does nothing else: where others wait for its cores, too, it is longer.
         """
+        from playwright.sync_api import Error
+
         deadline, pause = time.monotonic() + timeout * _busy(), 0.02
         while time.monotonic() < deadline:
-            found = self.page.evaluate(expression)
+            try:
+                found = self.page.evaluate(expression)
+            except Error as error:  # the page is being loaded
+                if "context was destroyed" not in str(error):
+                    raise
+                found = None
             if found:
                 return found
             time.sleep(pause)
