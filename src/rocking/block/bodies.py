@@ -64,7 +64,7 @@ class Blocks:
     axes : dict of str to ndarray, or None
         Axes of a grid: p (rad/s), alpha (rad) and restitution if it was an argument. The last one varies fastest.
     labels : dict of str to ndarray
-        Names and further facts of labelled blocks (`Block.with_labels`), shape (n,); empty otherwise.
+        Names and further facts of labelled blocks (``Block.with_labels``), shape (n,); empty otherwise.
 
     Raises
     ------

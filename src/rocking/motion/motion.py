@@ -269,7 +269,7 @@ class Motion(ProcessingMethods):
         >>> first, second = (rocking.records.load(f"ridgecrest-clc-{azimuth}") for azimuth in ("090", "360"))
         >>> rotd50 = rocking.Measure("pga", component="rotd50").value(first.with_orthogonal(second))
         >>> f"{first.pga:.2f} {second.pga:.2f} {rotd50:.2f} m/s^2"
-        ''
+        '3.38 5.01 4.25 m/s^2'
         """
         if isinstance(orthogonal, Motion):
             orthogonal = replace(orthogonal, vertical=None, orthogonal=None)

@@ -165,7 +165,7 @@ class Study:
     >>> table = pathlib.Path(tempfile.mkdtemp(), "all.csv")
     >>> study.to_csv(table)
     >>> table.read_text().splitlines()[1][:40]
-    'one-sine,0.4,0,2.0,0.1,0.9,True,1.570796'
+    'one-sine,0.4,0,4.0,1.0,1.0,0.0,2.0,0.1,0'
     """
 
     def __init__(self, folder: str | Path) -> None:
