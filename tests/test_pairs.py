@@ -138,7 +138,7 @@ def test_components_follow_delays_processing_and_scaling_and_are_dropped_otherwi
         (lambda: Measure.parse("sa_average"), "requires periods, in s"),
         (lambda: noise(1).scaled_to(3.0, "duration"), "measure must be one of"),
         (lambda: noise(1).with_orthogonal(3.0), "orthogonal must be a Motion"),  # type: ignore[arg-type]
-        (lambda: load_pairs("ridgecrest-clc-090"), "no pair of horizontal components"),
+        (lambda: load_pairs("ridgecrest-clc-090"), "no station has a pair of horizontal components"),
         (lambda: PAIR[0].with_orthogonal(PAIR[0]), "orthogonal must be perpendicular"),
         (lambda: fragility(BLOCK, PAIR, larger=True), "requires a measure of the pair"),
         (

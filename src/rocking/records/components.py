@@ -206,7 +206,7 @@ def collect_pairs(names: Any, *, vertical: bool, **options: Any) -> tuple[tuple[
             reasons[group.station] = str(error)
     if not motions:
         reason = escape_braces(next(iter(reasons.values()), "there are no records"))
-        raise RecordError(f"there is no pair of horizontal components; the first: {reason}")
+        raise RecordError(f"no station has a pair of horizontal components: {reason}")
     return tuple(motions), reasons
 
 
