@@ -16,7 +16,7 @@ from rocking.analysis.curve import FragilityCurve, format_interval
 from rocking.analysis.fragility import Fragility, fragility
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.incremental import compute_lowest_uplift
-from rocking.analysis.levels import compute_intensities, compute_units, simulate_levels
+from rocking.analysis.levels import compute_block_units, compute_intensities, simulate_levels
 from rocking.analysis.risk import Rate, check_measure
 from rocking.assessment.page import RULES, write_page
 from rocking.block import Block, Blocks
@@ -430,7 +430,7 @@ class _Study:
         strongest = np.median(
             [_MAX_PGA * value / motion.pga for value, motion in zip(values, self.motions, strict=True)]
         )
-        unit = float(compute_units(blocks, measure, model).min())
+        unit = float(compute_block_units(blocks, measure, model).min())
         search = np.geomspace(lowest, min(max(2.0 * lowest, strongest / unit), 64.0 * lowest), _SEARCH_COUNT)
         table = simulate_levels(blocks, self.motions, measure, search, **{**options, "polarity": "+"})
         shares = table.overturned.mean([name for name in table.overturned.dims if name != "level"]).values
