@@ -197,14 +197,15 @@ def _fit_outcomes(header: dict[str, Any], assessment: Assessment, outcomes_by_re
         reason = phrase("assessment.no_fit", reason=str(error))
         return Payload({**header, "fit": None, "why": reason, "outcomes": count}, arrays)
     curve, intensities = fragility.curves[0], np.linspace(0.0, assessment.levels[-1], 121)
-    lower, upper = curve.band(intensities) if curve.bounded else (np.zeros_like(intensities), np.ones_like(intensities))
+    without_band = (np.zeros_like(intensities), np.ones_like(intensities))
+    lower, upper = curve.band(intensities) if curve.is_bounded else without_band
     fit = {
         "median": curve.median,
         "median_interval": list(curve.median_interval),
         "dispersion": curve.dispersion,
         "dispersion_interval": list(curve.dispersion_interval),
         "confidence": curve.confidence,
-        "bounded": curve.bounded,
+        "bounded": curve.is_bounded,
         "exceeded": int(curve.exceeded.sum()),
         "notes": list(replace(fragility, source="motion" if assessment.stations is None else "cluster").notes),
     }

@@ -16,7 +16,7 @@ from rocking.core import checks
 from rocking.errors import BlockError, MotionError, RecordError
 from rocking.explorer.meshes import MeshBody, read_body, read_options
 from rocking.explorer.parameters import MESH_KINDS
-from rocking.inputs.notes import motion_notes
+from rocking.inputs.notes import list_motion_notes
 from rocking.motion.motion import Motion
 from rocking.records import formats
 from rocking.records.formats.channel import Channel
@@ -240,7 +240,7 @@ def _read_channel(upload: Upload, channel: Channel) -> Motion:
 def _describe_channel(motion: Motion, missing: list[str]) -> dict[str, Any]:
     """Return likely mistakes in a channel and its measures, or the effect of each choice of missing metadata."""
     if not missing:
-        return {"notes": list(motion_notes(motion)), "choices": {}, "measures": compute_measures(motion)}
+        return {"notes": list(list_motion_notes(motion)), "choices": {}, "measures": compute_measures(motion)}
     choices: dict[str, list[tuple[str, dict[str, float]]]] = {}
     if "units" in missing:
         peaks = {name: motion.pga * unit.multiplier / unit.divisor for name, unit in list_units().items()}
