@@ -16,8 +16,8 @@ from rocking.analysis.incremental import compute_lowest_uplift
 from rocking.analysis.levels import (
     assign_clusters,
     assign_groups,
+    compute_block_units,
     compute_intensities,
-    compute_units,
     simulate_levels,
 )
 from rocking.analysis.risk import check_measure
@@ -217,7 +217,7 @@ class _Study:
         strongest = np.median(
             [_MAX_PGA * value / motion.pga for value, motion in zip(values, self.motions, strict=True)]
         )
-        unit = float(compute_units(blocks, measure, model).min())
+        unit = float(compute_block_units(blocks, measure, model).min())
         search = np.geomspace(lowest, min(max(2.0 * lowest, strongest / unit), 64.0 * lowest), _SEARCH_COUNT)
         table = simulate_levels(blocks, self.motions, measure, search, **{**options, "polarity": "+"})
         shares = table.overturned.mean([name for name in table.overturned.dims if name != "level"]).values

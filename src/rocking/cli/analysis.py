@@ -279,7 +279,7 @@ def chatter(
     *,
     p: float | None = None,
     order: Annotated[int, INTEGER] = 4,
-    resolved: Annotated[int | None, INTEGER] = None,
+    impact_count: Annotated[int | None, INTEGER] = None,
     table: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
@@ -300,13 +300,13 @@ def chatter(
         Frequency parameter of the block, rad/s.
     order
         Number of terms of the expansion in a - 1, 1 to 40.
-    resolved
+    impact_count
         Number of impacts that the semi-analytical method resolves. The default depends on the restitution.
     table
         Show some cycles of the paper's iterative procedure (Eqs 62 and 64). cycles.csv contains all.
     """
     with output.folder() as folder:
-        report = chattering_report(a, omega, eta, order=order, resolved=resolved, p=p)
+        report = chattering_report(a, omega, eta, order=order, impact_count=impact_count, p=p)
         result, text = report.to_dict(), report.summary()
         if table:
             text += f"\n\n{report.table()}"
