@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from rocking.assessment.assess import Assessment, assess
+from rocking.assessment.assess import assess
 from rocking.assessment.page import describe_object
+from rocking.assessment.results import Assessment
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.errors import OptionError, RockingError
@@ -68,16 +69,14 @@ def assess_case(case: Case, texts: Texts, uploads: UploadStore) -> AssessedCase:
             read[name], numbers[name] = read_motion(entry, uploads), number
         except RockingError as error:
             failures[name] = str(error)
-    motions = {name: each.motion for name, each in read.items() if each.motion is not None and each.motion.pga > 0.0}
-    failures |= {name: "this does not move the ground" for name in read if name not in motions}
+    motions = {name: each.motion for name, each in read.items() if each.motion is not None}
     clusters = [stations[numbers[name]] for name in motions]
-    options: dict[str, Any] = {} if case.model == "nonlinear" else {"model": case.model}
-    options |= {} if case.friction is None else {"friction": case.friction}
+    given = {"model": case.model, "friction": case.friction, "chattering": case.texts.get("chattering")}
+    options: dict[str, Any] = {name: value for name, value in given.items() if value not in (None, "nonlinear")}
     options |= {"clusters": clusters} if len({*clusters}) < len(clusters) else {}
-    result = assess(
-        case.block.with_labels(name="block"), motions, measure=measure, levels=levels, polarity="both", **options,
-        failures=failures,
-    )  # fmt: skip
+    block = case.block.with_labels(name="block")
+    result = assess(block, motions, measure=measure, levels=levels, polarity="both", **options)
+    result = replace(result, skipped={**failures, **result.skipped})
     return AssessedCase(result, numbers, _write_script(case, read, measure, levels, options))
 
 
@@ -125,7 +124,7 @@ def describe_assessment(assessed: AssessedCase) -> Payload:
         "label": result.measure.quantity,
         "period": result.measure.period,
         "statements": describe_object(result, 0),
-        "failures": [f"{name}: {reason}" for name, reason in result.failures.items()],
+        "failures": [f"{name}: {reason}" for name, reason in result.skipped.items()],
         "records": [
             {"number": assessed.numbers[name], "name": name, **{key: data[key].values[k].item() for key in names}}
             for k, name in enumerate(result.motions)
