@@ -42,11 +42,7 @@ class Server:
     app: App
     server: uvicorn.Server
     socket: socket.socket
-
-    @property
-    def port(self) -> int:
-        """Port of the server."""
-        return int(self.socket.getsockname()[1])
+    port: int
 
     def link(self, texts: Mapping[str, str] | None = None, *, path: str = "/") -> str:
         """Return a link that opens the page at a path once, with the texts of a case."""
@@ -88,7 +84,7 @@ def start_listening(explorer: Explorer, *, port: int = 0, framed_by: str = "'non
         app.asgi, log_level="error", access_log=False, ws="none", timeout_keep_alive=10,
         limit_concurrency=_MAX_CONNECTIONS, timeout_graceful_shutdown=1,
     )  # fmt: skip
-    return Server(app, uvicorn.Server(config), listener)
+    return Server(app, uvicorn.Server(config), listener, listener.getsockname()[1])
 
 
 @dataclass(frozen=True)
