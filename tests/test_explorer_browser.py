@@ -634,7 +634,7 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
                 page.page.click(f"[data-view={view}]")
         page.until(COMPUTED[view], timeout=180.0)
         page.js("scrollTo(0, 0)")
-        page.paused(300)
+        page.until("document.getAnimations().every(({playState}) => playState !== 'running')")
         assert barriers(page) == [], view
         assert page.js("document.documentElement.scrollWidth") <= viewport["width"], view
     if viewport is PHONE:

@@ -33,15 +33,15 @@ _SENSOR: Final = re.compile(r"(?i)(?:ns|ew|ud)([12])$")
 _BOREHOLE: Final = " borehole"
 
 
-class _Component(NamedTuple):
-    """_Component of a record: its row of the list, and what it has in common with others of its station."""
+class Component(NamedTuple):
+    """Component of a record: its row of the list, and what it has in common with others of its station."""
 
     row: dict[str, Any]
     place: tuple[object, ...]  # equal for components of one sensor
     origin: tuple[str, ...]  # event and station
     samples: int = 0
 
-    def belongs_to(self, group: list[_Component]) -> bool:
+    def belongs_to(self, group: list[Component]) -> bool:
         """Whether a component belongs to a group of up to two horizontal ones and a vertical one."""
         first, is_up = group[0], self.row["is_up"]
         labels = [member.row["label"] for member in group if member.row["is_up"] == is_up]
@@ -68,7 +68,7 @@ def read_entries(text: str) -> list[dict[str, str]]:
 def list_records(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, Any]:
     """Return all records grouped by station; ``answers`` contains texts such as ``dt`` by the key of a file."""
     answers_by_key = {answer["key"]: answer for answer in answers if "key" in answer}
-    components, problems = list[_Component](), dict[str, str]()
+    components, problems = list[Component](), dict[str, str]()
     for key in uploads.list_records():
         components += _list_readable(uploads, key, answers_by_key.get(key, {}), problems)
     groups = []
@@ -97,7 +97,7 @@ def describe_entries(entries: list[dict[str, str]], uploads: UploadStore) -> lis
     return list(zip(titles, map(int, assign_numbers(stations)), strict=True))
 
 
-def _list_readable(uploads: UploadStore, key: str, answers: Texts, problems: dict[str, str]) -> list[_Component]:
+def _list_readable(uploads: UploadStore, key: str, answers: Texts, problems: dict[str, str]) -> list[Component]:
     """Return the channels of a file, read without wrong answers, for which the problem is added."""
     try:
         return _list_channels(uploads, key, answers)
@@ -110,12 +110,12 @@ def _list_readable(uploads: UploadStore, key: str, answers: Texts, problems: dic
 
 
 @functools.cache
-def _list_shipped() -> tuple[_Component, ...]:
-    def describe(name: str) -> _Component:
+def _list_shipped() -> tuple[Component, ...]:
+    def describe(name: str) -> Component:
         record = records.info(name)
         measures, origin = compute_measures(records.load(name)), (record.title.rpartition(", ")[0],)
         row = _create_row({"motion": name}, record.title, record.direction, record.direction == "up", measures)
-        return _Component(row, (name.rpartition("-")[0],), origin)
+        return Component(row, (name.rpartition("-")[0],), origin)
 
     return tuple(map(describe, records.names()))
 
@@ -128,7 +128,7 @@ def _create_row(
     return {**row, "key": "", "file": "", "missing": [], "raw": None, **facts}
 
 
-def _list_channels(uploads: UploadStore, key: str, answers: Texts) -> list[_Component]:
+def _list_channels(uploads: UploadStore, key: str, answers: Texts) -> list[Component]:
     """Return the channels of a file, read with the user's answers."""
     options = {name: PARAMETERS[name].read(answers[name]) for name in _ANSWERS if answers.get(name)}
     contents, missing = uploads.describe_file(key, **options), uploads.describe_file(key)["missing"]
@@ -144,7 +144,7 @@ def _list_channels(uploads: UploadStore, key: str, answers: Texts) -> list[_Comp
         title, facts = f"{name}, {channel['name']}" if has_many else name, {"key": key, "file": name}
         facts |= {"missing": contents["missing"], "raw": channel["raw"]}
         row = _create_row(texts, title, label, is_up, channel["measures"], **facts)
-        components.append(_Component(row, place, origin, channel["samples"]))
+        components.append(Component(row, place, origin, channel["samples"]))
     return components
 
 
@@ -162,9 +162,9 @@ def _split_component_name(name: str, channel: str, azimuth: float | None, has_ma
     return stem.lower(), label, is_up, sensor
 
 
-def _group_by_station(components: Iterable[_Component]) -> list[list[_Component]]:
+def _group_by_station(components: Iterable[Component]) -> list[list[Component]]:
     """Group the components of one sensor: up to two horizontal ones, followed by a vertical one."""
-    groups: list[list[_Component]] = []
+    groups: list[list[Component]] = []
     for component in components:
         home = next((group for group in groups if component.belongs_to(group)), None)
         if home is None:
