@@ -25,8 +25,8 @@ _SIDES = ("f8", (2,))
 #: substeps may, whether its series is too short, whether to try it; length of the sample, accelerations (horizontal,
 #: vertical) of the unscaled motion at its start, and their slopes; u, u' and (nonlinear) sin and cos(alpha - u) before
 #: and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation; rotation of overturning;
-#: usual length of a sample; factor on the motion; with friction, the largest push without a slip at zero velocity, its
-#: decrease per squared velocity (`sliding.may_slip`), and twice the slenderness.
+#: usual length of a sample; factor on the motion; with friction, the largest push without a slip at zero velocity and
+#: its decrease per squared velocity (`sliding.may_slip`).
 GROUP = define_record(
     **dict.fromkeys(
         ("simulation", "row", "end_row", "increment", "event", "blocked", "truncated", "retry"), ("i8", (WIDTH,))
@@ -36,7 +36,7 @@ GROUP = define_record(
             "length", "push_start", "push_slope", "lift_start", "lift_slope",
             "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine", "stiffness", "pull",
             "push_gain", "first", "second", "third", "curve", "peak", "overturn_angle", "h", "factor",
-            "sticking_push", "sticking_slope", "twice_slenderness",
+            "sticking_push", "sticking_slope",
         ),
         _LANES,
     ),
