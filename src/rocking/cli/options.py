@@ -14,13 +14,7 @@ from cyclopts import Group, Parameter, Token
 
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
-from rocking.errors import (
-    BlockError,
-    MotionError,
-    OptionError,
-    RecordError,
-    join_placeholders,
-)
+from rocking.errors import BlockError, MotionError, OptionError, RecordError, join_placeholders
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.inventory import read_inventory
