@@ -20,7 +20,8 @@ def capacities(body):
     """Peak accelerations, m/s^2, at which a body begins to overturn, and their relative derivatives."""
     found = [rocking.critical_scale(body, motion, (1.0, 12.0)) for motion in motions]
     by = {
-        name: np.array([getattr(each, name) / each.scale for each in found]) for name in ("p", "alpha", "restitution")
+        name: np.array([getattr(each, f"{name}_derivative") / each.scale for each in found])
+        for name in ("p", "alpha", "restitution")
     }
     return np.array([each.scale for each in found]), by
 

@@ -489,7 +489,7 @@ GRID: Final = rocking.Blocks.grid(p=[1.5, 3.0, 5.0], alpha=[0.1, 0.2, 0.3], rest
 ENSEMBLES: Final = {
     "levels": (GRID, {"levels": [1.0, 2.5, 6.0], "measure": "pga", "polarity": "both"}),
     "linear": (GRID, {"levels": [0.5, 1.0], "model": "linear"}),
-    "times": (GRID, {"times": True, "polarity": "-"}),
+    "times": (GRID, {"include_times": True, "polarity": "-"}),
     "robust": (GRID.select(slice(0, 6)), {"robust": True}),
     "treatment": (GRID, {"chattering": "velocity=0.001", "duration": 5.0}),
     "two-sided": (UNEVEN, {"levels": [0.4, 1.0], "measure": "pgv"}),
@@ -613,7 +613,7 @@ def critical_scales() -> Iterator[Item]:
     for block in (STATUE, SLENDER, UNEVEN[0], HELD["tendon"][0]):
         for motion in (lobes(1.0, 0.8), lobes(1.0, 1.3, 1.0, -1.0, 0.5)):
             found = attempt(rocking.critical_scale, block, motion, (0.5, 60.0))
-            names = ("scale", "p", "alpha", "restitution")
+            names = ("scale", "p_derivative", "alpha_derivative", "restitution_derivative")
             yield "scale", found if isinstance(found, str) else [getattr(found, name) for name in names]
 
 

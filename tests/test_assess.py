@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -11,6 +12,7 @@ import xarray as xr
 import rocking
 from rocking.assessment.assess import assess
 from rocking.assessment.chart import list_log_ticks, list_ticks
+from rocking.assessment.ranks import compute_scores
 
 FREQUENCIES = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0)
 MOTIONS = {f"{f} Hz": rocking.pulses.one_sine(3.0, f) for f in FREQUENCIES}
@@ -88,12 +90,45 @@ def test_every_table_contains_names_and_labels(assessment, tmp_path):
 def test_objects_and_motions_that_fail_are_named_and_stop_no_other():
     wall = rocking.Block.one_sided(width=0.4, height=4.0).with_labels(name="wall", friction="0.5")
     nothing = rocking.Motion.from_samples([0.0, 0.0], dt=0.01)
-    found = assess([VASE, wall, STELE], MOTIONS | {"silence": nothing}, levels=8, failures={"urn": "it is broken"})
+    found = assess([VASE, wall, STELE], MOTIONS | {"silence": nothing}, levels=8)
     assert [item.name for item in found.objects] == ["vase", "stele"]
-    assert [*found.failures] == ["urn", "silence", "wall"]
+    assert [*found.failures] == ["wall"]
+    assert [*found.skipped] == ["silence"]
     assert "friction is not available for blocks with" in found.failures["wall"]
     assert "silence" not in found.motions
     assert "not assessed: wall" in found.summary()
+    assert "not used: silence" in found.summary()
+    assert found.to_dataframe("failures")["name"].tolist() == ["wall", "silence"]
+
+
+def test_labels_of_clusters_are_those_of_the_motions_that_are_used():
+    nothing = rocking.Motion.from_samples([0.0, 0.0], dt=0.01)
+    labels = [0, 0, 1, 1, 2, 2, 3, 3]
+    plain = assess(VASE, MOTIONS, levels=8, clusters=labels)
+    more = assess(VASE, {"silence": nothing} | MOTIONS, levels=8, clusters=["none", *labels])
+    assert more.objects[0].curve.median_interval == plain.objects[0].curve.median_interval
+    assert more.objects[0].curve.clusters == 4
+
+
+def test_ranks_are_those_of_the_same_resampled_motions():
+    """Two objects whose intervals overlap widely, but of which one is weaker under every motion, keep their ranks."""
+    weaker = rocking.Block(width=0.238, height=1.1).with_labels(name="weaker")
+    found = assess([VASE, weaker], MOTIONS, levels=16)
+    first, second = found.objects
+    assert first.name == "weaker"
+    assert first.curve.median_interval[1] > second.curve.median_interval[0]
+    assert found.data.rank_worst.values.tolist() == [1, 2]
+    assert found.data.rank_best.values.tolist() == [1, 2]
+    few = assess([VASE, STELE], dict([*MOTIONS.items()][:2]), levels=16)
+    assert few.data.rank_worst.values.tolist() == [2, 2]
+
+
+def test_weights_of_one_reproduce_the_curve_and_the_rate(assessment):
+    """The score of a resample with every motion once is that of the fitted curve."""
+    for item in assessment.objects:
+        ones = np.ones((1, len(MOTIONS)))
+        assert compute_scores(item, ones, None)[0] == pytest.approx(np.log(item.curve.median), abs=1e-9)
+        assert compute_scores(item, ones, HAZARD)[0] == pytest.approx(-np.log(item.rate.annual_rate), abs=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -186,7 +221,9 @@ def test_the_page_is_complete_without_any_other_file(assessment, tmp_path):
 
 def test_names_in_a_page_are_text_and_no_markup(tmp_path):
     vase = VASE.with_labels(name="<script>alert(1)</script>", room='"A" & B')
-    assess(vase, MOTIONS, levels=6, failures={"<b>": "<i>"}).to_html(tmp_path / "r.html")
+    silence = {"<b>": rocking.Motion.from_samples([0.0, 0.0], dt=0.01)}
+    found = assess(vase, MOTIONS | silence, levels=6)
+    replace(found, failures={"<b>": "<i>"}).to_html(tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text()
     assert "<script>" not in text
     assert "<i>" not in text
@@ -221,7 +258,7 @@ def test_the_command_writes_the_report_and_names_what_it_leaves_out(run, tmp_pat
     assert {file.name for file in out.iterdir()} >= {"report.html", "assessment.nc"}
     assert "2 objects under 8 motions" in printed
     assert "not assessed: urn (line 3): height must be" in printed
-    assert re.search(r"not assessed: .*read me\.txt: the format of this text is unknown", printed)
+    assert re.search(r"not used: .*read me\.txt: the format of this text is unknown", printed)
     page = Page((out / "report.html").read_text()).text
     assert "urn (line 3)" in page
     assert "2.0 Hz.csv" in page
@@ -229,4 +266,5 @@ def test_the_command_writes_the_report_and_names_what_it_leaves_out(run, tmp_pat
     result = json.loads(printed)
     assert [entry["name"] for entry in result["objects"]] == ["vase", "stele"]
     assert len(result["outcomes"]) == 16
-    assert next(iter(result["failures"])) == "urn (line 3)"
+    assert [*result["failures"]] == ["urn (line 3)"]
+    assert [*result["skipped"]] == [str(records / "read me.txt")]

@@ -104,7 +104,7 @@ def test_the_semianalytical_time_is_nan_where_chattering_is_incomplete_and_only_
     critical = chattering.critical_amplitude(omega, eta)
     for share in (-1e-2, -1e-5, -1e-8, 1e-8, 1e-5, 1e-2):
         a = critical + share * (critical - 1.0)
-        times = chattering.chattering_time(a, omega, eta, method="semianalytical", resolved=resolved)
+        times = chattering.chattering_time(a, omega, eta, method="semianalytical", impact_count=resolved)
         np.testing.assert_array_equal(np.isnan(times), [share > 0.0] * 3)
 
 
@@ -112,7 +112,7 @@ def test_near_restitution_one_the_semianalytical_scheme_resolves_more_impacts():
     a = 1.0 + 0.5 * (chattering.critical_amplitude(2.0, 0.99) - 1.0)
     exact = float(chattering.chattering_time(a, 2.0, 0.99))
     by_default, by_sixty = (
-        float(chattering.chattering_time(a, 2.0, 0.99, method="semianalytical", resolved=n)) for n in (None, 60)
+        float(chattering.chattering_time(a, 2.0, 0.99, method="semianalytical", impact_count=n)) for n in (None, 60)
     )
     assert abs(by_default / exact - 1.0) < 1e-4 < 0.04 < abs(by_sixty / exact - 1.0)
 
@@ -121,7 +121,7 @@ def test_semianalytical_scheme_converges_like_the_square_of_what_remains():
     exact = chattering.chattering_time(1.03, 2.0, 0.92)
     resolved = np.array([40, 60, 80, 100])
     times = np.array(
-        [chattering.chattering_time(1.03, 2.0, 0.92, method="semianalytical", resolved=int(n)) for n in resolved]
+        [chattering.chattering_time(1.03, 2.0, 0.92, method="semianalytical", impact_count=int(n)) for n in resolved]
     )
     rates = np.diff(np.log(np.abs(times - exact))) / np.diff(resolved)
     assert rates == pytest.approx(2.0 * np.log(0.92), rel=0.1)

@@ -33,11 +33,11 @@ def test_chatter_json_is_what_the_functions_give(run):
     assert "asymptotic_table" not in result
 
 
-def test_order_and_resolved_are_passed_on(run):
-    _, out, _ = run("chatter", 1.01, 2, 0.92, "--order", 6, "--resolved", 20, "--json")
+def test_order_and_impact_count_are_passed_on(run):
+    _, out, _ = run("chatter", 1.01, 2, 0.92, "--order", 6, "--impact-count", 20, "--json")
     times = json.loads(out)["chattering_time"]
     assert times["series"] == chattering_time(1.01, 2.0, 0.92, method="series", order=6)
-    assert times["semianalytical"] == chattering_time(1.01, 2.0, 0.92, method="semianalytical", resolved=20)
+    assert times["semianalytical"] == chattering_time(1.01, 2.0, 0.92, method="semianalytical", impact_count=20)
 
 
 def test_chatter_shows_the_iterative_procedure(run):

@@ -44,7 +44,7 @@ def test_counts_and_times_are_those_of_the_response(records):
 
 def test_times_of_uplift_and_rest_are_those_of_the_response(records):
     blocks = random_blocks(30, 6)
-    result = simulate_many(blocks, records[0], times=True)
+    result = simulate_many(blocks, records[0], include_times=True)
     assert not {"first_uplift", "first_rest", "last_rest"} & {*simulate_many(blocks[0], records[0]).data_vars}
     rested = 0
     for b in range(30):

@@ -100,13 +100,13 @@ def test_lanes_under_multiples_of_a_record_are_responses_to_the_scaled_record(mo
         rocking.Block.from_parameters((p, 1.2 * p), (0.15, alpha), 0.9) for p, alpha in ((2.0, 0.15), (5.0, 0.25))
     ]
     levels = [0.3, 0.9, 1.7]
-    many = simulate_many(blocks, record, levels=levels, polarity="both", model=model, times=True)
+    many = simulate_many(blocks, record, levels=levels, polarity="both", model=model, include_times=True)
     names = ("peak_rotation", "residual_rotation", "first_rest", "last_rest", "peak_time")
     for s, level in enumerate(levels):
         for k, sign in enumerate((1.0, -1.0)):
             scaled = record.scaled(sign * level)
             for b, block in enumerate(blocks):
-                alone = simulate_many(block, scaled, model=model, times=True)
+                alone = simulate_many(block, scaled, model=model, include_times=True)
                 at = {"motion": 0, "scale": s, "polarity": k, "block": b}
                 for name in names:
                     expected, found = alone[name].values.ravel()[0], many[name].isel(at).item()

@@ -148,7 +148,7 @@ def test_a_critical_scale_changes_as_differences_of_critical_scales_say(model: s
 
     found = critical(given)
     changes = [("samples", np.eye(18)[k], found.gradient.samples[k]) for k in (3, 12)]
-    changes += [(name, given[name], getattr(found, name)) for name in ("p", "alpha", "restitution")]
+    changes += [(name, given[name], getattr(found, f"{name}_derivative")) for name in ("p", "alpha", "restitution")]
     for name, direction, expected in changes:
 
         def scale(h: float, name: str = name, direction: Floats = direction) -> float:
@@ -230,4 +230,13 @@ def test_where_a_touch_decides_on_overturning_a_critical_scale_has_no_derivative
     touch = rocking.critical_scale(block, motion, (0.99, 1.001))
     assert touch.scale == pytest.approx(0.99996, abs=1e-5)
     assert "without the block coming to the balance point" in touch.gradient.reason
-    assert np.all(np.isnan([touch.p, touch.alpha, touch.restitution, *touch.gradient.coefficients.ravel()]))
+    assert np.all(
+        np.isnan(
+            [
+                touch.p_derivative,
+                touch.alpha_derivative,
+                touch.restitution_derivative,
+                *touch.gradient.coefficients.ravel(),
+            ]
+        )
+    )

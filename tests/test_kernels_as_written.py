@@ -108,7 +108,7 @@ def ensembles(model: str) -> Numbers:
     blocks = [Block.from_parameters(p=4.0, alpha=0.2, restitution=e) for e in (0.5, 0.9)]
     short, up = shaken(6.0, seed=6, seconds=0.3), shaken(12.0, seed=7, seconds=0.3)
     for motion in (short, short.with_vertical(up), pulses.sine(4.0, 3.0, cycles=1)):
-        for asked in ({"derivatives": True}, {"times": True}):
+        for asked in ({"derivatives": True}, {"include_times": True}):
             with rocking.set_options(threads=1):
                 found = simulate_many([*blocks, TWO_SIDED], motion, model=model, duration=0.5, **asked)
             for name in sorted(map(str, found.data_vars)):
@@ -227,7 +227,7 @@ def closed(model: str) -> Numbers:
     yield from chattering.chattering_time(critical * (1.0 - np.array([1e-3, 1e-6, 1e-9, 1e-12, 1e-15])), 2.0, 0.7)
     for resolved in range(1, 10, 2):
         a, omega = np.meshgrid([1.2, 3.0, 10.0, 100.0], [0.1, 1.0, 9.0])
-        yield from np.ravel(chattering.chattering_time(a, omega, 0.9, method="semianalytical", resolved=resolved))
+        yield from np.ravel(chattering.chattering_time(a, omega, 0.9, method="semianalytical", impact_count=resolved))
     at_threshold = pulses.sine(min(STATUE.uplift_thresholds(model)), 1.2, cycles=1.5)
     yield from told(simulate(STATUE, at_threshold, model=model, chattering="time"))
     a, omega, eta = np.meshgrid([1.0, 1.0 + 1e-12, 1.03, 1e3], [1e-2, 0.7, 30.0], [0.01, 0.3, 0.97])

@@ -36,7 +36,7 @@ from rocking.kernels.certificate import (
     widen_for_drag,
     widen_for_error,
 )
-from rocking.kernels.ground import Window, bound_window, vertical_component, write_local_series
+from rocking.kernels.ground import AccelerationBounds, bound_window, vertical_component, write_local_series
 from rocking.kernels.state import new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -77,7 +77,7 @@ def speed(problem: Problem, side: int, time: float, share: float) -> float:
 
 
 #: Bounds on a component that does not move.
-STILL = Window(0.0, 0.0, 0.0, 0.0)
+STILL = AccelerationBounds(0.0, 0.0, 0.0, 0.0)
 
 #: How narrow a bracket must be, so that the one by comparison is enough, and so that the one of higher order is tried.
 ANY, NARROWEST = math.inf, 0.0

@@ -113,9 +113,9 @@ def stepped(
         busy = step_nonlinear(group, None if lift is None else (1.0, 0.0), 1.0, way.substeps)
     else:
         busy = step_linear(group, 1.0) if lift is None else step_weighted(group, 1.0, way.substeps)
-    events = np.array(group["event"][: len(blocks)], dtype=bool)
-    assert busy == np.sum(group["event"])
-    assert not np.any(group["event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes
+    events = np.array(group["has_event"][: len(blocks)], dtype=bool)
+    assert busy == np.sum(group["has_event"])
+    assert not np.any(group["has_event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes
     for lane in range(len(blocks)):
         assert write_lane(pool, lane) == lane
         assert states[lane]["piece"] == (1 if events[lane] else 2)

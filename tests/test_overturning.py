@@ -171,8 +171,8 @@ def test_bisection_finds_a_region_inside_an_interval_of_the_grid():
 
     edges = find_boundaries(levels, np.array([[0], [2]]), outcome_of, rtol=1e-12)
     np.testing.assert_allclose(edges.level, [1.3, 1.6], rtol=1e-12)
-    assert edges.below.tolist() == [0, 1]
-    assert edges.above.tolist() == [1, 2]
+    assert edges.outcome_below.tolist() == [0, 1]
+    assert edges.outcome_above.tolist() == [1, 2]
     assert np.all(edges.high - edges.low <= 1e-12 * edges.high)
 
 
@@ -182,7 +182,7 @@ def test_bisection_finds_a_thin_region_between_two_others():
 
     edges = find_boundaries(np.array([1.0, 2.0]), np.array([[1], [0]]), outcome_of, rtol=1e-12)
     np.testing.assert_allclose(edges.level, [1.3, 1.3 + 1e-7], rtol=1e-12)
-    assert edges.above.tolist() == [-1, 0]
+    assert edges.outcome_above.tolist() == [-1, 0]
 
 
 def test_bisection_of_endless_regions_ends():

@@ -168,10 +168,10 @@ def test_repeats_are_a_table_and_survive_pickling(tmp_path):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"relative": 0.0}, "relative must be a number from 1e-12 to 0.1, not 0"),
+        ({"relative_step": 0.0}, "relative_step must be a number from 1e-12 to 0.1, not 0"),
         ({"count": 4}, "count must be odd, with as many factors below 1 as above; got 4"),
         ({"count": 1}, "count must be a whole number"),
-        ({"relative": 0.1, "count": 13}, "relative must be below 1/11 for 13 factors; got 0.1"),
+        ({"relative_step": 0.1, "count": 13}, "relative_step must be below 1/11 for 13 factors; got 0.1"),
     ],
 )
 def test_factors_that_are_none_are_refused(given, message):

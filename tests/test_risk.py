@@ -80,8 +80,8 @@ def test_the_rate_below_an_intensity_is_that_of_the_weaker_motions(exponent: flo
 
     everything = from_motions(1e-3 * G, 1e6 * G)
     assert found.annual_rate == pytest.approx(everything, rel=1e-6)
-    assert found.below == pytest.approx(from_motions(1e-3 * G, 0.1 * G) / everything, rel=1e-6)
-    assert found.above == pytest.approx(from_motions(0.9 * G, 1e6 * G) / everything, rel=1e-6)
+    assert found.share_below_curve == pytest.approx(from_motions(1e-3 * G, 0.1 * G) / everything, rel=1e-6)
+    assert found.share_above_curve == pytest.approx(from_motions(0.9 * G, 1e6 * G) / everything, rel=1e-6)
     line = risk.plot().axes[1].lines[0]
     x, y = line.get_xdata()[200], line.get_ydata()[200]
     assert y == pytest.approx(from_motions(x * G / 1.001, x * G * 1.001) / everything / (2 * math.log(1.001)), rel=1e-4)
@@ -95,7 +95,7 @@ def test_against_any_hazard_curve_the_rate_is_the_integral(median: float, beta: 
     fitted = fragility_with(median, beta)
     found = fitted.annual_rate(hazard).rates[0]
     assert found.annual_rate == pytest.approx(by_quadrature(fitted.curves[0], hazard), rel=1e-8)
-    assert 0.0 <= found.below + found.above <= 1.0 + 1e-12
+    assert 0.0 <= found.share_below_curve + found.share_above_curve <= 1.0 + 1e-12
 
 
 def flat_fragility(dispersion: float) -> rocking.Fragility:
@@ -119,7 +119,7 @@ def test_steep_hazards_and_flat_fragilities_have_the_rate_of_the_closed_form(
             assert found.annual_rate == pytest.approx(float(expected), rel=1e-10)
         else:
             assert found.annual_rate == math.inf
-    assert found.below > 0.99
+    assert found.share_below_curve > 0.99
 
 
 def test_a_steep_fragility_is_exceeded_as_often_as_its_median() -> None:
@@ -400,11 +400,11 @@ def test_a_rate_from_above_the_hazard_curve_has_a_bound_and_no_estimate() -> Non
     strong = fragility_with(40.0, 0.3)
     site = HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])
     (rate,) = strong.annual_rate(site).rates
-    assert rate.above > 0.99
+    assert rate.share_above_curve > 0.99
     assert rate.annual_rate < 1.5e-4
     assert "once in > 6700 years" in rate.in_words()
     # Were every motion above the last point to exceed the limit, the rate would be this.
-    assert rate.bounds[0] == pytest.approx((1.0 - rate.above) * rate.annual_rate + 1.5e-4)
+    assert rate.bounds[0] == pytest.approx((1.0 - rate.share_above_curve) * rate.annual_rate + 1.5e-4)
 
 
 @pytest.mark.parametrize(("a", "b"), [(-1.0, 1.5), (2.0, 0.7), (-6.0, 9.0), (20.0, 2.0), (-20.0, 1.0)])

@@ -26,7 +26,7 @@ from histories import Ratios, chattering_figure, ratio_figure
 
 from rocking.chattering.duration import (
     chattering_time,
-    compute_default_resolved,
+    choose_impact_counts,
     critical_amplitude,
     interval_ratios,
     sequence,
@@ -190,7 +190,7 @@ def _duration_statements(case: BlockUnderSine) -> tuple[Statement, ...]:
             digits=3,
         ),
         Statement(
-            f"the same of Eq. 75 with {compute_default_resolved(np.array(case.eta))} impacts resolved, %",
+            f"the same of Eq. 75 with {choose_impact_counts(np.array(case.eta))} impacts resolved, %",
             '"remarkable agreement"' if papers else None,
             semianalytical,
             digits=2,

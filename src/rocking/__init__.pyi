@@ -22,7 +22,8 @@ from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
-from .assessment.assess import Assessment, assess
+from .assessment.assess import assess
+from .assessment.results import Assessment
 from .block import (
     Block,
     Blocks,

@@ -35,7 +35,7 @@ class CriticalScale:
         Derivatives with respect to the unscaled motion and the initial state, with the scale in `Gradient.value`. If
         the outcome changes although the block does not reach the balance point, all derivatives are NaN, and
         `Gradient.reason` explains this.
-    p, alpha, restitution : float
+    p_derivative, alpha_derivative, restitution_derivative : float
         Derivatives with respect to relative changes of these parameters on both sides. Times 1e-3, they are changes of
         the scale for 0.1 %.
 
@@ -49,15 +49,15 @@ class CriticalScale:
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
     >>> critical = rocking.critical_scale(block, record, (2.0, 6.0))
-    >>> f"scale {critical.scale:.4f}, +0.1 % of p {1e-3 * critical.p:+.4f}"
+    >>> f"scale {critical.scale:.4f}, +0.1 % of p {1e-3 * critical.p_derivative:+.4f}"
     'scale 3.2561, +0.1 % of p -0.0023'
     """
 
     scale: float
     gradient: Gradient
-    p: float
-    alpha: float
-    restitution: float
+    p_derivative: float
+    alpha_derivative: float
+    restitution_derivative: float
 
 
 def critical_scale(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis import probit
-from rocking.analysis.levels import compute_units
+from rocking.analysis.levels import compute_block_units
 from rocking.analysis.probit import Outcomes, Probit, compute_normal_scores, compute_probabilities
 from rocking.block.body import Body
 from rocking.core import checks
@@ -282,8 +282,10 @@ def format_intensity(intensity: float, measure: Measure) -> str:
 
 def format_interval(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
     """Format an interval, with bounds in place of finite ends beyond them."""
-    number = f"{{:.{digits}g}}".format
-    texts = ("infinity" if math.isinf(end) else format_within(end, bounds if end else (0, 0), number) for end in ends)
+    format_number = f"{{:.{digits}g}}".format
+    texts = (
+        "infinity" if math.isinf(end) else format_within(end, bounds if end else (0, 0), format_number) for end in ends
+    )
     return " to ".join(texts)
 
 
@@ -373,7 +375,7 @@ def convert_to_openquake_measure(measure: Measure, block: Body | None, model: Mo
     """
     if measure.has_block_units and block is None:
         raise OptionError(f"{measure.name} is in units of the block; give {{}} to convert it to PGA or PGV", "block")
-    unit = 1.0 if block is None else float(compute_units(block.as_bodies(), measure, model)[0])
+    unit = 1.0 if block is None else float(compute_block_units(block.as_bodies(), measure, model)[0])
     name = measure.motion_measure_name
     factors = {
         "pgv": ("PGV", 100.0),

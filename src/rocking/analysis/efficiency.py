@@ -14,8 +14,8 @@ from rocking.analysis.levels import (
     MIRROR_NOTE,
     assign_clusters,
     assign_families,
+    compute_block_units,
     compute_intensities,
-    compute_units,
     describe_pool,
     describe_sample,
     normalise_weights,
@@ -131,7 +131,7 @@ def compare_measures(
     analysis = incremental_dynamic_analysis(bodies, motions, measure=measures[-2], model=model, rtol=rtol)
     levels = analysis.data.overturning_level.transpose("motion", "block").values
     values = [compute_intensities(motions, measure)[:, None] for measure in measures]
-    units = [compute_units(bodies, measure, model) for measure in measures]
+    units = [compute_block_units(bodies, measure, model) for measure in measures]
     factors = levels * units[-2] / values[0]  # on the motions; levels are of pga_ratio
     rows = zip(measures, values, units, strict=True)
     intensity = np.array([factors**measure.exponent * value / unit for measure, value, unit in rows])

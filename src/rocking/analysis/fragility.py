@@ -29,10 +29,10 @@ from rocking.analysis.levels import (
     assign_groups,
     check_limit_states,
     check_state_mapping,
+    compute_block_units,
     compute_exceedances,
     compute_intensities,
     compute_ratios,
-    compute_units,
     create_outcome_table,
     describe_polarities,
     describe_pool,
@@ -417,7 +417,7 @@ def fragility(
         raise OptionError(f"{{}} must contain at least two levels; got {stripes.size}", "levels", value=levels)
     motions = list_motions(motions)
     values, cluster_numbers = compute_intensities(motions, measure), assign_clusters(motions, clusters)
-    units = compute_units(bodies, measure, model)
+    units = compute_block_units(bodies, measure, model)
     options: dict[str, Any] = {"chattering": chattering, "friction": friction}
     options["polarity"] = "+" if mirrored else polarity
     if stripes is None:

@@ -14,9 +14,9 @@ from rocking.analysis.levels import (
     MIRROR_NOTE,
     RATIO_VARIABLES,
     Brackets,
+    compute_block_units,
     compute_intensities,
     compute_ratios,
-    compute_units,
     create_motion_labels,
     describe_blocks,
     describe_undecided,
@@ -135,7 +135,7 @@ def incremental_dynamic_analysis(
     else:
         level_values = checks.increasing_numbers(levels, "levels", OptionError)
         table = simulate_levels(bodies, motion_list, measure, level_values, **options)
-    units = compute_units(bodies, measure, model)
+    units = compute_block_units(bodies, measure, model)
     # The scheme of the levels determines how often the restitution is drawn.
     setup = Setup(bodies, model, Certified(), friction=coefficients)
 
@@ -290,7 +290,7 @@ def compute_lowest_uplift(
     """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""
     (thresholds, weight_thresholds), gravity = compute_thresholds(blocks, model), blocks.gravity
     factors = [compute_uplift_factors(motion, thresholds, gravity, weight_thresholds) for motion in motions]
-    intensity = np.array(factors) ** measure.exponent * values[:, None] / compute_units(blocks, measure, model)
+    intensity = np.array(factors) ** measure.exponent * values[:, None] / compute_block_units(blocks, measure, model)
     lowest = float(np.min(intensity))
     if math.isinf(lowest):
         message = "no motion lifts a block at any level, because of direction or vertical component"
@@ -324,7 +324,7 @@ def _combine_bands(
     columns, starts, ends = list[int](), list[float](), list[float]()
     for column in range(flat_grid.shape[1]):
         selected = brackets.column == column
-        is_start, level = brackets.above[selected] == 1, brackets.level[selected]
+        is_start, level = brackets.outcome_above[selected] == 1, brackets.level[selected]
         starts += [*([np.nan] if flat_grid[0, column] else []), *level[is_start]]
         ends += [*level[~is_start], *([np.nan] if flat_grid[-1, column] else [])]
         columns += [column] * (len(starts) - len(columns))

@@ -228,12 +228,12 @@ def assign_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> 
     return families
 
 
-def compute_units(blocks: Bodies, measure: Measure, model: Model) -> Floats:
+def compute_block_units(blocks: Bodies, measure: Measure, model: Model) -> Floats:
     """Compute the unit of the measure for each block (SI): the block's own unit, or 1."""
     if not measure.has_block_units:
         return np.ones(len(blocks))
     uplift_thresholds = [min(blocks[k].uplift_thresholds(model)) for k in range(len(blocks))]
-    return measure.unit(np.array(uplift_thresholds), blocks.parameters()["p"][0].min(axis=1))
+    return measure.block_units(np.array(uplift_thresholds), blocks.parameters()["p"][0].min(axis=1))
 
 
 def simulate_levels(
@@ -242,7 +242,7 @@ def simulate_levels(
     """Simulate every block under every motion at every level, with the dimension ``level``."""
     import xarray as xr
 
-    units, coordinate = compute_units(blocks, measure, model), {"measure": measure.name, "units": measure.units}
+    units, coordinate = compute_block_units(blocks, measure, model), {"measure": measure.name, "units": measure.units}
     groups = [np.flatnonzero(units == unit) for unit in np.unique(units)]
     parts = []
     for group in groups:
@@ -375,8 +375,8 @@ class Brackets:
     column: Integers
     low: Floats
     high: Floats
-    below: Integers
-    above: Integers
+    outcome_below: Integers
+    outcome_above: Integers
 
     @property
     def level(self) -> Floats:
@@ -411,7 +411,7 @@ def find_boundaries(
                 )
                 points = zip(columns.tolist(), midpoints.tolist(), strict=True)
                 known = dict(zip(points, find_outcome(columns, midpoints).tolist(), strict=True))
-            outcomes = brackets.below.copy()
+            outcomes = brackets.outcome_below.copy()
             outcomes[is_wide] = [known[point] for point in wanted]
             brackets, origin = _bisect(brackets, is_wide, outcomes, origin)
             # A third outcome adds brackets, for which the progress bar does not move back.

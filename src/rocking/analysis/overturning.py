@@ -411,7 +411,7 @@ def _combine_modes(
     import xarray as xr
 
     lowest = np.full(ratios.size, np.inf)
-    overturns = _is_overturning(brackets.above) & ~_is_overturning(brackets.below)
+    overturns = _is_overturning(brackets.outcome_above) & ~_is_overturning(brackets.outcome_below)
     np.minimum.at(lowest, brackets.column[overturns], brackets.level[overturns])
     lowest[np.isinf(lowest) | _is_overturning(modes[0])] = np.nan
     meaning = (
@@ -427,8 +427,8 @@ def _combine_modes(
             "overturning_amplitude": variable("frequency", lowest, lowest_meaning, "1"),
             "boundary_frequency": variable("boundary", ratios[brackets.column], unit="1"),
             "boundary_amplitude": variable("boundary", brackets.level, unit="1"),
-            "mode_below": variable("boundary", brackets.below, meaning),
-            "mode_above": variable("boundary", brackets.above, meaning),
+            "mode_below": variable("boundary", brackets.outcome_below, meaning),
+            "mode_above": variable("boundary", brackets.outcome_above, meaning),
         },
         {
             "amplitude": variable("amplitude", levels, f"amplitude of the pulse {normalisation}", "1"),

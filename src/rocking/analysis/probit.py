@@ -33,7 +33,7 @@ _RAY_COUNT: Final = 360
 _RAY_TOLERANCE: Final = 1e-9
 
 #: Minimum number of clusters for an estimate of their differences.
-_MIN_CLUSTERS: Final = 3
+MIN_CLUSTERS: Final = 3
 
 
 class Outcomes(NamedTuple):
@@ -331,7 +331,7 @@ def compute_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers
     scaled, best, centre, spread = _standardise(data, fitted)
     if clusters is None:
         boundary = _trace_region(scaled, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
-    elif (cluster_count := int(clusters.max()) + 1) < _MIN_CLUSTERS:
+    elif (cluster_count := int(clusters.max()) + 1) < MIN_CLUSTERS:
         return _WHOLE_PLANE
     else:
         maximum, drop = np.column_stack(best), 0.5 * float(stdtrit(cluster_count - 1.0, 0.5 + 0.5 * confidence)) ** 2

@@ -49,7 +49,7 @@ class Rate:
         Exceedances per year.
     interval : (float, float)
         Confidence interval due to the fragility, for the given hazard curve.
-    below, above : float
+    share_below_curve, share_above_curve : float
         Shares of the rate from the extrapolated parts of the hazard curve, below its first and above its last point.
     bounds : (float, float)
         Smallest and largest rate that the hazard curve can resolve, printed for rates beyond.
@@ -67,8 +67,8 @@ class Rate:
     limit_state: str
     annual_rate: float
     interval: tuple[float, float]
-    below: float
-    above: float
+    share_below_curve: float
+    share_above_curve: float
     bounds: tuple[float, float] = (0.0, math.inf)
 
     def __repr__(self) -> str:
@@ -182,8 +182,8 @@ class Risk(Result):
                     "return_period_years": rate.return_period,
                     "return_period_interval_years": list(rate.return_interval),
                     "probability": rate.probability(years),
-                    "share_below_hazard_curve": rate.below,
-                    "share_above_hazard_curve": rate.above,
+                    "share_below_hazard_curve": rate.share_below_curve,
+                    "share_above_hazard_curve": rate.share_above_curve,
                 }
                 for rate in self.rates
             ],
@@ -228,7 +228,7 @@ def describe_extrapolated_shares(rate: Rate) -> list[str]:
     """Describe the share of a rate from extrapolations of the hazard curve."""
     return [
         f"{rate.limit_state}: {100 * share:.{0 if share > 0.1 else 1}f} % of the rate is from {side} the hazard curve"
-        for share, side in ((rate.below, "below"), (rate.above, "above"))
+        for share, side in ((rate.share_below_curve, "below"), (rate.share_above_curve, "above"))
         if share > 0.01
     ]
 
@@ -458,8 +458,8 @@ class Survival(Result):
             "most_probable": self.max_probability,
             "mean_probability": self.mean_probability,
             "mean_probability_standard_error": self.mean_error,
-            "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
-            "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
+            "share_below_hazard_curve": math.nan if self.rate is None else self.rate.share_below_curve,
+            "share_above_hazard_curve": math.nan if self.rate is None else self.rate.share_above_curve,
             "contradicts": self.contradicts_hazard,
         }
 

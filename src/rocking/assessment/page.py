@@ -10,7 +10,7 @@ from html import escape
 from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -19,6 +19,11 @@ from rocking.assessment.chart import Chart
 from rocking.core.constants import STANDARD_GRAVITY, VERSION
 from rocking.core.tables import format_count, write_text
 
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from rocking.assessment.results import Assessment, ObjectAssessment
+
 #: Rules of thumb beside the simulations.
 RULES: Final = ("west", "ishiyama")
 
@@ -26,7 +31,7 @@ RULES: Final = ("west", "ishiyama")
 _MAX_NAMES: Final = 5
 
 
-def write_page(assessment: Any, path: str | Path, command: str) -> None:
+def write_page(assessment: Assessment, path: str | Path, command: str) -> None:
     """Write the report of an assessment."""
     style = Path(__file__).with_name("report.css").read_text("utf-8")
     title = f"Assessment of {format_count(len(assessment.objects), 'object')}"
@@ -38,7 +43,7 @@ def write_page(assessment: Any, path: str | Path, command: str) -> None:
     write_text(path, f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>\n{style}</style></head>\n{body}\n</html>\n')
 
 
-def _write_overview(assessment: Any, title: str) -> str:
+def _write_overview(assessment: Assessment, title: str) -> str:
     """Write the summary table, the figure of all objects, and failures."""
     header, rows = assessment.tabulate()
     labels = assessment.labels
@@ -56,7 +61,8 @@ def _write_overview(assessment: Any, title: str) -> str:
     failed = f'<div class="failed"><h3>Not assessed</h3><ul>{"".join(failures)}</ul></div>' if failures else ""
     return f"""<h1>{title} under {format_count(len(assessment.motions), "ground motion")}</h1>
 <p>Intensity measure: {escape(assessment.measure.label)}.{hazard} Intervals have {confidence} confidence. Objects are
-ranked by their {basis}. The ranks in brackets are possible within the intervals.</p>
+ranked by their {basis}. The ranks in brackets are plausible with {confidence} confidence: the motions are resampled,
+the same ones for all objects.</p>
 {_write_table(header, linked, anchors=anchors)}
 {failed}
 <h3>Median intensity of overturning</h3>
@@ -67,7 +73,7 @@ marks a bar without an end. The intervals contain the differences between the gr
 model, of the sizes that are taken as known, and of the selection of the motions.</p>"""
 
 
-def _write_object(assessment: Any, k: int) -> str:
+def _write_object(assessment: Assessment, k: int) -> str:
     """Write the page of one object."""
     item, data = assessment.objects[k], assessment.data
     labels = {name: assessment.label(name, k) for name in assessment.labels}
@@ -111,7 +117,7 @@ triangles mark the record as it is. Ratios of rules are demand divided by capaci
 </section>"""
 
 
-def _describe_outcome(data: Any, k: int, m: int) -> str:
+def _describe_outcome(data: xr.Dataset, k: int, m: int) -> str:
     if data.unfinished.values[k, m]:
         return "not finished"
     if data.undecided.values[k, m]:
@@ -123,7 +129,7 @@ def _describe_outcome(data: Any, k: int, m: int) -> str:
     return "slides" if "largest_slip" in data and data.largest_slip.values[k, m] > 0.0 else "does not move"
 
 
-def describe_object(assessment: Any, k: int) -> list[str]:
+def describe_object(assessment: Assessment, k: int) -> list[str]:
     """Describe the results of an object and their certainty, one statement each."""
     item, data, measure = assessment.objects[k], assessment.data, assessment.measure
     names = np.array(_shorten_names(assessment.motions))
@@ -179,7 +185,7 @@ def describe_object(assessment: Any, k: int) -> list[str]:
     return [f"{text[0].upper()}{text[1:]}".replace("< ", "less than ").replace("> ", "more than ") for text in texts]
 
 
-def _describe_rate(assessment: Any, item: Any) -> list[str]:
+def _describe_rate(assessment: Assessment, item: ObjectAssessment) -> list[str]:
     """Describe how often the site overturns an object."""
     if assessment.hazard is None:
         return []
@@ -193,7 +199,7 @@ def _describe_rate(assessment: Any, item: Any) -> list[str]:
     return [f"{text}{probability}.", *(f"{share}." for share in describe_extrapolated_shares(item.rate))]
 
 
-def _describe_sliding(item: Any, data: Any, k: int) -> list[str]:
+def _describe_sliding(item: ObjectAssessment, data: xr.Dataset, k: int) -> list[str]:
     """Describe the friction that an object requires, or its slip."""
     threshold = item.uplift / item.body.gravity
     if item.friction is None:
@@ -201,7 +207,7 @@ def _describe_sliding(item: Any, data: Any, k: int) -> list[str]:
             f"It lifts off at {threshold:.3g} g. With a coefficient of friction below {threshold:.3g} it would slide "
         )
         return [text + "instead of rock; the simulations do not include sliding."]
-    text = f"With a coefficient of friction of {np.max(item.friction):g} it "
+    text = f"With a coefficient of friction of {item.static_friction:g} it "
     slip = np.nanmax(data.largest_slip.values[k]) if "largest_slip" in data else math.nan
     slides = f"slides by up to {1000.0 * slip:.2g} mm under the records as they are" if slip > 0.0 else "does not slide"
     if item.slides_first:
@@ -223,7 +229,7 @@ def _list_names(names: Sequence[str]) -> str:
     return f" ({', '.join(names[:_MAX_NAMES])}{more})"
 
 
-def _write_records(assessment: Any) -> str:
+def _write_records(assessment: Assessment) -> str:
     """Write the table of the ground motions."""
     data = assessment.data
     columns = {
@@ -242,13 +248,16 @@ def _write_records(assessment: Any) -> str:
         file = str(data["file"].values[m]) if "file" in data.coords else ""
         file = "" if file in name else file
         rows.append([name, file, *texts, str(data["format"].values[m]), *numbers, str(data.processing.values[m])])
+    blank = [""] * (len(rows[0]) - 2)
+    names = _shorten_names(assessment.skipped)
+    rows += [[name, *blank, f"not used: {why}"] for name, why in zip(names, assessment.skipped.values(), strict=True)]
     header = ["record", "file", *map(str, further), "format", *columns, "corrections"]
     kept = [k for k, title in enumerate(header) if title in columns or any(row[k] for row in rows)]
     table = _write_table([header[k] for k in kept], [[row[k] for k in kept] for row in rows], dense=True)
     return f'<section id="records"><h2>Ground motions</h2>\n{table}</section>'
 
 
-def _write_method(assessment: Any, command: str) -> str:
+def _write_method(assessment: Assessment, command: str) -> str:
     """Write assumptions, versions and the command."""
     options = assessment.data.attrs
     versions = [f"rocking {VERSION}", f"Python {platform.python_version()}"]
@@ -269,7 +278,7 @@ def _write_method(assessment: Any, command: str) -> str:
 <p>{escape(", ".join(versions))}; written {time}.</p></section>"""
 
 
-def _draw_overview(assessment: Any) -> str:
+def _draw_overview(assessment: Assessment) -> str:
     """Draw the median of each object with its interval."""
     scale = assessment.measure.display_factor
     rows, ends = [], list[float]()
@@ -284,7 +293,7 @@ def _draw_overview(assessment: Any) -> str:
     return Chart.draw_intervals(rows, (min(ends), max(ends)), assessment.measure.label)
 
 
-def _draw_fragility(assessment: Any, item: Any) -> str:
+def _draw_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
     """Draw the fragility curve with its band and the simulated shares, and the hazard curve."""
     scale = assessment.measure.display_factor
     chart = Chart(

@@ -1,7 +1,7 @@
 from .diagnostics import BoundReached, Diagnostics, Scores
 from .history import HistoryCalibration, Measured
 from .outcomes import Estimate, Validation
-from .validate import JudgedTest, ModelValidation, Score, ShareInBin
+from .validate import JudgedTest, MeanScore, ModelValidation, ShareInBin
 
 __all__ = [
     "BoundReached",
@@ -9,9 +9,9 @@ __all__ = [
     "Estimate",
     "HistoryCalibration",
     "JudgedTest",
+    "MeanScore",
     "Measured",
     "ModelValidation",
-    "Score",
     "Scores",
     "ShareInBin",
     "Validation",

@@ -116,7 +116,7 @@ class JudgedTest:
 
 
 @dataclass(frozen=True)
-class Score:
+class MeanScore:
     """Mean score of predictions (smaller is better) and its standard error.
 
     Attributes
@@ -201,7 +201,7 @@ class ModelValidation(Result):
     ----------
     tests : tuple of JudgedTest
         Predictions and observations.
-    brier, log_loss : Score
+    brier, log_loss : MeanScore
         Mean squared difference between probability and outcome; mean of -log of the outcome's probability.
     reliability : tuple of ShareInBin
         Shares that overturned, in the nonempty bins of the predicted probability.
@@ -227,8 +227,8 @@ class ModelValidation(Result):
     TABLES = ("tests",)
 
     tests: tuple[JudgedTest, ...]
-    brier: Score
-    log_loss: Score
+    brier: MeanScore
+    log_loss: MeanScore
     reliability: tuple[ShareInBin, ...]
     reliability_chance: float
     description: str
@@ -430,7 +430,9 @@ def _average_left_out(source: Validation, count: int, weights: object, outlier_p
     return np.asarray(source.probabilities.mean(axis=0))
 
 
-def compute_score(scores: Floats, observed: Flags, base_score: Callable[[float], float], clusters: Integers) -> Score:
+def compute_score(
+    scores: Floats, observed: Flags, base_score: Callable[[float], float], clusters: Integers
+) -> MeanScore:
     """Compute mean score, and skill against the base rate, whose score is `base_score` of the overturned share."""
 
     def mean(indices: Integers) -> float:
@@ -441,7 +443,7 @@ def compute_score(scores: Floats, observed: Flags, base_score: Callable[[float],
         return 1.0 - mean(indices) / reference if reference > 0.0 else math.nan
 
     errors, all_tests = [_jackknife(statistic, clusters) for statistic in (mean, skill)], np.arange(len(scores))
-    return Score(mean(all_tests), errors[0], skill(all_tests), errors[1], len(scores), len(np.unique(clusters)))
+    return MeanScore(mean(all_tests), errors[0], skill(all_tests), errors[1], len(scores), len(np.unique(clusters)))
 
 
 def _jackknife(statistic: Callable[[Integers], float], clusters: Integers) -> float:

@@ -62,7 +62,7 @@ def chattering_time(
     *,
     method: str = "exact",
     order: int = 4,
-    resolved: int | None = None,
+    impact_count: int | None = None,
 ) -> Floats:
     """Compute the dimensionless time from uplift to rest of a slender block under a sine.
 
@@ -86,7 +86,7 @@ def chattering_time(
         "exact" for completeness.
     order : int
         Number of terms of "series", 1 to 40.
-    resolved : int, optional
+    impact_count : int, optional
         Number of impacts that "semianalytical" resolves before its geometric sum. By default 60, and above eta = 0.92
         enough for the same decrease of the speed as 60 impacts at 0.92.
 
@@ -119,14 +119,14 @@ def chattering_time(
     1.125947676934
     """
     order = checks.integer(order, "order", OptionError, 1, MAX_ORDER)
-    if resolved is not None:
-        resolved = checks.integer(resolved, "resolved", OptionError, 1, 1_000_000)
+    if impact_count is not None:
+        impact_count = checks.integer(impact_count, "impact_count", OptionError, 1, 1_000_000)
     parameters = check_amplitude(a), check_frequency(omega), check_restitution(eta)
     methods: dict[str, Callable[[], Floats]] = {
         "exact": lambda: _compute_exact_times(*parameters),
         "asymptotic": lambda: compute_asymptotic_times(*parameters),
         "series": lambda: compute_series_times(*parameters, order),
-        "semianalytical": lambda: _compute_semianalytical_times(*parameters, resolved),
+        "semianalytical": lambda: _compute_semianalytical_times(*parameters, impact_count),
     }
     selected = checks.choice(method, "method", OptionError, list(methods))
     return methods[selected]()
@@ -333,24 +333,24 @@ def _compute_exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     return times.reshape(shape)[()]
 
 
-def _compute_semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int | None) -> Floats:
+def _compute_semianalytical_times(a: Floats, omega: Floats, eta: Floats, impact_count: int | None) -> Floats:
     """Compute the chattering times by method "semianalytical"."""
     shape, (amplitudes, frequencies, restitutions) = broadcast_flat(a, omega, eta)
     exact = np.atleast_1d(_compute_exact_times(amplitudes, frequencies, restitutions))
     times = np.where(amplitudes == 1.0, 0.0, exact)
     complete = np.flatnonzero(np.isfinite(exact) & (amplitudes > 1.0))
     sequences = amplitudes[complete], frequencies[complete], restitutions[complete]
-    impacts = compute_default_resolved(sequences[2]) if resolved is None else np.full(complete.size, resolved)
+    impact_counts = choose_impact_counts(sequences[2]) if impact_count is None else np.full(complete.size, impact_count)
     phases = np.zeros(complete.size)
     statuses = np.full(complete.size, SequenceStatus.UNRESOLVED, np.int8)
-    write_semianalytical_phases(sequences, impacts, phases, statuses)
+    write_semianalytical_phases(sequences, impact_counts, phases, statuses)
     # Chattering is proven to be complete, so that an estimate beyond half a period is inaccurate.
     phases[statuses == SequenceStatus.UNRESOLVED] = math.inf
     times[complete] = phases / sequences[1]
     return times.reshape(shape)[()]
 
 
-def compute_default_resolved(eta: Floats) -> NDArray[np.int64]:
+def choose_impact_counts(eta: Floats) -> NDArray[np.int64]:
     """Compute the default number of impacts that Eq. 75 resolves."""
     count = np.ceil(_PAPER_IMPACTS * math.log(_PAPER_RESTITUTION) / np.log(eta))
     return np.maximum(count, _PAPER_IMPACTS).astype(np.int64)

@@ -351,7 +351,7 @@ class ChatteringEpisodes(Result):
     shaking : tuple of float
         Bracketed duration: times at which the motion first exceeds a threshold of the block, and last falls below one
         or the block overturns, s; NaN if not before the end of the simulation.
-    at_rest : float
+    time_at_rest : float
         Time at rest within the bracketed duration, s.
 
     See Also
@@ -369,16 +369,16 @@ class ChatteringEpisodes(Result):
 
     episodes: NDArray[np.void]
     shaking: tuple[float, float]
-    at_rest: float
+    time_at_rest: float
 
     def _headline(self) -> str:
-        return f"{len(self.episodes)}, at rest for {self.at_rest:.3f} s of the shaking"
+        return f"{len(self.episodes)}, at rest for {self.time_at_rest:.3f} s of the shaking"
 
     @property
     def share_at_rest(self) -> float:
         """Fraction of the bracketed duration during which the block is at rest; NaN without a bracketed duration."""
         start, end = self.shaking
-        return self.at_rest / (end - start) if end > start else math.nan
+        return self.time_at_rest / (end - start) if end > start else math.nan
 
     @property
     def amid_shaking(self) -> NDArray[np.bool_]:
@@ -404,7 +404,7 @@ class ChatteringEpisodes(Result):
         return {
             "episodes": array_to_rows(self.episodes),
             "shaking_s": self.shaking,
-            "at_rest_s": self.at_rest,
+            "time_at_rest_s": self.time_at_rest,
             "share_at_rest": self.share_at_rest,
         }
 
@@ -466,5 +466,5 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     start, end = float(exceedances[0, 0]), min(float(exceedances[-1, 1]), response.duration)
     # The shaking starts with an uplift, within rounding error.
-    at_rest = clear_rounding(np.diff(np.clip(response.rest_intervals, start, end)), end).sum()
-    return ChatteringEpisodes(episodes, (start, end), float(at_rest))
+    time_at_rest = clear_rounding(np.diff(np.clip(response.rest_intervals, start, end)), end).sum()
+    return ChatteringEpisodes(episodes, (start, end), float(time_at_rest))

@@ -73,8 +73,8 @@ class ChatteringReport(Result):
 
     def summary(self) -> str:
         values = self.values
-        times, resolved = values["chattering_time"], values["resolved"]
-        impacts = "" if resolved is None else f", {format_count(resolved, 'impact')}"
+        times, impact_count = values["chattering_time"], values["impact_count"]
+        impacts = "" if impact_count is None else f", {format_count(impact_count, 'impact')}"
         caveat = "" if values["complete"] else ", worthless: it takes chattering for complete"
         lines = [
             ("chattering", self._describe_completeness()),
@@ -152,7 +152,7 @@ class ChatteringReport(Result):
 
 
 def chattering_report(
-    a: float, omega: float, eta: float, *, order: int = 4, resolved: int | None = None, p: float | None = None
+    a: float, omega: float, eta: float, *, order: int = 4, impact_count: int | None = None, p: float | None = None
 ) -> ChatteringReport:
     """Report the chattering time of a slender block under a sine by every method, and its completeness.
 
@@ -160,7 +160,7 @@ def chattering_report(
     ----------
     a, omega, eta : float
         As in `chattering_time`, as scalars.
-    order, resolved : int
+    order, impact_count : int
         As in `chattering_time`.
     p : float, optional
         Frequency parameter of the block, rad/s. If given, times are also reported in seconds.
@@ -191,7 +191,7 @@ def chattering_report(
     series = math.nan
     with suppress(OptionError):  # double precision does not resolve this many terms
         series = float(chattering_time(a, omega, eta, method="series", order=order))
-    compute = partial(chattering_time, a, omega, eta, resolved=resolved)
+    compute = partial(chattering_time, a, omega, eta, impact_count=impact_count)
     times = {method: float(compute(method=method)) for method in ("exact", "asymptotic", "semianalytical")}
     values: dict[str, Any] = {
         "a": a,
@@ -201,7 +201,7 @@ def chattering_report(
         "half_period": math.pi / omega,
         "chattering_time": {**times, "series": series},
         "order": order,
-        "resolved": resolved,
+        "impact_count": impact_count,
         "bracket": {"lower": chattering.lower, "upper": chattering.upper, "impacts": int(chattering.impacts.size)},
         "critical_amplitude": float(critical_amplitude(omega, eta)),
         "first_interval": {"exact": float(interval), "eq32": float(first_interval(a, omega))},

@@ -23,7 +23,9 @@ from rocking.cli.options import (
     MEASURE,
     MODEL,
     RECORDS,
+    RISK,
     BlockOptions,
+    ClusterOptions,
     EnsembleOptions,
     LoadedRecords,
     MeasureOptions,
@@ -34,7 +36,6 @@ from rocking.cli.options import (
     SlipOptions,
     SlipSchemeOptions,
     UnscaledOptions,
-    parse_labels,
     read_ensemble_arguments,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
@@ -199,7 +200,7 @@ def measures(
     periods: str = "0.5,1,2",
     damping: float = 0.05,
     also: str | None = None,
-    clusters: str | None = None,
+    clusters: Annotated[ClusterOptions, RISK] = ClusterOptions(),
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
@@ -219,15 +220,11 @@ def measures(
         Fraction of critical damping of the spectral accelerations.
     also
         Further measures, separated by commas: pgd, arias, cav, incremental_velocity, duration.
-    clusters
-        Groups of records, each of which counts as one in the intervals: station groups the components of one station
-        in one earthquake, as named in the files; or a label for each record, separated by commas. By default each
-        record is a group.
     """
     settings = block.blocks(model)
     with output.folder() as folder:
         loaded = motion.read_all(names)
-        settings |= {"periods": read_array(periods, "periods"), "clusters": parse_labels(clusters)}
+        settings |= {"periods": read_array(periods, "periods"), "clusters": clusters.parse_clusters()}
         further = [] if also is None else [name.strip() for name in also.split(",")]
         settings |= {"damping": damping, "component": motion.component, "also": further}
         result = compare_measures(motions=[*loaded.motions.values()], **settings)
@@ -282,7 +279,7 @@ def chatter(
     *,
     p: float | None = None,
     order: Annotated[int, INTEGER] = 4,
-    resolved: Annotated[int | None, INTEGER] = None,
+    impact_count: Annotated[int | None, INTEGER] = None,
     table: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
@@ -303,13 +300,13 @@ def chatter(
         Frequency parameter of the block, rad/s.
     order
         Number of terms of the expansion in a - 1, 1 to 40.
-    resolved
+    impact_count
         Number of impacts that the semi-analytical method resolves. The default depends on the restitution.
     table
         Show some cycles of the paper's iterative procedure (Eqs 62 and 64). cycles.csv contains all.
     """
     with output.folder() as folder:
-        report = chattering_report(a, omega, eta, order=order, resolved=resolved, p=p)
+        report = chattering_report(a, omega, eta, order=order, impact_count=impact_count, p=p)
         result, text = report.to_dict(), report.summary()
         if table:
             text += f"\n\n{report.table()}"

@@ -11,17 +11,17 @@ from typing import Annotated, Any, Final
 from cyclopts import Parameter
 
 from rocking.assessment.assess import assess as assess_objects
-from rocking.cli.fragility import read_hazard
 from rocking.cli.options import (
     INTEGER,
     MEASURE,
     MODEL,
     RECORDS,
+    RISK,
     MeasureOptions,
     MotionOptions,
     Names,
+    RiskOptions,
     SlipOptions,
-    parse_labels,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, skip_on_error
 from rocking.inputs.inventory import read_labelled
@@ -35,14 +35,10 @@ _VERTICAL: Final = "its channel is vertical by its name; give the horizontal fil
 def assess(
     inventory: Path,
     *names: Names,
-    hazard: Path | None = None,
-    site: Annotated[int, INTEGER] = 0,
-    years: float = 50.0,
     count: Annotated[int, INTEGER] = 20,
     samples: Annotated[int, INTEGER] = 50,
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "both",
-    clusters: str | None = None,
-    confidence: float = 0.9,
+    risk: Annotated[RiskOptions, RISK] = RiskOptions(),
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
     model: Annotated[SlipOptions, MODEL] = SlipOptions(),
@@ -53,7 +49,7 @@ def assess(
     Each object is simulated under the records as they are and scaled to levels of intensity, with its fragility, rank
     and rules of thumb. Objects and records that cannot be read are listed, and do not stop the others. --out contains
     report.html (one page with figures, for the browser and for printing), assessment.xlsx (if openpyxl is installed)
-    and assessment.nc.
+    and assessment.nc. The measure of --hazard replaces --measure.
 
     Parameters
     ----------
@@ -61,40 +57,27 @@ def assess(
         CSV file or Excel workbook with one object in each row: name, sizes with units in the heading, as Width (cm) and
         Height (m), or p and alpha, or pivots; optionally friction, restraints and standard deviations (24 +- 1). All
         other columns, such as location or value, are listed in the report.
-    hazard
-        CSV file of the site's hazard curve (pga_g,annual_rate, or OpenQuake's), for annual rates. Its measure replaces
-        --measure.
-    site
-        Row of OpenQuake's file, from 0.
-    years
-        Time of the probabilities, years.
     count
         Number of levels of each object, if --levels does not set them for all.
     samples
         Number of sampled blocks of an object with uncertain sizes.
     polarity
         Motions as they are (+), reversed (-), or both. A symmetric object responds equally to both, which count once.
-    clusters
-        Groups of records for the intervals: station groups the components of one station in one earthquake, as named
-        in the files; or a label for each record, separated by commas. By default each record is a group.
-    confidence
-        Probability of the intervals.
     """
-    curve = read_hazard(hazard, site, years, measure.periods, motion.component)
+    curve = risk.read_hazard(measure, motion.component)
     settings: dict[str, Any] = measure.arguments(motion.component) | model.arguments()
     settings["levels"] = count if settings["levels"] is None else settings["levels"]
     if curve is not None:
         settings["measure"] = curve.measure
-    settings |= {"polarity": polarity, "clusters": parse_labels(clusters), "confidence": confidence}
+    settings |= {"polarity": polarity, "clusters": risk.parse_clusters(), "confidence": risk.confidence}
     with output.folder() as folder:
         objects = read_labelled(inventory, keep_going=True, expected=("name", "friction"))
         loaded = replace(motion, keep_going=True).read_all(names)
-        failures = {**objects.failures}
-        failures |= {name: reason.removeprefix(f"{name}: ") for name, reason in loaded.skipped.items()}
-        failures |= {name: _VERTICAL for name, record in loaded.motions.items() if is_vertical(record)}
-        motions = {name: record for name, record in loaded.motions.items() if name not in failures}
-        settings |= {"years": years, "samples": samples, "failures": failures}
-        result = assess_objects(objects, motions, hazard=curve, **settings)
+        skipped = {name: reason.removeprefix(f"{name}: ") for name, reason in loaded.skipped.items()}
+        skipped |= {name: _VERTICAL for name, record in loaded.motions.items() if is_vertical(record)}
+        motions = {name: record for name, record in loaded.motions.items() if name not in skipped}
+        result = assess_objects(objects, motions, hazard=curve, years=risk.years, samples=samples, **settings)
+        result = replace(result, skipped=skipped | {**result.skipped})
         if folder is not None:
             result.to_html(folder / "report.html", command=shlex.join(["rocking", *sys.argv[1:]]))
             with skip_on_error("assessment.xlsx"):

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -18,16 +18,16 @@ from rocking.analysis.risk import check_measure
 from rocking.calibration.tables import read_observed
 from rocking.cli.options import (
     BLOCK,
-    INTEGER,
     MEASURE,
     MODEL,
     RECORDS,
+    RISK,
     EnsembleOptions,
     MeasureOptions,
     MotionOptions,
     Names,
+    RiskOptions,
     SlipSchemeOptions,
-    parse_labels,
     parse_limit_states,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, skip_on_error, write_results
@@ -35,15 +35,11 @@ from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import write_csv
 from rocking.errors import FitError, OptionError
-from rocking.inputs.notes import hazard_notes
-from rocking.motion.scaling import ComponentName, Measure
+from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Polarity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-#: Default time for probabilities, years.
-_YEARS: Final = 50.0
 
 
 def fragility(
@@ -51,14 +47,10 @@ def fragility(
     outcomes: Path | None = None,
     limit_states: str = "overturning",
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "+",
-    clusters: str | None = None,
     larger: Annotated[bool, Parameter(negative="")] = False,
-    confidence: float = 0.9,
     taxonomy: str = "rocking-block",
-    hazard: Path | None = None,
-    site: Annotated[int, INTEGER] = 0,
-    years: float = _YEARS,
     standing: float | None = None,
+    risk: Annotated[RiskOptions, RISK] = RiskOptions(),
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
@@ -71,7 +63,7 @@ def fragility(
     ensemble from a calibration (--ensemble). With --levels every motion is scaled to each level (stripes); otherwise
     motions are used unscaled (a cloud). --outcomes fits observed outcomes instead, without records and block. --out
     contains fragility.png, .pdf, .csv, outcomes.csv (record, intensity, peak, outcome), result.json, and fragility.xml
-    (NRML 0.5).
+    (NRML 0.5), with --hazard also risk.png and .pdf.
 
     Parameters
     ----------
@@ -83,29 +75,17 @@ def fragility(
         Limit states, separated by commas: overturning, or NAME=ROTATION divided by the slenderness, as half=0.5.
     polarity
         Motions as they are (+), reversed (-), or both. A symmetric block responds equally to both, which count once.
-    clusters
-        Groups of records for the intervals: station groups the components of one station in one earthquake, as named
-        in the files; or a label for each record, separated by commas. By default each record is a group.
     larger
         Count only the larger response of both components of each pair (--component), and of both polarities.
-    confidence
-        Probability of the intervals and bands.
     taxonomy
         Identifier of the fragility function in NRML.
-    hazard
-        CSV file of the site's hazard curve (pga_g,annual_rate, or OpenQuake's): adds annual rates of exceeding the
-        limit states, and risk.png and .pdf to --out.
-    site
-        Row of OpenQuake's file, from 0.
-    years
-        Time of the probabilities, years.
     standing
         Years for which the block has stood: adds upper bounds on how strongly and how often it was shaken, with
         --hazard the probability of its survival, and survival.png and .pdf to --out.
     """
     if outcomes is not None:
         conflicting = {
-            "records": names, "levels": measure.levels, "ensemble": block.ensemble, "clusters": clusters,
+            "records": names, "levels": measure.levels, "ensemble": block.ensemble, "clusters": risk.clusters,
             "larger": larger, "limit_states": limit_states != "overturning",
             "polarity": polarity != "+", "model": model.equation,
             "chattering": model.chattering != "certified", **block.supplied(),
@@ -115,8 +95,7 @@ def fragility(
             message = "{} are observed, for their own block and motions: omit {}"
             raise OptionError(message, "outcomes", option)
     bodies = {} if outcomes is not None else block.blocks(model)
-    checks.positive(years, "years", OptionError)
-    curve = read_hazard(hazard, site, years, measure.periods, motion.component)
+    curve = risk.read_hazard(measure, motion.component)
     states, intensity_measure = parse_limit_states(limit_states), measure.create_measure(motion.component)
     if output.out is not None:
         check_nrml_names("taxonomy", taxonomy)
@@ -124,31 +103,30 @@ def fragility(
     if standing is not None:
         checks.positive(standing, "standing", OptionError)
         standing_limit = _find_standing_limit([*states])
-    checks.fraction(confidence, "confidence", OptionError)
     with output.folder() as folder:
         records: dict[str, Any] = {}
         if outcomes is not None:
             observed = read_observed(outcomes, intensity_measure, **motion.metadata(), **motion.corrections())
             _check_hazard(curve, observed["measure"])
-            fitted = fit_fragility(**observed, confidence=confidence)
+            fitted = fit_fragility(**observed, confidence=risk.confidence)
         else:
             _check_hazard(curve, intensity_measure)
             loaded = motion.read_all(names)
             records, settings = loaded.to_dict(), measure.arguments(motion.component) | model.arguments() | bodies
             settings |= {
                 "polarity": polarity,
-                "clusters": parse_labels(clusters),
+                "clusters": risk.parse_clusters(),
                 "limit_states": states,
                 "larger": larger,
             }
             with _save_outcomes_on_failure(folder):
-                fitted = fit_simulated(motions=[*loaded.motions.values()], **settings, confidence=confidence)
+                fitted = fit_simulated(motions=[*loaded.motions.values()], **settings, confidence=risk.confidence)
         result, texts = fitted.to_dict() | records, [fitted.summary()]
         figures: dict[str, Callable[[], Figure]] = {"fragility": fitted.plot}
         if curve is not None:
-            risk = fitted.annual_rate(curve)
-            result["risk"], figures["risk"] = risk.to_dict(years), risk.plot
-            texts.append(risk.summary(years))
+            rates = fitted.annual_rate(curve)
+            result["risk"], figures["risk"] = rates.to_dict(risk.years), rates.plot
+            texts.append(rates.summary(risk.years))
         if standing is not None:
             survival = fitted.survival(standing, curve, limit_state=standing_limit)
             result["survival"], figures["survival"] = survival.to_dict(), survival.plot
@@ -195,18 +173,3 @@ def _save_outcomes_on_failure(folder: Path | None) -> Iterator[None]:
             write_csv(folder / "outcomes.csv", error.outcomes)
             note(f"the simulated outcomes are in {folder / 'outcomes.csv'}")
         raise
-
-
-def read_hazard(
-    file: Path | None, site: int, years: float, period: Any, component: ComponentName
-) -> HazardCurve | None:
-    """Read a hazard curve, if any, with notes."""
-    if file is None:
-        for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
-            if is_given:
-                raise OptionError("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
-        return None
-    curve = HazardCurve.read(file, site=site, period=period, component=component)
-    for sentence in hazard_notes(curve.intensity, curve.measure):
-        note(f"{file}: {sentence}")
-    return curve

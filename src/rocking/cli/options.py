@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, TypeVar, ca
 
 from cyclopts import Group, Parameter, Token
 
+from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.errors import BlockError, MotionError, OptionError, RecordError, join_placeholders
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.inventory import read_inventory
-from rocking.inputs.notes import motion_notes, vertical_notes
+from rocking.inputs.notes import hazard_notes, motion_notes, vertical_notes
 from rocking.inputs.pulses import named_pulse
 from rocking.inputs.quantities import (
     NumberReader,
@@ -37,6 +38,7 @@ from rocking.records.components import collect_pairs
 from rocking.records.named import OWN, expand_record_names, list_motion_names, load_motion, load_vertical
 
 if TYPE_CHECKING:
+    from rocking.analysis.hazard import HazardCurve
     from rocking.block import Block
     from rocking.block.body import Body
 
@@ -446,6 +448,59 @@ class MeasureOptions(IntensityOptions):
         return {"measure": measure, "levels": levels}
 
 
+#: Default time for probabilities, years.
+_YEARS: Final = 50.0
+
+#: Options among those of the command itself.
+RISK: Final = Parameter(name="*")
+_CLUSTERS_HELP: Final = (
+    "Groups of records for the intervals: station groups the components of one station in one earthquake, as named in "
+    "the files; or a label for each record, separated by commas. By default each record is a group."
+)
+_HAZARD_HELP: Final = "CSV file of the site's hazard curve (pga_g,annual_rate, or OpenQuake's), for annual rates."
+
+
+@dataclass(frozen=True)
+class ClusterOptions:
+    """Groups of records."""
+
+    clusters: Annotated[str | None, Parameter(help=_CLUSTERS_HELP)] = None
+
+    def parse_clusters(self) -> str | list[str] | None:
+        """Parse the labels that group motions."""
+        from rocking.analysis.levels import BY_STATION
+
+        text = self.clusters
+        return text if text is None or text == BY_STATION else [label.strip() for label in text.split(",")]
+
+
+@dataclass(frozen=True)
+class RiskOptions(ClusterOptions):
+    """Statistics of a fragility, and hazard curve of a site."""
+
+    confidence: Annotated[float, Parameter(help="Probability of the intervals and bands.")] = 0.9
+    hazard: Annotated[Path | None, Parameter(help=_HAZARD_HELP)] = None
+    site: Annotated[int, INTEGER, Parameter(help="Row of OpenQuake's file, from 0.")] = 0
+    years: Annotated[float, Parameter(help="Time of the probabilities, years.")] = _YEARS
+
+    def read_hazard(self, measure: IntensityOptions, component: ComponentName) -> HazardCurve | None:
+        """Check the numbers, and read the hazard curve, if any, with notes."""
+        from rocking.analysis.hazard import HazardCurve
+
+        checks.fraction(self.confidence, "confidence", OptionError)
+        checks.positive(self.years, "years", OptionError)
+        if self.hazard is None:
+            for name, is_given in {"site": self.site != 0, "years": self.years != _YEARS}.items():
+                if is_given:
+                    raise OptionError("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
+            return None
+        period: Any = measure.periods
+        curve = HazardCurve.read(self.hazard, site=self.site, period=period, component=component)
+        for sentence in hazard_notes(curve.intensity, curve.measure):
+            note(f"{self.hazard}: {sentence}")
+        return curve
+
+
 @dataclass(frozen=True)
 class ModelOptions:
     """Equation of motion."""
@@ -510,13 +565,6 @@ class SlipSchemeOptions(SchemeOptions):
 @_with_inputs("duration", "initial_rotation", "initial_velocity")
 class StartOptions(InputOptions):
     """Start and end of a simulation."""
-
-
-def parse_labels(clusters: str | None) -> str | list[str] | None:
-    """Parse the labels of an option that groups motions."""
-    from rocking.analysis.levels import BY_STATION
-
-    return clusters if clusters in (None, BY_STATION) else [label.strip() for label in clusters.split(",")]
 
 
 def read_positive_acceleration(text: str, name: str) -> float:

@@ -141,7 +141,7 @@ class Result(ABC):
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
         """Write a table of `to_dataframe` to a CSV file, with "inf" for infinity, like `to_json`."""
-        write_csv(path, self.to_dataframe(table), digits=self._FORMAT)
+        write_csv(path, self.to_dataframe(table), float_format=self._FORMAT)
 
     def to_excel(self, path: str | Path) -> None:
         """Write all tables as sheets of a workbook (.xlsx), like `to_json`.

@@ -100,11 +100,11 @@ def format_count(number: float, noun: str) -> str:
     return f"{text} {noun[:-1]}ies" if noun.endswith("y") else f"{text} {noun}s"
 
 
-def format_within(value: float, bounds: tuple[float, float], text: Callable[[float], str]) -> str:
+def format_within(value: float, bounds: tuple[float, float], format_number: Callable[[float], str]) -> str:
     """Format a number or, if it is out of bounds, the bound after < or >."""
     low, high = bounds
     sign = "< " if value < low else "> " if value > high else ""
-    return sign + text(min(max(value, low), high))
+    return sign + format_number(min(max(value, low), high))
 
 
 def format_digits(
@@ -116,13 +116,13 @@ def format_digits(
     # Two digits of the width.
     last_digit = math.floor(math.log10(width)) - 1 if 0.0 < width < math.inf else math.inf
 
-    def text(number: float) -> str:
+    def format_number(number: float) -> str:
         if number == 0.0 or not math.isfinite(number):
             return "infinity" if math.isinf(number) else f"{number:g}"
         digits = int(max(2, math.floor(math.log10(abs(number))) - last_digit + 1))
         return f"{float(f'{number:.{digits - 1}e}'):.{max(digits, 6)}g}"
 
-    value_text, low_text, high_text = (format_within(number, bounds, text) for number in (value, low, high))
+    value_text, low_text, high_text = (format_within(number, bounds, format_number) for number in (value, low, high))
     return value_text, f"{low_text} to {high_text}"
 
 
@@ -281,9 +281,11 @@ def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
         temporary.write_bytes(content)
 
 
-def write_csv(path: str | Path, frame: pd.DataFrame, *, index: bool = False, digits: str | None = "%.15g") -> None:
+def write_csv(
+    path: str | Path, frame: pd.DataFrame, *, index: bool = False, float_format: str | None = "%.15g"
+) -> None:
     """Write a data frame as CSV with a header, completely or not at all."""
-    write_text(path, frame.to_csv(index=index, float_format=digits, lineterminator="\n"))
+    write_text(path, frame.to_csv(index=index, float_format=float_format, lineterminator="\n"))
 
 
 def write_excel(path: str | Path, sheets: Mapping[str, pd.DataFrame]) -> None:

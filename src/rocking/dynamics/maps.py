@@ -41,7 +41,7 @@ _NO_TRAPS: Final = np.empty((0, TRAP_COLUMNS))
 _BELOW_ONE: Final = 1.0 - 2.0**-40
 
 
-class PeriodicForcing:
+class PeriodicallyForcedBody:
     """Body under periodic motion, in the form that kernels accept."""
 
     def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | ChatteringScheme) -> None:
@@ -169,14 +169,14 @@ class Scale(NamedTuple):
     velocity: float
 
 
-def compute_scale(strobe: PeriodicForcing) -> Scale:
+def compute_scale(forced_body: PeriodicallyForcedBody) -> Scale:
     """Compute the natural scales of coordinate and velocity of a body under a motion."""
-    record, period = strobe._body_records[0], strobe.forcing_period
-    if not isinstance(strobe.body, LinearBody):
+    record, period = forced_body._body_records[0], forced_body.forcing_period
+    if not isinstance(forced_body.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
         return Scale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
     pull = float(np.max(np.abs(record["threshold_slope"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
-    speed = period * max(estimate_mean_acceleration(strobe.motion), pull, 1e-300)
+    speed = period * max(estimate_mean_acceleration(forced_body.motion), pull, 1e-300)
     rate = math.sqrt(abs(float(record["stiffness"][0])))
     if record["two_stops"]:
         width = float(record["overturn_angle"])
@@ -220,7 +220,7 @@ def describe_input(subject: Body | Motion) -> str:
     return f"{subject.description}, {format_sides(subject.sides)}"
 
 
-class StroboscopicMap(PeriodicForcing):
+class StroboscopicMap(PeriodicallyForcedBody):
     """Map of a state (coordinate, velocity) over one period, created by `stroboscopic_map`.
 
     Attributes

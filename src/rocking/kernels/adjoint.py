@@ -12,10 +12,10 @@ from enum import IntEnum
 
 from rocking.core.arrays import Floats
 from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import mean_factor
 from rocking.kernels.ground import ground_error, has_vertical, sum_absolute_terms, vertical_component
-from rocking.kernels.restraints import apply_tendon_law, plastic_at_node
+from rocking.kernels.restraints import apply_tendon_law, update_plastic_elongation
 from rocking.kernels.series import write_variation_coefficients
 from rocking.kernels.state import Record, Records, TendonLaw
 from rocking.kernels.trace import (
@@ -65,7 +65,7 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
     """
     block, nodes = trail.block, trail.nodes
     number = count_impacts(nodes, row)
-    plastic = find_plastic(trail, row)
+    plastic_elongation = find_plastic_elongation(trail, row)
     for k in range(row, -1, -1):
         node = nodes[k]
         if node.side < 0 or (k < row and nodes[k + 1].side < 0):
@@ -78,8 +78,8 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
             if k < row and turns_back(nodes, k + 1):
                 change[0] += elongation_rate(trail, node.side, nodes[k + 1].u) * change[2]
                 change[2] = 0.0
-                plastic = find_plastic(trail, k)
-            apply_tendon_law(block, node.law, plastic)
+                plastic_elongation = find_plastic_elongation(trail, k)
+            apply_tendon_law(block, node.tendon_law, plastic_elongation)
         order, _, degree = expand_arc(trail.ground, block, trail.settings, scratch, node, t)
         if k < row and nodes[k + 1].u == 0.0 and t > 0.0:
             number -= is_impact(nodes, k)
@@ -166,9 +166,9 @@ def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floa
     """
     block, nodes = trail.block, trail.nodes
     node, next_node = nodes[row], nodes[row + 1]
-    plastic = find_plastic(trail, row)
+    plastic_elongation = find_plastic_elongation(trail, row)
     if block.yielding:
-        apply_tendon_law(block, node.law, plastic)
+        apply_tendon_law(block, node.tendon_law, plastic_elongation)
     if node.side < 0:
         side, rate = next_node.side, -push_rate(trail.ground, block, next_node.side, next_node.piece, next_node.offset)
         if row > 0 and next_node.time == node.time:
@@ -177,10 +177,10 @@ def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floa
             return AdjointEnd.START
         if not rate > 0.0:
             return AdjointEnd.TOUCHES_THRESHOLD
-        change[2] = restoring_by_tendon(block, side, plastic, 1.0) / (block.threshold_slope[side] * rate)
+        change[2] = restoring_by_tendon(block, side, plastic_elongation, 1.0) / (block.threshold_slope[side] * rate)
         add_instant(trail, next_node, (side_sign(side) / rate, block.threshold[side] / rate), out)
     elif next_node.side < 0:
-        differentiate_rest_time(trail, node, plastic, change, out)
+        differentiate_rest_time(trail, node, plastic_elongation, change, out)
     else:
         t = step_duration(trail, node, next_node)
         order, _, _ = expand_arc(trail.ground, block, trail.settings, scratch, node, t)
@@ -192,7 +192,7 @@ def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floa
 
 
 @inlined
-def differentiate_rest_time(trail: Trail, node: Record, plastic: float, change: Floats, out: Floats) -> None:
+def differentiate_rest_time(trail: Trail, node: Record, plastic_elongation: float, change: Floats, out: Floats) -> None:
     """Write the derivatives of the time of rest after the impact of a node (see `trace.rest_shift`)."""
     block, i = trail.block, node.side
     j = block.next_side[i]
@@ -206,8 +206,8 @@ def differentiate_rest_time(trail: Trail, node: Record, plastic: float, change: 
     by_time += by_g_i * block.threshold_slope[i] * push_rate(trail.ground, block, i, node.piece, node.offset)
     by_time += by_g_j * block.threshold_slope[j] * push_rate(trail.ground, block, j, node.piece, node.offset)
     change[0], change[1] = -by_time / node.v, by_speed
-    change[2] = by_g_i * restoring_by_tendon(block, i, plastic, 1.0)
-    change[2] += by_g_j * restoring_by_tendon(block, j, plastic, 1.0)
+    change[2] = by_g_i * restoring_by_tendon(block, i, plastic_elongation, 1.0)
+    change[2] += by_g_j * restoring_by_tendon(block, j, plastic_elongation, 1.0)
     by_i, by_j = by_g_i * block.threshold_slope[i], by_g_j * block.threshold_slope[j]
     push = by_i * side_sign(i) + by_j * side_sign(j)
     add_instant(trail, node, (push, by_i * block.threshold[i] + by_j * block.threshold[j]), out)
@@ -229,17 +229,17 @@ def add_instant(trail: Trail, node: Record, derivatives: tuple[float, float], ou
 @inlined
 def turns_back(nodes: Records, row: int) -> bool:
     """Return whether the body turns back at a node, where the plastic elongation is written."""
-    return bool(nodes[row - 1].law == TendonLaw.PLASTIC and nodes[row].law == TendonLaw.ELASTIC)
+    return bool(nodes[row - 1].tendon_law == TendonLaw.PLASTIC and nodes[row].tendon_law == TendonLaw.ELASTIC)
 
 
 @inlined
-def find_plastic(trail: Trail, row: int) -> float:
+def find_plastic_elongation(trail: Trail, row: int) -> float:
     """Return the plastic elongation at a node; 0 if no tendon yields."""
     if not trail.block.yielding:
         return 0.0
     while row > 0 and not turns_back(trail.nodes, row):
         row -= 1
-    return plastic_at_node(trail.block, trail.settings, trail.nodes, row, 0.0)
+    return update_plastic_elongation(trail.block, trail.settings, trail.nodes, row, 0.0)
 
 
 @inlined
@@ -251,7 +251,7 @@ def count_impacts(nodes: Records, row: int) -> int:
     return count
 
 
-@shared
+@not_inlined
 def propagate_through_arc(
     trail: Trail,
     scratch: Record,
@@ -294,7 +294,7 @@ def propagate_through_arc(
             for j in range(k + 1):
                 m[k] += lam * x[j] * (-scratch.sine[k - j] if trail.settings.nonlinear else scratch.rotation[k - j])
         add_moments(scratch.auxiliary, m, order, node.offset, t, 1.0, out[node.piece, ground.columns :])
-    if block.yielding and node.law == TendonLaw.ELASTIC:
+    if block.yielding and node.tendon_law == TendonLaw.ELASTIC:
         write_plastic_series(trail, scratch, node.side, x, order, m)
         add_moments(scratch.auxiliary, m, order, 0.0, t, 1.0, change[2:_STATE_DERIVATIVES])
 

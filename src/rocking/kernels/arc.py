@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.ground import Ground, acceleration, has_vertical, vertical_component, write_local_series
 from rocking.kernels.series import (
     INTEGRATED_TWICE,
@@ -51,7 +51,7 @@ def write_weight_series(ground: Ground, piece: int, offset: float, W: Floats) ->
     return degree
 
 
-@shared
+@not_inlined
 def expand_arc(
     ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
 ) -> tuple[int, float, int]:
@@ -153,7 +153,7 @@ def converged_order(c: Floats, degree: int, h: float) -> int:
     return ORDER + 1
 
 
-@shared
+@not_inlined
 def expand_with_bound(
     block: Record, settings: Record, state: Record, scratch: Record, degrees: tuple[int, int], h: float
 ) -> tuple[int, float]:
@@ -208,7 +208,7 @@ MIN_TERM = 1e-290
 MAX_SHORTENINGS = 200
 
 
-@shared
+@not_inlined
 def shorten_step(
     block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], h: float
 ) -> float:
@@ -237,7 +237,7 @@ def bound_truncation(
     return bound_linear_truncation(scratch, block.stiffness[side], degrees[1], order, h)
 
 
-@shared
+@not_inlined
 def bound_linear_truncation(
     scratch: Record, lam: float, weight_degree: int, order: int, h: float
 ) -> tuple[float, float]:
@@ -266,7 +266,7 @@ def bound_linear_truncation(
     return (stiffness * products / (order * (1.0 - feedback)) if feedback < 1.0 else np.inf), largest
 
 
-@shared
+@not_inlined
 def bound_nonlinear_truncation(
     scratch: Record, lam: float, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
@@ -307,7 +307,7 @@ def bound_nonlinear_truncation(
     return (stiffness * (push_products + strength * z) / order if z < 1.0 else np.inf), largest
 
 
-@shared
+@not_inlined
 def bound_restrained_truncation(
     block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
@@ -350,14 +350,14 @@ def bound_restrained_truncation(
 
 @inlined
 def bound_restrained_angles(
-    scratch: Record, degrees: tuple[int, int], order: int, h: float, forces: tuple[float, float, float, float]
+    scratch: Record, degrees: tuple[int, int], order: int, h: float, force_terms: tuple[float, float, float, float]
 ) -> float:
     """Bound V of `bound_restrained_truncation` in the nonlinear model from terms of the rotation in ``auxiliary``.
 
-    ``forces``: stiffness and prestress times h^2, contribution of known terms, and feedback of V.
+    ``force_terms``: stiffness and prestress times h^2, contribution of known terms, and feedback of V.
     """
     A, W, d = scratch.ground, scratch.weight, scratch.auxiliary
-    power, strength, known_terms, feedback = forces
+    stiffness, prestress, known_terms, feedback = force_terms
     if not feedback < 0.5:
         return np.inf
     for k in range(1, order + 1):
@@ -366,11 +366,12 @@ def bound_restrained_angles(
         d[k] += d[k + 1]
     velocity = d[0]
     angle_sum, products = sum_angle_terms(scratch.sine, scratch.cosine, d, order, h)
-    if strength > 0.0:
+    if prestress > 0.0:
         half_sum, half_products = sum_angle_terms(scratch.half_sine, scratch.half_cosine, d, order, h)
         angle_sum += half_sum
         products += half_products
     write_angle_tails(scratch.sine, scratch.cosine, d, order, h)
+    strength, power = prestress, stiffness
     for j in range(max(degrees[0], degrees[1]) + 1):
         push = ((abs(A[j]) if j <= degrees[0] else 0.0) + (abs(W[j]) if j <= degrees[1] else 0.0)) * power
         strength += push

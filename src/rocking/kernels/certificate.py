@@ -17,12 +17,12 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.kernels.arc import restoring_acceleration, side_sign, weight_at, write_weight_series
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import mean_factor, min_factor
 from rocking.kernels.ground import (
     ROUNDING,
+    AccelerationBounds,
     Ground,
-    Window,
     bound_window,
     ground_error,
     has_vertical,
@@ -32,7 +32,7 @@ from rocking.kernels.ground import (
     write_local_series,
 )
 from rocking.kernels.remaining import ImpactSide, Pair, bound_restoring_error, estimate_remaining_time, refine_bracket
-from rocking.kernels.restraints import may_law_change_below
+from rocking.kernels.restraints import may_tendon_law_change_below
 from rocking.kernels.sliding import least_sticking_friction, slip_factor, slip_restoring, slip_stiffness
 from rocking.kernels.state import Record
 
@@ -123,7 +123,7 @@ def no_proof() -> Proof:
     return Proof(np.nan, np.nan, np.nan, np.nan)
 
 
-@shared
+@not_inlined
 def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
     """Compute a bracket on the time to rest after an impact; all NaN: no proof."""
     v, i = state.v, state.side
@@ -161,7 +161,7 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
     max_square = v * v * (1.0 + 2.0 * change / min_restoring) * (1.0 + 2.0 * change / min_restoring)
     if (
         (block.two_stops and height >= block.overturn_angle)
-        or (block.yielding and may_law_change_below(block, settings, state.plastic, height))
+        or (block.yielding and may_tendon_law_change_below(block, settings, state.plastic_elongation, height))
         or (block.has_friction and not sticks_until_rest(block, settings, motion_bounds, height, max_square))
     ):
         return no_proof()
@@ -184,8 +184,8 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
 class MotionBounds(NamedTuple):
     """Bounds on both components of the motion during a window."""
 
-    horizontal: Window  # bounds on the push
-    vertical: Window  # bounds on the addition to a weight of 1
+    horizontal: AccelerationBounds  # bounds on the push
+    vertical: AccelerationBounds  # bounds on the addition to a weight of 1
 
 
 @inlined
@@ -221,7 +221,7 @@ _MAX_HEIGHT_RATIO = 2.0
 _MAX_SLIDING_SPEED_RATIO = 1.25
 
 
-@shared
+@not_inlined
 def prove_slide(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
     """Compute a bracket on the time at which a block that slips ceases to rock and slides; all NaN: no proof.
 
@@ -281,7 +281,12 @@ def sliding_divisor(block: Record, side: int, direction: float, height: float) -
 
 @inlined
 def bound_sliding_side(
-    block: Record, settings: Record, side: int, slip: tuple[float, float], vertical: Window, limits: tuple[float, float]
+    block: Record,
+    settings: Record,
+    side: int,
+    slip: tuple[float, float],
+    vertical: AccelerationBounds,
+    limits: tuple[float, float],
 ) -> Bounds:
     """Compute bounds on a side while slipping; NaN without a proof.
 
@@ -313,7 +318,7 @@ def bound_sliding_side(
 @inlined
 def bound_motion(ground: Ground, block: Record, state: Record, window: float, scratch: Record) -> MotionBounds:
     """Bound the motion from a state on, including its error; NaN beyond a threshold."""
-    vertical = Window(0.0, 0.0, 0.0, 0.0)
+    vertical = AccelerationBounds(0.0, 0.0, 0.0, 0.0)
     if has_vertical(ground):
         limits = (-1.0, np.inf)
         bounds = bound_window(vertical_component(ground), state.piece, state.offset, window, limits, scratch.ground)
@@ -407,31 +412,31 @@ def clear_lowest_coefficients(A: Floats) -> Floats:
 
 
 @inlined
-def widen_for_error(motion: Window, error: float) -> Window:
+def widen_for_error(motion: AccelerationBounds, error: float) -> AccelerationBounds:
     """Return bounds on a motion that differs from a bounded one by at most ``error``."""
-    return Window(motion.low - error, motion.high + error, motion.slope, motion.jumps + 2.0 * error)
+    return AccelerationBounds(motion.low - error, motion.high + error, motion.slope, motion.jumps + 2.0 * error)
 
 
 @inlined
-def max_magnitude(motion: Window) -> float:
+def max_magnitude(motion: AccelerationBounds) -> float:
     """Return the largest absolute value of an acceleration."""
     return max(abs(motion.low), abs(motion.high))
 
 
 @inlined
-def max_weight_magnitude(vertical: Window) -> float:
+def max_weight_magnitude(vertical: AccelerationBounds) -> float:
     """Return the largest absolute weight divided by the weight at rest."""
     return max(1.0 + vertical.high, -(1.0 + vertical.low))
 
 
 @inlined
-def max_weight(block: Record, j: int, vertical: Window) -> float:
+def max_weight(block: Record, j: int, vertical: AccelerationBounds) -> float:
     """Return the largest absolute weight on side j, including restraints."""
     return max_weight_magnitude(vertical) + abs(block.added_weight[j])
 
 
 @inlined
-def max_push(block: Record, j: int, horizontal: Window) -> float:
+def max_push(block: Record, j: int, horizontal: AccelerationBounds) -> float:
     """Return the largest absolute push on side j, including restraints."""
     return max_magnitude(horizontal) + abs(block.added_push[j])
 

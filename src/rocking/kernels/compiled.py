@@ -51,7 +51,7 @@ def inlined(function: F) -> F:
     return _declare_part(function, forceinline=True)
 
 
-def shared(function: F) -> F:
+def not_inlined(function: F) -> F:
     """Declare a part of kernels with several callers, where inlining would only duplicate code."""
     return _declare_part(function, forceinline=False)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.kernels.arc import evaluate_series
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.ground import ROUNDING, shift_polynomial
 from rocking.kernels.state import Record, StepOutcome
 
@@ -25,7 +25,7 @@ _WINDOW = 4.0
 _MAX_STEPS = 100_000
 
 
-@shared
+@not_inlined
 def find_first_root(c: Floats, lead: int, order: int, h: float) -> float:
     """Find the first root in (0, h] of sum_k c[lead + k] t^k (Eq. 20: Eq. 15 divided by t^lead); NaN if there is none.
 
@@ -91,7 +91,7 @@ def evaluate_deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float
     return f, slope
 
 
-@shared
+@not_inlined
 def find_first_passing(d: Floats, degree: int, h: float) -> float:
     """Find the first time in [0, h) from which a polynomial is negative beyond rounding; inf if never.
 
@@ -153,7 +153,7 @@ class StepEnd(NamedTuple):
     peak: float  # rotation at that time
 
 
-@shared
+@not_inlined
 def advance_to_event(state: Record, scratch: Record, order: int, h: float, overturn_angle: float) -> StepEnd:
     """Follow the series of an arc to its first event within h; the outcome is STEP, IMPACT or OVERTURN."""
     c, d = scratch.rotation, scratch.auxiliary
@@ -205,7 +205,7 @@ def may_exceed_peak(state: Record, end: float, c: Floats, order: int, h: float) 
     return rise > 0.0
 
 
-@shared
+@not_inlined
 def find_maximum(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
     """Find time and value of a series' maximum on (0, h] between turning points; ``d`` is scratch space."""
     highest_time = h
@@ -282,7 +282,7 @@ def restitution_factor(block: Record, side: int, speed: float, number: int) -> f
     return float(block.restitution[side])
 
 
-@shared
+@not_inlined
 def variable_factor(block: Record, side: int, speed: float, number: int) -> float:
     """Compute a variable factor; see `restitution_factor`."""
     lowest, highest = block.min_restitution[side], block.restitution[side]
@@ -321,7 +321,7 @@ def mean_factor(block: Record, side: int, max_speed: float) -> float:
     return 0.5 * (min_factor(block, side, max_speed) + block.restitution[side])
 
 
-@shared
+@not_inlined
 def draw_uniform(seed: int, number: int) -> float:
     """Draw from [0, 1) a multiple of 2^-53 that depends only on a seed below 2^63 and a number below 2^32.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats, Integers
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48
@@ -23,7 +23,7 @@ STRETCH = 16
 #: Largest number of pieces and whole stretches in a window.
 _MAX_WINDOW = 128
 
-#: Columns of a piece (start, length, first coefficient), and of bounds on a stretch, as in `Window`.
+#: Columns of a piece (start, length, first coefficient), and of bounds on a stretch, as in `AccelerationBounds`.
 START, LENGTH, FIRST = 0, 1, 2
 _MIN, _MAX, _STEEPEST, _JUMPS = 0, 1, 2, 3
 
@@ -52,7 +52,7 @@ class Grounds(NamedTuple):
     unit: float  # factor that converts coefficients and errors to units of g
 
 
-class Window(NamedTuple):
+class AccelerationBounds(NamedTuple):
     """Bounds on the acceleration during a time."""
 
     low: float  # lower bound
@@ -144,13 +144,13 @@ def write_pieces(breakpoints: Floats, coefficients: Floats, ground: Ground, A: F
 
 
 @inlined
-def bound_stretch(ground: Ground, stretch: int) -> Window:
+def bound_stretch(ground: Ground, stretch: int) -> AccelerationBounds:
     """Compute bounds on a stretch from those of the unscaled motion; those in scaled units include the rounding."""
     row = ground.stretches[stretch, component_index(ground)]
     scale = ground.factor * ground.unit
     first, second, size = scale * row[_MIN], scale * row[_MAX], abs(scale) * (1.0 + ROUNDING)
     rounding = ROUNDING * max(abs(first), abs(second))
-    return Window(
+    return AccelerationBounds(
         min(first, second) - rounding, max(first, second) + rounding, size * row[_STEEPEST], size * row[_JUMPS]
     )
 
@@ -263,7 +263,7 @@ def shift_polynomial(c: Floats, degree: int, shift: float) -> None:
 
 
 @inlined
-def bound_piece(ground: Ground, piece: int, offset: float, duration: float, A: Floats) -> Window:
+def bound_piece(ground: Ground, piece: int, offset: float, duration: float, A: Floats) -> AccelerationBounds:
     """Compute bounds on a piece in [offset, offset + duration]; ``jumps`` is the allowance for rounding in the others.
 
     For degree 1 they are exact except for rounding. ``A`` is scratch space.
@@ -274,7 +274,7 @@ def bound_piece(ground: Ground, piece: int, offset: float, duration: float, A: F
         first = start + rate * offset
         last = first + rate * duration if rate != 0.0 else first
         rounding = ROUNDING * (abs(start) + max(abs(first), abs(last)))
-        return Window(min(first, last) - rounding, max(first, last) + rounding, abs(rate), rounding)
+        return AccelerationBounds(min(first, last) - rounding, max(first, last) + rounding, abs(rate), rounding)
     degree = write_local_series(ground, piece, offset, 1.0, A)
     low = high = A[0]
     steepest = 0.0
@@ -286,7 +286,7 @@ def bound_piece(ground: Ground, piece: int, offset: float, duration: float, A: F
         high += max(0.0, A[k] * power)
     size, slope_size = sum_absolute_terms(ground, piece, offset + duration if degree > 0 else offset)
     rounding = ROUNDING * columns * size
-    return Window(low - rounding, high + rounding, steepest + ROUNDING * columns * slope_size, rounding)
+    return AccelerationBounds(low - rounding, high + rounding, steepest + ROUNDING * columns * slope_size, rounding)
 
 
 @inlined
@@ -299,10 +299,10 @@ def sum_absolute_terms(ground: Ground, piece: int, t: float) -> tuple[float, flo
     return size, slope_size
 
 
-@shared
+@not_inlined
 def bound_window(
     ground: Ground, piece: int, offset: float, duration: float, limits: tuple[float, float], A: Floats
-) -> Window:
+) -> AccelerationBounds:
     """Compute bounds, rounding included, for a duration from an offset on; ``A`` is scratch space.
 
     NaN if they exceed ``limits`` or the duration spans too many pieces.
@@ -321,13 +321,13 @@ def bound_window(
         if low < limits[0] or high > limits[1]:
             break
         if duration <= remaining:
-            return Window(low, high, steepest, jumps)
+            return AccelerationBounds(low, high, steepest, jumps)
         jumps += bounds.jumps
         if next_piece == piece + 1:
             jumps += jump_at_end(ground, piece)
         duration -= remaining
         piece, offset = next_piece, 0.0
-    return Window(np.nan, np.nan, np.nan, np.nan)
+    return AccelerationBounds(np.nan, np.nan, np.nan, np.nan)
 
 
 @inlined

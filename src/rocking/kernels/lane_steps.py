@@ -4,7 +4,7 @@ A step marks and counts the lanes in which an event may occur (always with NaN, 
 the others that have a block. Weights are in the ground's frame, divided by the weight at rest.
 """
 
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.series import (
     ValueAndSlope,
     has_negligible_truncation,
@@ -22,31 +22,35 @@ _SIDES = ("f8", (2,))
 
 #: Group of lanes: index of the simulation (-1: none); row of its sample, and first row that lanes do not step;
 #: increment of the row by a step (0 without a simulation); whether the step may contain an event, whether one of its
-#: substeps may, whether its series is too short, whether to try it; length of the sample, accelerations (horizontal,
-#: vertical) of the unscaled motion at its start, and their slopes; u, u' and (nonlinear) sin and cos(alpha - u) before
-#: and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation; rotation of overturning;
-#: usual length of a sample; factor on the motion; with friction, the largest push without a slip at zero velocity and
-#: its decrease per squared velocity (`sliding.may_slip`).
+#: substeps may, whether its series is too short, whether the step is still to be taken; length of the sample,
+#: accelerations (horizontal, vertical) of the unscaled motion at its start, and their slopes; u, u' and (nonlinear) sin
+#: and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation;
+#: rotation of overturning; usual length of a sample; factor on the motion; with friction, the largest push without a
+#: slip at zero velocity and its decrease per squared velocity (`sliding.may_slip`).
 GROUP = define_record(
     **dict.fromkeys(
-        ("simulation", "row", "end_row", "increment", "event", "blocked", "truncated", "retry"), ("i8", (WIDTH,))
+        ("simulation", "row", "end_row", "increment", "has_event", "has_substep_event", "is_truncated", "is_pending"),
+        ("i8", (WIDTH,)),
     ),
     **dict.fromkeys(
         (
             "length", "push_start", "push_slope", "lift_start", "lift_slope",
             "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine", "stiffness", "pull",
-            "push_gain", "first", "second", "third", "curve", "peak", "overturn_angle", "h", "factor",
-            "sticking_push", "sticking_slope",
+            "push_gain", "stumpff_1", "stumpff_2", "stumpff_3", "curvature_factor", "peak", "overturn_angle", "h",
+            "factor", "sticking_push", "sticking_slope",
         ),
         _LANES,
     ),
 )  # fmt: skip
 
-#: Constants of a step of length h on each side. Linear: lam, gain threshold, side gain (u'' = lam u - pull - push a),
-#: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
-#: instead of its gain. ``curve`` max |u''| bounds the distance of the rotation above or below both ends of the step.
+#: Constants of a step of length h on each side. Linear: lam, gain threshold, side gain (u'' = lam u - pull - push a), h
+#: c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
+#: instead of its gain. ``curvature_factor`` max |u''| bounds the distance of the rotation above or below both ends of
+#: the step.
 STEP_CONSTANTS = define_record(
-    **dict.fromkeys(("stiffness", "pull", "push_gain", "first", "second", "third", "curve"), _SIDES)
+    **dict.fromkeys(
+        ("stiffness", "pull", "push_gain", "stumpff_1", "stumpff_2", "stumpff_3", "curvature_factor"), _SIDES
+    )
 )
 
 #: Largest bound on the next terms by the last ones, divided by the first two; the truncation is 1/100 of it.
@@ -68,16 +72,18 @@ def weight_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
 
 
 @inlined
-def is_event_free(group: Record, lane: int, ends: ValueAndSlope, rate: float, change: ValueAndSlope) -> bool:
+def is_event_free(
+    group: Record, lane: int, ends: tuple[float, float], rate: float, rate_changes: tuple[float, float]
+) -> bool:
     """Return whether a step certainly contains no impact, new peak or overturning; False for NaN.
 
     During a step from u to u1 (``ends``), the rate of the rotation per step, initially ``rate``, changes by between
-    ``change[0]`` and ``change[1]``. Therefore the rotation exceeds neither end by more than an eighth of them. A rising
-    rotation has its peak at the end, which the next step compares; a falling one has it at the start, which must not
-    exceed the peak so far.
+    ``rate_changes[0]`` and ``rate_changes[1]``. Therefore the rotation exceeds neither end by more than an eighth of
+    them. A rising rotation has its peak at the end, which the next step compares; a falling one has it at the start,
+    which must not exceed the peak so far.
     """
     u, u1 = ends
-    lower, upper = change
+    lower, upper = rate_changes
     peak, below, highest = group.peak[lane], 0.125 * upper, max(u, u1) - 0.125 * lower
     is_rising = rate + lower > 0.0
     is_falling = (rate + upper < 0.0) & (u <= peak)
@@ -86,12 +92,12 @@ def is_event_free(group: Record, lane: int, ends: ValueAndSlope, rate: float, ch
     return (u > below) & (u1 > below) & ((highest <= peak) | is_rising | is_falling) & is_below
 
 
-@shared
+@not_inlined
 def step_linear(group: Record, unit: float) -> int:
     """Step a group through one sample by Stumpff's functions (exact for any lam and h); return the number of events.
 
-    Because w = u'' then satisfies w'' = lam w, its extrema are at the ends of the step (except for ``curve``). Rounding
-    of sample times makes some samples longer or shorter than h.
+    Because w = u'' then satisfies w'' = lam w, its extrema are at the ends of the step (except for
+    ``curvature_factor``). Rounding of sample times makes some samples longer or shorter than h.
     """
     events = 0
     for lane in range(WIDTH):
@@ -102,20 +108,22 @@ def step_linear(group: Record, unit: float) -> int:
         lam, push_gain = group.stiffness[lane], group.push_gain[lane]
         w = lam * u - (group.pull[lane] + push_gain * start)
         j = lam * v - push_gain * slope
-        u1 = u + (h * v + (group.second[lane] * w + group.third[lane] * j))
-        v1 = v + (group.first[lane] * w + group.second[lane] * j)
+        u1 = u + (h * v + (group.stumpff_2[lane] * w + group.stumpff_3[lane] * j))
+        v1 = v + (group.stumpff_1[lane] * w + group.stumpff_2[lane] * j)
         w1 = lam * u1 - (group.pull[lane] + push_gain * end)
         excess = group.length[lane] - h
         u1 += excess * v1
         v1 += excess * w1
         min_w, max_w = min(min(w, w1), 0.0), max(max(w, w1), 0.0)
-        curve = group.curve[lane]
+        curvature_factor = group.curvature_factor[lane]
         # Eight times ``curve`` is h^2; its product with the smallest w is h times the smallest change of the rate.
-        is_free = is_event_free(group, lane, (u, u1), h * v, (8.0 * curve * min_w, 8.0 * curve * max_w))
+        is_free = is_event_free(
+            group, lane, (u, u1), h * v, (8.0 * curvature_factor * min_w, 8.0 * curvature_factor * max_w)
+        )
         group.u[lane] = u1 if is_free else u
         group.v[lane] = v1 if is_free else v
         group.row[lane] += group.increment[lane] if is_free else 0
-        group.event[lane] = not is_free
+        group.has_event[lane] = not is_free
         events += not is_free
     return events
 
@@ -127,7 +135,7 @@ def step_linear(group: Record, unit: float) -> int:
 def begin_step(group: Record) -> None:
     """Declare the step of every lane as still to be taken."""
     for lane in range(WIDTH):
-        group.event[lane] = group.retry[lane] = 1
+        group.has_event[lane] = group.is_pending[lane] = 1
 
 
 @inlined
@@ -138,7 +146,7 @@ def copy_states(group: Record, substeps: int, scaled: bool) -> None:
         group.next_v[lane] = group.v[lane] * (group.length[lane] / substeps) if scaled else group.v[lane]
         group.next_sine[lane] = group.sine[lane]
         group.next_cosine[lane] = group.cosine[lane]
-        group.blocked[lane] = group.truncated[lane] = 0
+        group.has_substep_event[lane] = group.is_truncated[lane] = 0
 
 
 @inlined
@@ -146,21 +154,21 @@ def accept_states(group: Record, substeps: int, scaled: bool) -> tuple[int, int]
     """Copy the new states of lanes without an event; return the numbers of other lanes, and of those to be repeated."""
     events = retries = 0
     for lane in range(WIDTH):
-        is_free = (group.retry[lane] != 0) & (group.blocked[lane] == 0)
+        is_free = (group.is_pending[lane] != 0) & (group.has_substep_event[lane] == 0)
         rate = 1.0 / (group.length[lane] / substeps) if scaled else 1.0
         group.u[lane] = group.next_u[lane] if is_free else group.u[lane]
         group.v[lane] = group.next_v[lane] * rate if is_free else group.v[lane]
         group.sine[lane] = group.next_sine[lane] if is_free else group.sine[lane]
         group.cosine[lane] = group.next_cosine[lane] if is_free else group.cosine[lane]
         group.row[lane] += group.increment[lane] if is_free else 0
-        group.event[lane] = 0 if is_free else group.event[lane]
-        group.retry[lane] &= group.truncated[lane]
-        events += group.event[lane]
-        retries += group.retry[lane]
+        group.has_event[lane] = 0 if is_free else group.has_event[lane]
+        group.is_pending[lane] &= group.is_truncated[lane]
+        events += group.has_event[lane]
+        retries += group.is_pending[lane]
     return events, retries
 
 
-@shared
+@not_inlined
 def step_weighted(group: Record, unit: float, substeps: int) -> int:
     """Step a group of the linear model through one sample under varying weight; return the number of events."""
     begin_step(group)
@@ -170,7 +178,7 @@ def step_weighted(group: Record, unit: float, substeps: int) -> int:
     return accept_states(group, substeps, scaled=False)[0]
 
 
-@shared
+@not_inlined
 def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> None:
     """Move the copies through the k-th substep and mark the lanes in which an event may occur.
 
@@ -200,7 +208,7 @@ def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> 
         is_free = is_event_free(group, lane, (u, u1), r1, (lower, upper))
         next_terms = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
         is_free &= abs(q) * next_terms <= _NEXT_TERMS * (abs(r1) + abs(r2))
-        group.blocked[lane] |= not is_free
+        group.has_substep_event[lane] |= not is_free
         group.next_u[lane] = u1
         group.next_v[lane] = v1
 
@@ -214,36 +222,36 @@ def line_during(line: ValueAndSlope, k: int, h: float) -> ValueAndSlope:
 
 @inlined
 def weight_during(
-    group: Record, lane: int, at_rest: ValueAndSlope | None, unit: float, k: int, h: float
+    group: Record, lane: int, resting_weight: ValueAndSlope | None, unit: float, k: int, h: float
 ) -> ValueAndSlope | None:
     """Return the weight at the start of the k-th substep of length h, and its change; None if it is constant."""
-    if at_rest is None:
-        return at_rest
+    if resting_weight is None:
+        return resting_weight
     return line_during(weight_line(group, lane, unit), k, h)
 
 
-@shared
-def step_nonlinear(group: Record, at_rest: ValueAndSlope | None, unit: float, substeps: int) -> int:
+@not_inlined
+def step_nonlinear(group: Record, resting_weight: ValueAndSlope | None, unit: float, substeps: int) -> int:
     """Step a group of the nonlinear model through one sample and return the number of events.
 
-    ``at_rest`` is (1, 0), the weight without vertical motion and its slope, or None if it is constant. A lane whose
-    series is too short repeats the step with twice as many substeps, independently of other lanes.
+    ``resting_weight`` is (1, 0), the weight without vertical motion and its slope, or None if it is constant. A lane
+    whose series is too short repeats the step with twice as many substeps, independently of other lanes.
     """
     begin_step(group)
     for refinement in range(1, 3):
         count = refinement * substeps
         copy_states(group, count, scaled=True)
         for k in range(count):
-            take_nonlinear_substep(group, at_rest, unit, k, count, 1.0 / refinement)
+            take_nonlinear_substep(group, resting_weight, unit, k, count, 1.0 / refinement)
         events, retries = accept_states(group, count, scaled=True)
         if retries == 0:
             break
     return events
 
 
-@shared
+@not_inlined
 def take_nonlinear_substep(
-    group: Record, at_rest: ValueAndSlope | None, unit: float, k: int, count: int, fraction: float
+    group: Record, resting_weight: ValueAndSlope | None, unit: float, k: int, count: int, fraction: float
 ) -> None:
     """Move the copies through the k-th of ``count`` substeps, and mark lanes with possible events or truncation.
 
@@ -255,23 +263,23 @@ def take_nonlinear_substep(
         scale = (group.length[lane] / group.h[lane] * fraction) ** 2
         u, r1 = group.next_u[lane], group.next_v[lane]
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
-        weight = weight_during(group, lane, at_rest, unit, k, span)
+        weight = weight_during(group, lane, resting_weight, unit, k, span)
         lane_push = line_during(push_line(group, lane, unit), k, span)
         side_push = (group.push_gain[lane] * lane_push[0], group.push_gain[lane] * lane_push[1])
         l2 = group.stiffness[lane] * scale
-        terms, angles = nonlinear_velocity_terms(r1, (s0, c0), l2, side_push, weight)
+        terms, angle_sums = nonlinear_velocity_terms(r1, (s0, c0), l2, side_push, weight)
         _, r2, r3, r4, r5, r6, r7, r8, r9 = terms
         last_terms = (1.0 / 7.0) * r7 + (0.125 * r8 + (1.0 / 9.0) * r9)
         change = r1 + (0.5 * r2 + ((1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + last_terms)))))
         u1 = u + change
         v1 = r1 + (r2 + (r3 + (r4 + (r5 + (r6 + (r7 + (r8 + r9)))))))
         sizes = (abs(r1), abs(r2), abs(r3), abs(r4), abs(r5), abs(r6), abs(r7), abs(r8), abs(r9))
-        strength = sum_forcing(weight, side_push, 1.0)
-        is_converged, tail = has_negligible_truncation(sizes, angles, -2.0 * l2, strength)
+        forcing_bounds = sum_forcing(weight, side_push, 1.0)
+        is_converged, tail = has_negligible_truncation(sizes, angle_sums, -2.0 * l2, forcing_bounds)
         lower, upper = min(r2 - tail, 0.0), max(r2 + tail, 0.0)
         is_free = is_event_free(group, lane, (u, u1), r1, (lower, upper))
-        group.blocked[lane] |= not (is_free & is_converged)
-        group.truncated[lane] |= not is_converged
+        group.has_substep_event[lane] |= not (is_free & is_converged)
+        group.is_truncated[lane] |= not is_converged
         # sine and 1 - cosine of the change of the rotation
         square = change * change
         higher = 1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0))

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats, Integers
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import raise_peak
 from rocking.kernels.ground import FIRST, LENGTH, START, Grounds, select_ground
 from rocking.kernels.lane_steps import (
@@ -100,11 +100,11 @@ def compute_step_constants(blocks: Records, lengths: Floats, substeps: int) -> R
     steps["stiffness"] = lam
     steps["pull"] = blocks["threshold_slope"] * blocks["threshold"]
     steps["push_gain"] = blocks["threshold_slope"] * sign
-    steps["first"] = h * stumpff(1, q)
-    steps["second"] = h * h * stumpff(2, q)
-    steps["third"] = h * h * h * stumpff(3, q)
+    steps["stumpff_1"] = h * stumpff(1, q)
+    steps["stumpff_2"] = h * h * stumpff(2, q)
+    steps["stumpff_3"] = h * h * h * stumpff(3, q)
     # For lam < 0, u'' inside a step may exceed both ends by |lam| h^2/8 of its largest value.
-    steps["curve"] = h * h / 8.0 / (1.0 - np.maximum(-q, 0.0) / 8.0)
+    steps["curvature_factor"] = h * h / 8.0 / (1.0 - np.maximum(-q, 0.0) / 8.0)
     return steps
 
 
@@ -135,10 +135,10 @@ def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
     group.stiffness[lane] = steps.stiffness[side]
     group.pull[lane] = steps.pull[side]
     group.push_gain[lane] = steps.push_gain[side]
-    group.first[lane] = steps.first[side]
-    group.second[lane] = steps.second[side]
-    group.third[lane] = steps.third[side]
-    group.curve[lane] = steps.curve[side]
+    group.stumpff_1[lane] = steps.stumpff_1[side]
+    group.stumpff_2[lane] = steps.stumpff_2[side]
+    group.stumpff_3[lane] = steps.stumpff_3[side]
+    group.curvature_factor[lane] = steps.curvature_factor[side]
     if block.has_friction:
         group.sticking_push[lane] = block.sticking_push[side] if state.direction == 0 else -np.inf
         group.sticking_slope[lane] = block.sticking_slope[side]
@@ -178,8 +178,8 @@ def clear_lane(pool: Pool, lane: int) -> None:
     group.v[lane] = group.sine[lane] = group.cosine[lane] = group.factor[lane] = 0.0
     group.peak[lane] = group.overturn_angle[lane] = group.sticking_push[lane] = np.inf
     group.h[lane] = pool.grounds.pieces[0, LENGTH]
-    group.stiffness[lane] = group.pull[lane] = group.push_gain[lane] = group.curve[lane] = 0.0
-    group.first[lane] = group.second[lane] = group.third[lane] = 0.0
+    group.stiffness[lane] = group.pull[lane] = group.push_gain[lane] = group.curvature_factor[lane] = 0.0
+    group.stumpff_1[lane] = group.stumpff_2[lane] = group.stumpff_3[lane] = 0.0
 
 
 # ---- The loop over samples ----
@@ -202,7 +202,7 @@ def run_lanes(settings: Record, scratch: Record, pool: Pool, substeps: int) -> N
         events = step_group(settings, pool, substeps)
         lane = 0
         while events > 0:
-            if group.event[lane] != 0:
+            if group.has_event[lane] != 0:
                 march_lane(settings, scratch, pool, lane)
                 events -= 1
             lane += 1
@@ -287,7 +287,7 @@ def march_lane(settings: Record, scratch: Record, pool: Pool, lane: int) -> None
         start_simulation(settings, scratch, pool, lane)
 
 
-@shared
+@not_inlined
 def start_simulation(settings: Record, scratch: Record, pool: Pool, lane: int) -> None:
     """Start simulations until one rocks at the start of a sample, and put it into a lane; without one, clear it."""
     while pool.counts.started < pool.blocks.shape[0]:

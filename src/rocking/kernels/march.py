@@ -7,7 +7,7 @@ import numpy as np
 
 from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign, weight_at
 from rocking.kernels.certificate import no_proof
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import StepEnd, advance_to_event, apply_impact, find_first_root, raise_peak
 from rocking.kernels.ground import Ground, has_vertical, is_piecewise_linear, last_piece, piece_length, piece_start
 from rocking.kernels.rest import (
@@ -23,10 +23,10 @@ from rocking.kernels.rest import (
 )
 from rocking.kernels.restraints import (
     apply_tendon_law,
-    change_law,
+    change_tendon_law,
     elongation_from_rotation,
-    find_law_change,
     find_leaning_rotation,
+    find_tendon_law_change,
 )
 from rocking.kernels.short_arc import short_step, undecided_step
 from rocking.kernels.sliding import (
@@ -95,9 +95,9 @@ def march(ground: Ground, block: Record, settings: Record, table: Records, scrat
 def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Record) -> None:
     """Apply the law of the state to a tendon; one that starts too far from rest has already yielded."""
     if state_time(ground, state) == 0.0 and state.side >= 0:
-        plastic = elongation_from_rotation(block, settings.nonlinear, state.side, state.u) - block.yield_elongation
-        state.plastic = max(state.plastic, plastic)
-    apply_tendon_law(block, state.law, state.plastic)
+        elongation = elongation_from_rotation(block, settings.nonlinear, state.side, state.u)
+        state.plastic_elongation = max(state.plastic_elongation, elongation - block.yield_elongation)
+    apply_tendon_law(block, state.tendon_law, state.plastic_elongation)
 
 
 @inlined
@@ -220,7 +220,7 @@ def full_step(ground: Ground, block: Record, settings: Record, scratch: Record, 
     return advance_to_event(state, scratch, order, h, block.overturn_angle)
 
 
-@shared
+@not_inlined
 def step_to_slip(
     ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, end: StepEnd, h_max: float
 ) -> int:
@@ -248,7 +248,7 @@ def start_slip(block: Record, state: Record, direction: int) -> None:
         state.side = AT_REST
 
 
-@shared
+@not_inlined
 def slip_along_arc(
     ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
 ) -> int:
@@ -328,14 +328,14 @@ def count_rest(settings: Record, table: Records, state: Record, time: float) -> 
     write_event(settings, table, state, time, EventKind.REST)
 
 
-@shared
+@not_inlined
 def yielding_step(block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
     """Step along a series to its first event or the next change of the tendon's law."""
-    change, law = find_law_change(block, settings, scratch, state, order, h)
+    change, law = find_tendon_law_change(block, settings, scratch, state, order, h)
     end = advance_to_event(state, scratch, order, min(h, change), block.overturn_angle)
     if end.outcome == StepOutcome.STEP and end.time >= change:
-        turns_back = state.law == TendonLaw.PLASTIC
-        change_law(block, settings, state, law, end.u)
+        turns_back = state.tendon_law == TendonLaw.PLASTIC
+        change_tendon_law(block, settings, state, law, end.u)
         return StepEnd(end.outcome, end.time, end.u, 0.0 if turns_back else end.v, end.peak_time, end.peak)
     return end
 
@@ -406,7 +406,7 @@ def is_pushed_off_both_sides(ground: Ground, block: Record, state: Record, offse
     return bool(side_acceleration < 0.0 and other_acceleration < 0.0)
 
 
-@shared
+@not_inlined
 def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h: float) -> bool:
     """Return whether the arc from a state has a minimum within h so near zero that rounding may hide an impact.
 
@@ -451,7 +451,7 @@ def finish_sequence(
     return Ending.RUNNING
 
 
-@shared
+@not_inlined
 def finish_while_sliding(
     ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record, duration: float
 ) -> None:

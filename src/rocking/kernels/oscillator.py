@@ -3,7 +3,7 @@
 import math
 
 from rocking.core.arrays import Floats
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import evaluate_deflated
 from rocking.kernels.ground import shift_polynomial
 
@@ -31,7 +31,7 @@ def write_peak_displacements(
         peaks[i] = _find_peak(breakpoints, coefficients, frequencies[i], damping, work[:columns], work[columns:])
 
 
-@shared
+@not_inlined
 def _find_peak(
     breakpoints: Floats, coefficients: Floats, frequency: float, damping: float, force: Floats, series: Floats
 ) -> float:
@@ -53,7 +53,7 @@ def _find_peak(
     return peak
 
 
-@shared
+@not_inlined
 def _step_oscillator(series: Floats, force: Floats, h: float, frequency: float, damping: float, peak: float) -> float:
     """Expand the solution about the start of a step, and move ``series[:2]`` to its end.
 
@@ -68,7 +68,7 @@ def _step_oscillator(series: Floats, force: Floats, h: float, frequency: float, 
     return peak
 
 
-@shared
+@not_inlined
 def _raise_peak(series: Floats, h: float, peak: float) -> float:
     """Return the largest absolute value of a series from 0 to h, or ``peak`` if larger, except for rounding.
 
@@ -106,7 +106,7 @@ def _evaluate_slope(series: Floats, x: float) -> float:
     return slope
 
 
-@shared
+@not_inlined
 def _shift_force(force: Floats, shift: float) -> None:
     """Expand a polynomial about ``shift`` in place; inlined, it would slow the loop over the steps."""
     shift_polynomial(force, len(force) - 1, shift)

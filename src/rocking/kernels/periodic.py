@@ -13,7 +13,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import relative_speed_slope, restitution_factor
 from rocking.kernels.ground import ROUNDING, Ground, component_coefficients, piece_length, piece_start
 from rocking.kernels.march import march
@@ -127,7 +127,7 @@ def write_state(row: Floats, state: Record) -> None:
     row[0], row[1], row[2] = state.u, state.v, state.side
 
 
-@shared
+@not_inlined
 def advance_period(problem: PeriodicProblem, scratch: Record, state: Record) -> int:
     """Advance a state by one period and return its `PeriodOutcome`."""
     ground, block, settings, table, steps = problem
@@ -267,7 +267,7 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
         differentiate_period(trail, scratch, work, table, states[k], out[k])
 
 
-@shared
+@not_inlined
 def differentiate_period(
     trail: Trail, scratch: Record, work: Record, table: Records, state: Record, M: Floats
 ) -> tuple[int, float]:
@@ -335,7 +335,7 @@ def measure_stretches(
     return impacts
 
 
-@shared
+@not_inlined
 def apply_step(trail: Trail, scratch: Record, work: Record, node: Record, next_node: Record, M: Floats) -> float:
     """Multiply a derivative by the derivative of the step from a node to ``next_node``, with any impact at its end.
 

@@ -17,7 +17,7 @@ impact. NaN arguments make the results NaN, and a NaN bracket proves nothing.
 import math
 from typing import NamedTuple
 
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 
 #: Number of Newton steps to the time of rest, and the relative error of the speed that ends them.
 _MAX_NEWTON_STEPS = 5
@@ -394,7 +394,7 @@ def bound_ratio(m: Series, shift: Triple, next_shift: Triple) -> float:
     return max_ratio if m[0] - higher > shifted and max_ratio <= 1.0 else math.nan
 
 
-@shared
+@not_inlined
 def refine_bracket(v: float, i: ImpactSide, j: ImpactSide, window: float) -> Pair:
     """Compute a bracket on the time to rest from an impact that enters side i with speed v; NaN, NaN: no proof.
 

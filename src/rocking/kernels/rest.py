@@ -7,7 +7,7 @@ import numpy as np
 
 from rocking.kernels.arc import restoring_acceleration, side_sign, weight_at
 from rocking.kernels.certificate import Proof, prove_rest, prove_slide
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import is_factor_random, mean_factor
 from rocking.kernels.ground import Ground, coefficient, piece_length, piece_start
 from rocking.kernels.remaining import THIRD, Pair
@@ -90,7 +90,7 @@ def time_to_last_piece(ground: Ground, state: Record, time: float) -> float:
     return wait
 
 
-@shared
+@not_inlined
 def bound_rest(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
     """Compute proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
     if state.direction == 0:
@@ -108,7 +108,7 @@ def rounding_allowance(time: float, upper: float, state: Record) -> float:
     return 4.0 * ULP * time + 8.0 * ULP * (max(state.proven_impacts, 1) + 4) * (since_proof + upper)
 
 
-@shared
+@not_inlined
 def decide_rest(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> Rest:
     """Decide whether the block comes to rest at an impact, given the proven bounds (NaN: none)."""
     time = state_time(ground, state)
@@ -176,7 +176,7 @@ MAX_BETA = 1.0 / 64.0
 MAX_GAMMA = 2.0**-14
 
 
-@shared
+@not_inlined
 def apply_proven_impacts(
     ground: Ground, block: Record, settings: Record, table: Records, state: Record, duration: float
 ) -> None:

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import find_first_root
 from rocking.kernels.state import Record, Records, TendonLaw
 
@@ -25,12 +25,12 @@ from rocking.kernels.state import Record, Records, TendonLaw
 _LEVEL_TOLERANCE = 2.0**-44
 
 
-@shared
-def apply_tendon_law(block: Record, law: int, plastic: float) -> None:
+@not_inlined
+def apply_tendon_law(block: Record, law: int, plastic_elongation: float) -> None:
     """Write a law and its quantities at a plastic elongation into the record of a block."""
     for side in range(2):
         # Force at zero elongation, divided by inertia and lever arm.
-        force = -block.tendon_stiffness[side] * (plastic + block.slack_elongation)
+        force = -block.tendon_stiffness[side] * (plastic_elongation + block.slack_elongation)
         weight = push = prestress = 0.0
         if law == TendonLaw.ELASTIC:
             weight, push, prestress = block.tendon_weight[side], block.tendon_push[side], force
@@ -60,34 +60,39 @@ def elongation_from_rotation(block: Record, nonlinear: bool, side: int, u: float
 
 
 @inlined
-def law_at_rest(block: Record, plastic: float) -> int:
+def tendon_law_at_rest(block: Record, plastic_elongation: float) -> int:
     """Return the law while the block stands."""
-    return TendonLaw.ELASTIC if plastic + block.slack_elongation <= 0.0 else TendonLaw.SLACK
+    return TendonLaw.ELASTIC if plastic_elongation + block.slack_elongation <= 0.0 else TendonLaw.SLACK
 
 
 @inlined
-def may_law_change_below(block: Record, settings: Record, plastic: float, height: float) -> bool:
+def may_tendon_law_change_below(block: Record, settings: Record, plastic_elongation: float, height: float) -> bool:
     """Return whether the law of a standing block changes below a height on one of its sides."""
-    level = block.slack_elongation if law_at_rest(block, plastic) == TendonLaw.SLACK else block.yield_elongation
-    plus = rotation_from_elongation(block, settings.nonlinear, 0, plastic + level)
-    minus = rotation_from_elongation(block, settings.nonlinear, 1, plastic + level)
+    is_slack = tendon_law_at_rest(block, plastic_elongation) == TendonLaw.SLACK
+    level = block.slack_elongation if is_slack else block.yield_elongation
+    plus = rotation_from_elongation(block, settings.nonlinear, 0, plastic_elongation + level)
+    minus = rotation_from_elongation(block, settings.nonlinear, 1, plastic_elongation + level)
     return bool(not height < min(plus, minus))
 
 
-@shared
-def find_law_change(
+@not_inlined
+def find_tendon_law_change(
     block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float
 ) -> tuple[float, int]:
     """Find the time of the first change of the law along an arc, inf if none within h, and the law after it."""
     c, d, side = scratch.rotation, scratch.auxiliary, state.side
-    if state.law == TendonLaw.PLASTIC:
+    if state.tendon_law == TendonLaw.PLASTIC:
         for k in range(order):
             d[k] = (k + 1) * c[k + 1]
         return find_first_negative(d, order - 1, h), TendonLaw.ELASTIC
-    slack_rotation = rotation_from_elongation(block, settings.nonlinear, side, state.plastic + block.slack_elongation)
-    if state.law == TendonLaw.SLACK:
+    slack_rotation = rotation_from_elongation(
+        block, settings.nonlinear, side, state.plastic_elongation + block.slack_elongation
+    )
+    if state.tendon_law == TendonLaw.SLACK:
         return find_level_passage(c, order, h, slack_rotation, 1.0, d), TendonLaw.ELASTIC
-    yield_rotation = rotation_from_elongation(block, settings.nonlinear, side, state.plastic + block.yield_elongation)
+    yield_rotation = rotation_from_elongation(
+        block, settings.nonlinear, side, state.plastic_elongation + block.yield_elongation
+    )
     yield_time = find_level_passage(c, order, h, yield_rotation, 1.0, d)
     slack_time = find_level_passage(c, order, h, slack_rotation, -1.0, d) if slack_rotation > 0.0 else np.inf
     if slack_time < yield_time:
@@ -121,24 +126,24 @@ def find_first_negative(d: Floats, order: int, h: float) -> float:
 
 
 @inlined
-def plastic_at_node(block: Record, settings: Record, nodes: Records, row: int, previous: float) -> float:
+def update_plastic_elongation(block: Record, settings: Record, nodes: Records, row: int, previous: float) -> float:
     """Return the plastic elongation at a node, from the node itself or from its value ``previous``."""
     node = nodes[row]
-    turns_back = row > 0 and node.law == TendonLaw.ELASTIC and nodes[row - 1].law == TendonLaw.PLASTIC
+    turns_back = row > 0 and node.tendon_law == TendonLaw.ELASTIC and nodes[row - 1].tendon_law == TendonLaw.PLASTIC
     if turns_back or (row == 0 and node.side >= 0):
         return max(0.0, elongation_from_rotation(block, settings.nonlinear, node.side, node.u) - block.yield_elongation)
     return previous
 
 
 @inlined
-def change_law(block: Record, settings: Record, state: Record, law: int, u: float) -> None:
+def change_tendon_law(block: Record, settings: Record, state: Record, law: int, u: float) -> None:
     """Change the law of a block at a rotation."""
-    if state.law == TendonLaw.PLASTIC:
-        state.plastic = max(
+    if state.tendon_law == TendonLaw.PLASTIC:
+        state.plastic_elongation = max(
             0.0, elongation_from_rotation(block, settings.nonlinear, state.side, u) - block.yield_elongation
         )
-    state.law = law
-    apply_tendon_law(block, law, state.plastic)
+    state.tendon_law = law
+    apply_tendon_law(block, law, state.plastic_elongation)
 
 
 # ---- Proof that a leaning body stays between two rotations forever ----
@@ -165,7 +170,7 @@ _GAUSS_LEGENDRE = (
 )  # fmt: skip
 
 
-@shared
+@not_inlined
 def find_leaning_rotation(block: Record, settings: Record, state: Record, acceleration: float) -> float:
     """Find the rotation without moment about which a body leans forever; NaN if this is not proven.
 
@@ -181,12 +186,13 @@ def find_leaning_rotation(block: Record, settings: Record, state: Record, accele
         else acceleration < 0.0 or -state.v > PEAK_MARGIN * drag * u
     ):
         return np.nan
-    plastic = state.plastic
+    plastic_elongation = state.plastic_elongation
     if block.yielding:
-        plastic = max(plastic, elongation_from_rotation(block, nonlinear, side, u) - block.yield_elongation)
-    tendon_state = (nonlinear, side, plastic)
+        elongation = elongation_from_rotation(block, nonlinear, side, u)
+        plastic_elongation = max(plastic_elongation, elongation - block.yield_elongation)
+    tendon_state = (nonlinear, side, plastic_elongation)
     max_rotation = min(
-        state.peak, rotation_from_elongation(block, nonlinear, side, plastic + block.yield_elongation)
+        state.peak, rotation_from_elongation(block, nonlinear, side, plastic_elongation + block.yield_elongation)
     ) * (1.0 + PEAK_MARGIN)
     inner, inner_end = find_barrier(block, tendon_state, u, 0.0)
     outer, outer_end = find_barrier(block, tendon_state, u, max_rotation)
@@ -199,7 +205,7 @@ def find_leaning_rotation(block: Record, settings: Record, state: Record, accele
     return np.nan if state.v < 0.0 and u > middle * (1.0 + PEAK_MARGIN) else middle
 
 
-@shared
+@not_inlined
 def find_barrier(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> tuple[float, float]:
     """Find the first interval of rotations between two that turns a body back; NaN: none.
 
@@ -228,13 +234,13 @@ def bisect_moment(block: Record, tendon_state: tuple[bool, int, float], start: f
     return start
 
 
-@shared
+@not_inlined
 def bound_energy_rise(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> float:
     """Compute a lower bound on the change of potential energy along a path, divided by inertia, law by law."""
-    nonlinear, side, plastic = tendon_state
+    nonlinear, side, plastic_elongation = tendon_state
     low, high, total = min(start, end), max(start, end), 0.0
-    slack_rotation = rotation_from_elongation(block, nonlinear, side, plastic + block.slack_elongation)
-    yield_rotation = rotation_from_elongation(block, nonlinear, side, plastic + block.yield_elongation)
+    slack_rotation = rotation_from_elongation(block, nonlinear, side, plastic_elongation + block.slack_elongation)
+    yield_rotation = rotation_from_elongation(block, nonlinear, side, plastic_elongation + block.yield_elongation)
     for upper in (min(max(slack_rotation, low), high), min(max(yield_rotation, low), high), high):
         half, middle = 0.5 * (upper - low), 0.5 * (upper + low)
         for node, weight in _GAUSS_LEGENDRE:
@@ -242,7 +248,7 @@ def bound_energy_rise(block: Record, tendon_state: tuple[bool, int, float], star
             total += half * weight * static_restoring(block, tendon_state, middle + half * node)
         low = upper
     size = abs(block.spring[side]) + abs(block.prestress[side]) + abs(block.base_prestress[side])
-    size += block.tendon_stiffness[side] * (block.lever_arm[side] + plastic + abs(block.slack_elongation))
+    size += block.tendon_stiffness[side] * (block.lever_arm[side] + plastic_elongation + abs(block.slack_elongation))
     weight = 1.0 + abs(block.added_weight[side]) + abs(block.base_weight[side])
     size += block.stiffness[side] * (weight + abs(block.added_push[side]) + abs(block.base_push[side]))
     return math.copysign(1.0, end - start) * total - _ROUNDING_OF_MOMENT * size * abs(end - start)
@@ -251,10 +257,11 @@ def bound_energy_rise(block: Record, tendon_state: tuple[bool, int, float], star
 @inlined
 def static_restoring(block: Record, tendon_state: tuple[bool, int, float], u: float) -> float:
     """Compute the restoring acceleration at a rotation without ground motion and damping."""
-    nonlinear, side, plastic = tendon_state
+    nonlinear, side, plastic_elongation = tendon_state
     weight, push, pull = block.added_weight[side], block.added_push[side], block.prestress[side]
     if block.yielding:
-        stretch = max(elongation_from_rotation(block, nonlinear, side, u) - plastic - block.slack_elongation, 0.0)
+        elongation = elongation_from_rotation(block, nonlinear, side, u) - plastic_elongation
+        stretch = max(elongation - block.slack_elongation, 0.0)
         weight, push, pull = block.base_weight[side], block.base_push[side], block.base_prestress[side]
         pull += block.tendon_stiffness[side] * min(stretch, block.yield_elongation - block.slack_elongation)
     if nonlinear:

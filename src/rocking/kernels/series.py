@@ -31,6 +31,9 @@ from rocking.kernels.state import ORDER, Record
 #: Value of a quantity that is linear in time, and its slope or change during a step.
 ValueAndSlope = tuple[float, float]
 
+#: Sine and cosine of an angle.
+SineCosine = tuple[float, float]
+
 #: Coefficients c[0] to c[9] of a rotation; nine terms of a velocity; seven sums of |terms| of sin and cos(alpha - u).
 RotationCoefficients = tuple[float, float, float, float, float, float, float, float, float, float]
 VelocityTerms = tuple[float, float, float, float, float, float, float, float, float]
@@ -188,7 +191,7 @@ def expand_linear(u: float, v: float, lam: float, pull: float, rate: float) -> R
 def expand_weighted(
     u: float, v: float, lam: float, pull: float, push: ValueAndSlope, weight: ValueAndSlope
 ) -> RotationCoefficients:
-    """Compute the coefficients of u'' = weight (lam u - at_rest) - push, with weight and push linear in time."""
+    """Compute the coefficients of u'' = weight (lam u - pull) - push, with weight and push linear in time."""
     z = lam * u - pull
     c2 = 0.5 * (weighted_term(weight, z, 0.0) - push[0])
     c3 = (1.0 / 6.0) * (weighted_term(weight, lam * v, z) - push[1])
@@ -200,15 +203,15 @@ def expand_weighted(
 
 @inlined
 def expand_nonlinear(
-    start: ValueAndSlope, angle: ValueAndSlope, lam: float, push: ValueAndSlope, weight: ValueAndSlope | None
+    start: ValueAndSlope, sine_cosine: SineCosine, lam: float, push: ValueAndSlope, weight: ValueAndSlope | None
 ) -> tuple[RotationCoefficients, AngleSums]:
     """Compute the coefficients of u'' = -lam (weight sin(alpha - u) + push cos(alpha - u)).
 
-    Weight (None: 1) and push are linear in time. ``start`` is (u, v) and ``angle`` the sine and cosine of alpha - u
-    there. The second tuple contains the sums of the |coefficients| of sine and cosine, from power 1 to 7.
+    Weight (None: 1) and push are linear in time. ``start`` is (u, v) and ``sine_cosine`` the sine and cosine of alpha -
+    u there. The second tuple contains the sums of the |coefficients| of sine and cosine, from power 1 to 7.
     """
     u, v = start
-    s0, c0 = angle
+    s0, c0 = sine_cosine
     a, b = push
     l2 = -0.5 * lam
     u2 = l2 * (weighted_term(weight, s0, 0.0) + a * c0)
@@ -272,14 +275,14 @@ def weighted_velocity_terms(
 
 @inlined
 def nonlinear_velocity_terms(
-    r1: float, angle: ValueAndSlope, l2: float, push: ValueAndSlope, weight: ValueAndSlope | None
+    r1: float, sine_cosine: SineCosine, l2: float, push: ValueAndSlope, weight: ValueAndSlope | None
 ) -> tuple[VelocityTerms, AngleSums]:
     """Compute the terms r1 to r9 of the velocity of a nonlinear arc.
 
-    ``l2`` is -lam/2, ``angle`` the initial sine and cosine of alpha - u; a weight of None is 1. The second tuple is as
-    in `expand_nonlinear`.
+    ``l2`` is -lam/2, ``sine_cosine`` the initial sine and cosine of alpha - u; a weight of None is 1. The second tuple
+    is as in `expand_nonlinear`.
     """
-    s0, c0 = angle
+    s0, c0 = sine_cosine
     a, b = push
     r2 = 2.0 * (l2 * (weighted_term(weight, s0, 0.0) + a * c0))
     s1, c1 = -(r1 * c0), r1 * s0
@@ -301,8 +304,8 @@ def nonlinear_velocity_terms(
     c7 = (1.0 / 7.0) * (((r1 * s6 + r2 * s5) + (r3 * s4 + r4 * s3)) + ((r5 * s2 + r6 * s1) + r7 * s0))
     r9 = 0.25 * (l2 * (weighted_term(weight, s7, s6) + (a * c7 + b * c6)))
     lowest_sums = (abs(r1), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
-    angles = (*lowest_sums, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
-    return (r1, r2, r3, r4, r5, r6, r7, r8, r9), angles
+    angle_sums = (*lowest_sums, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
+    return (r1, r2, r3, r4, r5, r6, r7, r8, r9), angle_sums
 
 
 # ---- Sufficiency of nine terms; see "Where a series may end" in the documentation ----
@@ -314,7 +317,7 @@ _MAX_SUM = 0.25
 
 
 @inlined
-def sum_forcing(weight: ValueAndSlope | None, push: ValueAndSlope, t: float) -> ValueAndSlope:
+def sum_forcing(weight: ValueAndSlope | None, push: ValueAndSlope, t: float) -> tuple[float, float]:
     """Compute the sum of |weight| and |push| within t, and of their changes; lines are values and slopes."""
     if weight is None:
         return 1.0 + abs(push[0]) + abs(push[1]) * t, abs(push[1]) * t
@@ -324,7 +327,7 @@ def sum_forcing(weight: ValueAndSlope | None, push: ValueAndSlope, t: float) -> 
 
 @inlined
 def has_negligible_truncation(
-    r: VelocityTerms, z: AngleSums, stiffness: float, strength: ValueAndSlope
+    r: VelocityTerms, z: AngleSums, stiffness: float, forcing_bounds: tuple[float, float]
 ) -> tuple[bool, float]:
     """Return whether the truncation after nine terms is below 2^-52, and a bound on all terms of u'' after the first.
 
@@ -340,7 +343,7 @@ def has_negligible_truncation(
     t2 = r[1] + t3
     velocity = r[0] + t2
     products = (t8 + z[0] * t7) + (z[1] * t6 + z[2] * t5) + ((z[3] * t4 + z[4] * t3) + (z[5] * t2 + z[6] * velocity))
-    max_forcing, change = stiffness * strength[0], stiffness * strength[1]
+    max_forcing, change = stiffness * forcing_bounds[0], stiffness * forcing_bounds[1]
     # The factors include the feedback if velocity and max_forcing are below a quarter.
     truncation = 1.01 * change * z[6] + 0.131 * (max_forcing * products)
     is_negligible = (truncation <= _MAX_TRUNCATION * velocity) & (velocity <= _MAX_SUM) & (max_forcing <= _MAX_SUM)

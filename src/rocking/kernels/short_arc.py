@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from rocking.kernels.arc import side_sign, weight_at
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import StepEnd
 from rocking.kernels.ground import (
     Ground,
@@ -73,7 +73,7 @@ def partial_step(ground: Ground, block: Record, settings: Record, state: Record,
     return end if is_sufficient_linear(c, end.time) else undecided_step()
 
 
-@shared
+@not_inlined
 def short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
     """Compute a short step under varying weight."""
     lam = block.stiffness[state.side]

@@ -17,7 +17,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.kernels.arc import NEGLIGIBLE, expand_arc, pad_to_same_degree, side_sign, weight_at, write_weight_series
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import StepEnd, find_first_passing
 from rocking.kernels.ground import (
     Ground,
@@ -113,7 +113,7 @@ def may_slip(ground: Ground, block: Record, settings: Record, scratch: Record, s
     return not (low > 0.0 and max(highest, -lowest) <= block.static_friction * normal)
 
 
-@shared
+@not_inlined
 def find_slip(
     ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
 ) -> tuple[int, float, float, int]:
@@ -170,14 +170,14 @@ def write_square(scratch: Record, n: int) -> None:
 # ---- Series while slipping ----
 
 
-@shared
+@not_inlined
 def expand_slip(
     ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
 ) -> tuple[int, float]:
     """Write the series of slide-rock from a state into scratch; return (order, step), the step at most ``h_max``.
 
-    They are the rotation, the slip velocity in the frame of the side (scratch.slip), and the clearance
-    W - R cos(psi) u'^2, which is positive in contact (scratch.lift). A series ends where its last terms are negligible.
+    They are the rotation, the slip velocity in the frame of the side (scratch.slip), and the clearance W - R cos(psi)
+    u'^2, which is positive in contact (scratch.undivided_normal). A series ends where its last terms are negligible.
     """
     side = state.side
     sign = side_sign(side)
@@ -222,7 +222,7 @@ def write_slip_coefficients(
     s, k, b, D, N = scratch.sine, scratch.cosine, scratch.lever, scratch.divisor, scratch.normal
     mu, arm = direction * block.kinetic_friction, block.arm[side]
     if not settings.nonlinear:
-        scratch.lift[n] = N[n] = weight
+        scratch.undivided_normal[n] = N[n] = weight
         y = weight * (mu - block.slenderness[side])
         for m in range(n + 1):
             y += N[m] * c[n - m]
@@ -236,7 +236,7 @@ def write_slip_coefficients(
     for m in range(n + 1):
         lift -= arm * (k[m] * q[n - m])
         divisor += block.inertia_ratio[side] * (s[m] * b[n - m])
-    scratch.lift[n], D[n] = lift, divisor
+    scratch.undivided_normal[n], D[n] = lift, divisor
     for m in range(1, n + 1):
         lift -= D[m] * N[n - m]
     N[n] = lift / D[0]
@@ -279,7 +279,7 @@ def ignore_rounding_at_start(velocity: Floats) -> None:
         velocity[1] = 0.0
 
 
-@shared
+@not_inlined
 def find_slip_end(scratch: Record, order: int, h: float, direction: float) -> tuple[float, float]:
     """Find the first times in [0, h) at which slide-rock sticks, and at which contact is lost; inf if never."""
     d = scratch.auxiliary
@@ -288,7 +288,7 @@ def find_slip_end(scratch: Record, order: int, h: float, direction: float) -> tu
     ignore_rounding_at_start(d)
     stick = find_first_passing(d, order - 1, h)
     for k in range(order - 1):
-        d[k] = scratch.lift[k]
+        d[k] = scratch.undivided_normal[k]
     return stick, find_first_passing(d, order - 2, h)
 
 
@@ -312,7 +312,7 @@ def integrate_slip(scratch: Record, degree: int, t: float) -> tuple[float, float
     return distance * t, velocity
 
 
-@shared
+@not_inlined
 def expand_slide(ground: Ground, block: Record, scratch: Record, state: Record) -> int:
     """Write the series of the velocity of a block that slides on both pivots into scratch.slip; return its degree."""
     A, W, V = scratch.ground, scratch.weight, scratch.slip
@@ -359,7 +359,7 @@ def slip_factor(block: Record, side: int, e: float, direction: float) -> float:
     return (square - d * lever + couple) / (square + next_d * lever)
 
 
-@shared
+@not_inlined
 def strike_with_friction(block: Record, state: Record, side: int, speed: float) -> None:
     """Change speed, slip and mode at an impact that has left a side and would stick with the speed of the state."""
     other = 1 - side

@@ -210,8 +210,8 @@ STATE = define_record(
     rests="i8",  # number of rests so far
     rests_by_rounding="i8",  # number of rests because time hardly advanced between impacts
     rounding_decisions="i8",  # number of contacts, or sides of uplift without weight, decided by rounding
-    law="i8",  # `TendonLaw` of a tendon that yields
-    plastic="f8",  # plastic elongation of the tendon, m
+    tendon_law="i8",  # `TendonLaw` of a tendon that yields
+    plastic_elongation="f8",  # plastic elongation of the tendon, m
     leaning_rotation="f8",  # rotation about which the body leans at the end
     direction="i8",  # sign of the velocity of the foot; 0 if it sticks
     slip="f8",  # displacement of the foot relative to the ground divided by g, s^2
@@ -221,7 +221,16 @@ STATE = define_record(
 
 #: Step of a response: state at its start (see `STATE`) and time, for `expand_arc`.
 NODE_ROW = define_record(
-    time="f8", piece="i8", offset="f8", side="i4", law="i4", u="f8", v="f8", slip="f8", slip_rate="f8", direction="i8"
+    time="f8",
+    piece="i8",
+    offset="f8",
+    side="i4",
+    tendon_law="i4",
+    u="f8",
+    v="f8",
+    slip="f8",
+    slip_rate="f8",
+    direction="i8",
 )
 
 #: Impact: time, side entered (+1 or -1), speeds before and after.
@@ -249,7 +258,7 @@ SCRATCH = define_record(
     half_cosine=_SERIES,  # cos(u/2)
     slip=_SERIES,  # velocity of the foot, or the horizontal force without slip, in the frame of the side
     normal=_SERIES,  # normal force
-    lift=_SERIES,  # normal force times divisor
+    undivided_normal=_SERIES,  # normal force times divisor
     squares=_SERIES,  # square of u'
     lever=_SERIES,  # b of `sliding`
     divisor=_SERIES,  # 1 + (R^2/k^2) sin(alpha - u) b
@@ -293,12 +302,12 @@ def new_states(count: int, budget: int) -> Records:
     return states
 
 
-def state_at_node(node: Record, plastic: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
+def state_at_node(node: Record, plastic_elongation: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
     """Return the state of a march that starts at a node, with the plastic elongation of a tendon there."""
     state = new_states(1, budget)[0]
-    for name in ("piece", "offset", "side", "u", "v", "law", "slip", "slip_rate", "direction"):
+    for name in ("piece", "offset", "side", "u", "v", "tendon_law", "slip", "slip_rate", "direction"):
         state[name] = node[name]
-    state["peak"], state["plastic"] = node["u"], plastic
+    state["peak"], state["plastic_elongation"] = node["u"], plastic_elongation
     return state
 
 
@@ -361,7 +370,7 @@ def write_node(ground: Ground, settings: Record, table: Records, state: Record) 
     row.side = state.side
     row.u = state.u
     row.v = state.v
-    row.law = state.law
+    row.tendon_law = state.tendon_law
     row.slip = state.slip
     row.slip_rate = state.slip_rate
     row.direction = state.direction

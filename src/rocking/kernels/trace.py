@@ -12,7 +12,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign, weight_at
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import find_first_root, mean_factor, relative_speed_slope, restitution_factor
 from rocking.kernels.ground import (
     Ground,
@@ -23,7 +23,7 @@ from rocking.kernels.ground import (
     piece_start,
     vertical_component,
 )
-from rocking.kernels.restraints import apply_tendon_law, law_at_rest, plastic_at_node
+from rocking.kernels.restraints import apply_tendon_law, tendon_law_at_rest, update_plastic_elongation
 from rocking.kernels.series import INTEGRATED_TWICE, write_variation_coefficients
 from rocking.kernels.sliding import expand_slide, expand_slip, integrate_slip
 from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, new_records
@@ -63,7 +63,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
     ground, block, settings, nodes = trail
     expanded_row = -1
     order = 0
-    plastic_row, plastic = -1, 0.0  # for a tendon that yields
+    plastic_row, plastic_elongation = -1, 0.0  # for a tendon that yields
     landing = np.inf
     for k in range(times.shape[0]):
         row = rows[k]
@@ -78,11 +78,11 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
             continue
         if row != expanded_row:
             if block.yielding:
-                first, plastic = (plastic_row + 1, plastic) if row > plastic_row else (0, 0.0)
+                first, plastic_elongation = (plastic_row + 1, plastic_elongation) if row > plastic_row else (0, 0.0)
                 for earlier in range(first, row + 1):
-                    plastic = plastic_at_node(block, settings, nodes, earlier, plastic)
+                    plastic_elongation = update_plastic_elongation(block, settings, nodes, earlier, plastic_elongation)
                 plastic_row = row
-                apply_tendon_law(block, node.law, plastic)
+                apply_tendon_law(block, node.tendon_law, plastic_elongation)
             duration = np.inf if is_last else nodes[row + 1].time - node.time
             order, h = expand_step(trail, scratch, node, duration)
             landing = np.inf
@@ -102,7 +102,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
         out[k, _ACCELERATION] = sign * w
 
 
-@shared
+@not_inlined
 def expand_step(trail: Trail, scratch: Record, node: Record, duration: float) -> tuple[int, float]:
     """Write the series of the step from a node, with or without slip, into scratch; return (order, step)."""
     if node.direction != 0:
@@ -111,7 +111,7 @@ def expand_step(trail: Trail, scratch: Record, node: Record, duration: float) ->
     return order, h
 
 
-@shared
+@not_inlined
 def write_slip(
     trail: Trail, scratch: Record, row: int, order: int, elapsed: float, landing: float, out: Floats
 ) -> None:
@@ -183,15 +183,15 @@ def compute_variation(
     impact_count = event_count = 0
     du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
     dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
-    plastic, plastic_variation = 0.0, plastic_by_start(trail) * du  # plastic elongation of a tendon, and its variation
+    plastic_elongation, plastic_variation = 0.0, plastic_by_start(trail) * du  # of a tendon
     written = count_times_until(times, 0, nodes[0].time)
     changes[:written] = du
     changes[written:] = 0.0
     for k in range(nodes.shape[0]):
         node = nodes[k]
         if trail.block.yielding:
-            plastic = plastic_at_node(trail.block, trail.settings, nodes, k, plastic)
-            apply_tendon_law(trail.block, node.law, plastic)
+            plastic_elongation = update_plastic_elongation(trail.block, trail.settings, nodes, k, plastic_elongation)
+            apply_tendon_law(trail.block, node.tendon_law, plastic_elongation)
         if k + 1 == nodes.shape[0]:
             if node.side >= 0 and event_count < events.shape[0]:
                 events[event_count] = -du / node.v
@@ -200,14 +200,15 @@ def compute_variation(
         start, duration = (du, dv, plastic_variation), next_node.time - node.time
         first, written = written, count_times_until(times, written, next_node.time)
         if node.side < 0:
-            tendon_change = restoring_by_tendon(trail.block, next_node.side, plastic, plastic_variation)
+            tendon_change = restoring_by_tendon(trail.block, next_node.side, plastic_elongation, plastic_variation)
             shift_of_rest = events[event_count - 1] if event_count > 0 else 0.0
             du = 0.0
             events[event_count], dv = vary_uplift(trail, node, next_node, quantity, tendon_change, shift_of_rest)
             event_count += 1
         elif next_node.side < 0:
             shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
-            events[event_count] = rest_shift(trail, node, quantity, (dv, shift, plastic, plastic_variation), next_node)
+            variations = (dv, shift, plastic_elongation, plastic_variation)
+            events[event_count] = rest_shift(trail, node, quantity, variations, next_node)
             event_count += 1
             if written > first:
                 order = expand_variation(trail, scratch, work, node, quantity, start, duration)
@@ -217,7 +218,7 @@ def compute_variation(
             write_changes(trail, scratch, work, node, order, times[first:written], changes[first:written], False)
             t = step_duration(trail, node, next_node)
             du, dv, _ = evaluate_series(work.change, order, t)
-            if node.law == TendonLaw.PLASTIC and next_node.law != node.law:
+            if node.tendon_law == TendonLaw.PLASTIC and next_node.tendon_law != node.tendon_law:
                 plastic_variation = elongation_rate(trail, node.side, next_node.u) * du
             if is_impact(nodes, k):
                 _, speed, _ = evaluate_series(scratch.rotation, order, t)
@@ -250,7 +251,7 @@ def count_times_until(times: Floats, count: int, last: float) -> int:
     return count
 
 
-@shared
+@not_inlined
 def write_changes(
     trail: Trail, scratch: Record, work: Record, node: Record, order: int, times: Floats, changes: Floats, is_last: bool
 ) -> None:
@@ -281,7 +282,7 @@ def elongation_rate(trail: Trail, side: int, u: float) -> float:
 def plastic_by_start(trail: Trail) -> float:
     """Return the plastic elongation per rotation at the start of a response: 0 unless the tendon yields there."""
     node = trail.nodes[0]
-    if not trail.block.yielding or plastic_at_node(trail.block, trail.settings, trail.nodes, 0, 0.0) <= 0.0:
+    if not trail.block.yielding or update_plastic_elongation(trail.block, trail.settings, trail.nodes, 0, 0.0) <= 0.0:
         return 0.0
     return elongation_rate(trail, node.side, node.u)
 
@@ -306,7 +307,7 @@ def step_duration(trail: Trail, node: Record, next_node: Record) -> float:
     return next_node.time - node.time
 
 
-@shared
+@not_inlined
 def expand_variation(
     trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: Variations, duration: float
 ) -> int:
@@ -326,9 +327,9 @@ def expand_variation(
     elif side_quantity != Quantity.MOTION:
         for k in range(order - 1):
             work.forcing[k] = 0.0
-    work.change[0], work.change[1], plastic = start
-    if plastic != 0.0 and node.law == TendonLaw.ELASTIC:
-        change = trail.block.tendon_stiffness[node.side] * plastic
+    work.change[0], work.change[1], plastic_elongation = start
+    if plastic_elongation != 0.0 and node.tendon_law == TendonLaw.ELASTIC:
+        change = trail.block.tendon_stiffness[node.side] * plastic_elongation
         for k in range(order - 1):
             work.forcing[k] += change * (
                 scratch.half_cosine[k] if trail.settings.nonlinear else (1.0 if k == 0 else 0.0)
@@ -451,9 +452,9 @@ def is_jump(trail: Trail, node: Record) -> bool:
 
 
 @inlined
-def restoring_by_tendon(block: Record, side: int, plastic: float, change: float) -> float:
+def restoring_by_tendon(block: Record, side: int, plastic_elongation: float, change: float) -> float:
     """Compute the effect of a change of plastic elongation on the restoring acceleration at zero rotation."""
-    if not block.yielding or law_at_rest(block, plastic) == TendonLaw.SLACK:
+    if not block.yielding or tendon_law_at_rest(block, plastic_elongation) == TendonLaw.SLACK:
         return 0.0
     return -block.tendon_stiffness[side] * change
 
@@ -482,15 +483,17 @@ def rest_shift(
     elongation of a tendon and its variation. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g
     at the impact.
     """
-    dv, shift, plastic, plastic_variation = changes
+    dv, shift, plastic_elongation, plastic_variation = changes
     if rest.time == node.time:
         return shift
     block, i = trail.block, node.side
     j = block.next_side[i]
     g_i = restoring_acceleration(trail.ground, block, i, node.piece, node.offset)
     g_j = restoring_acceleration(trail.ground, block, j, node.piece, node.offset)
-    dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, i, plastic, plastic_variation)
-    dg_j = restoring_shift(trail, node, j, quantity, shift) + restoring_by_tendon(block, j, plastic, plastic_variation)
+    tendon_i = restoring_by_tendon(block, i, plastic_elongation, plastic_variation)
+    dg_i = restoring_shift(trail, node, i, quantity, shift) + tendon_i
+    tendon_j = restoring_by_tendon(block, j, plastic_elongation, plastic_variation)
+    dg_j = restoring_shift(trail, node, j, quantity, shift) + tendon_j
     e_i, e_j = mean_factor(block, i, node.v), mean_factor(block, j, node.v)
     de_i = 1.0 if quantity_on_side(quantity, i) == Quantity.RESTITUTION else 0.0
     de_j = 1.0 if quantity_on_side(quantity, j) == Quantity.RESTITUTION else 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import bound_rounding, find_first_passing, leading_power
 from rocking.kernels.ground import (
     ROUNDING,
@@ -25,7 +25,7 @@ from rocking.kernels.ground import (
     vertical_component,
     write_local_series,
 )
-from rocking.kernels.restraints import apply_tendon_law, plastic_at_node
+from rocking.kernels.restraints import apply_tendon_law, update_plastic_elongation
 from rocking.kernels.state import AT_REST, Record, Records, find_stop_of_resting_side
 from rocking.kernels.trace import Trail
 
@@ -45,7 +45,7 @@ def rest_threshold(block: Record, side: int) -> float:
     return min(block.threshold[side], block.static_friction) if block.has_friction else block.threshold[side]
 
 
-@shared
+@not_inlined
 def find_next_uplift(
     ground: Ground, block: Record, scratch: Record, resting: int, piece: int, offset: float, stop: float
 ) -> Uplift:
@@ -94,12 +94,12 @@ def write_next_uplifts(trail: Trail, scratch: Record, times: Floats) -> None:
     The law of a tendon that yields changes in the block of the trail.
     """
     ground, block, settings, nodes = trail
-    plastic = 0.0
+    plastic_elongation = 0.0
     for k in range(nodes.shape[0]):
         node = nodes[k]
         if block.yielding:
-            plastic = plastic_at_node(block, settings, nodes, k, plastic)
-            apply_tendon_law(block, node.law, plastic)
+            plastic_elongation = update_plastic_elongation(block, settings, nodes, k, plastic_elongation)
+            apply_tendon_law(block, node.tendon_law, plastic_elongation)
         if node.side < 0:
             uplift = find_next_uplift(ground, block, scratch, node.side, node.piece, node.offset, settings.stop)
             times[k] = piece_start(ground, uplift.piece) + uplift.offset if uplift.side != AT_REST else np.inf
@@ -158,7 +158,7 @@ def write_push(ground: Ground, piece: int, offset: float, threshold: float, sign
     return max(degree, weight_degree)
 
 
-@shared
+@not_inlined
 def find_first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float, d: Floats) -> tuple[float, bool]:
     """Find the first time in [0, h) from which sign * A(t) > threshold (else inf), and whether that is a jump."""
     gap = threshold - sign * A[0]

@@ -22,7 +22,7 @@ from rocking.motion import piecewise
 DAMPING: Final = 0.05
 
 
-def check_damping(value: object, error: checks.Error) -> float:
+def check_damping(value: object, error: checks.ErrorFactory) -> float:
     """Return a damping ratio, or raise `error`."""
     ratio = checks.real(value, "damping", error)
     if not 0.0 <= ratio < 1.0:

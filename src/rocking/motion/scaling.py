@@ -291,7 +291,7 @@ class Measure:
         """Whether the measure has a separate unit for each block."""
         return self.name in ("pga_ratio", "pgv_ratio")
 
-    def unit(self, uplift_accelerations: Floats, p: Floats) -> Floats:
+    def block_units(self, uplift_accelerations: Floats, p: Floats) -> Floats:
         """Return the unit for each block (m/s^2 or m/s) from its uplift acceleration and its p, shape (n,).
 
         The p of a block with two sides is the smaller one.

@@ -71,7 +71,7 @@ class TimeHistory:
         sides = self.trail.nodes["side"][rows].astype(np.int64)
         return states.reshape((*times.shape, 3)), sides.reshape(times.shape)
 
-    def slips(self, time: ArrayLike, gravity: float) -> Floats:
+    def slip_states(self, time: ArrayLike, gravity: float) -> Floats:
         """Return displacement, m, and velocity, m/s, of the foot at times of any shape; NaN outside [0, end]."""
         times = checks.numbers(time, "time", OptionError)
         flat = times.ravel()
@@ -196,9 +196,9 @@ def add_all_impacts(trail: Trail, *, ends_in_sequence: bool) -> Trail:
     body, settings, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
     settings["rest_rule"], settings["no_end_time"], settings["writes_tables"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
-    parts, next_row, plastic = [], 0, compute_plastic_elongations(trail)
+    parts, next_row, plastic_elongations = [], 0, compute_plastic_elongations(trail)
     for row in last_impacts:
-        start = state.state_at_node(nodes[row], plastic[row], _MAX_IMPACTS)
+        start = state.state_at_node(nodes[row], plastic_elongations[row], _MAX_IMPACTS)
         body["rest_limit"] = np.maximum(min_speeds, _MIN_SPEED_RATIO * start["v"])
         start["peak"] = math.inf  # the peak is not needed, and weight is positive at a proven rest
         settings["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
@@ -217,12 +217,12 @@ def compute_elongation(trail: Trail, rotations: Floats, side: Integers) -> Float
 
 
 def compute_plastic_elongations(trail: Trail) -> Floats:
-    """Return the plastic elongation of a tendon from each node on, m, as `restraints.plastic_at_node`."""
+    """Return the plastic elongation of a tendon from each node on, m, as `restraints.update_plastic_elongation`."""
     nodes = trail.nodes
     if not trail.block["yielding"]:
         return np.zeros(len(nodes))
-    law, side = nodes["law"], nodes["side"]
+    law, side = nodes["tendon_law"], nodes["side"]
     unloads = np.append(side[:1] >= 0, (law[1:] == state.TendonLaw.ELASTIC) & (law[:-1] == state.TendonLaw.PLASTIC))
-    plastic = np.maximum(0.0, compute_elongation(trail, nodes["u"], side) - trail.block["yield_elongation"])
+    plastic_elongations = np.maximum(0.0, compute_elongation(trail, nodes["u"], side) - trail.block["yield_elongation"])
     last = np.maximum.accumulate(np.where(unloads, np.arange(len(nodes)), -1))
-    return np.where(last >= 0, plastic[last], 0.0)
+    return np.where(last >= 0, plastic_elongations[last], 0.0)

@@ -65,14 +65,14 @@ class PerturbedSimulations(Result):
 
     Attributes
     ----------
-    relative : float
+    relative_step : float
         Relative step of the factors.
     repeats : tuple of Repeat
         Factor, outcome, peak (rad), peak_time, overturn_time, last_rest (s; NaN if there is none) and events of each
         simulation, by ascending factor. The middle one has factor 1.
     coordinate : Coordinate
         Name and unit of the coordinate.
-    scaled : str
+    scaled_input : str
         Scaled input: "motions" or "initial states".
 
     See Also
@@ -91,20 +91,20 @@ class PerturbedSimulations(Result):
 
     TABLES = ("repeats",)
 
-    relative: float
+    relative_step: float
     repeats: tuple[Repeat, ...]
     coordinate: Coordinate
-    scaled: str
+    scaled_input: str
 
     @property
     def max_deviation(self) -> float:
         """Largest relative distance of a factor from 1."""
-        return self.relative * max(1, len(self.repeats) - 2)
+        return self.relative_step * max(1, len(self.repeats) - 2)
 
     @property
     def sample_text(self) -> str:
         """Text with the number of simulations, the scaled input and the range of factors."""
-        return f"{len(self.repeats)} {self.scaled} within {format_percent(self.max_deviation)}"
+        return f"{len(self.repeats)} {self.scaled_input} within {format_percent(self.max_deviation)}"
 
     @property
     def factors(self) -> Floats:
@@ -205,7 +205,7 @@ class PerturbedSimulations(Result):
 
     def to_dict(self) -> dict[str, Any]:
         return {
-            "relative": self.relative,
+            "relative_step": self.relative_step,
             "within": self.max_deviation,
             "decided": self.is_decided,
             "overturned": int(np.count_nonzero(self.overturned)),
@@ -214,22 +214,22 @@ class PerturbedSimulations(Result):
         }
 
 
-def check_factors(relative: float, count: int) -> list[float]:
+def check_factors(relative_step: float, count: int) -> list[float]:
     """Return the factors of `list_factors`, or raise `OptionError` if an argument is out of range."""
-    step = checks.between(relative, "relative", OptionError, 1e-12, 0.1)
+    step = checks.between(relative_step, "relative_step", OptionError, 1e-12, 0.1)
     if checks.integer(count, "count", OptionError, 3, 1001) % 2 == 0:
         message = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
         raise OptionError(message, "count", value=count)
     if step * (count - 2) >= 1.0:
         message = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
-        raise OptionError(message, "relative", value=step)
+        raise OptionError(message, "relative_step", value=step)
     return list_factors(step, count)
 
 
-def list_factors(relative: float, count: int) -> list[float]:
-    """Return the factors 1, 1 +- relative, 1 +- 3 relative, and so on, in ascending order."""
+def list_factors(relative_step: float, count: int) -> list[float]:
+    """Return the factors 1, 1 +- step, 1 +- 3 step, and so on, in ascending order."""
     multiples = range(1, count - 1, 2)
-    return [*(1.0 - k * relative for k in reversed(multiples)), 1.0, *(1.0 + k * relative for k in multiples)]
+    return [*(1.0 - k * relative_step for k in reversed(multiples)), 1.0, *(1.0 + k * relative_step for k in multiples)]
 
 
 def choose_steps(precision: float) -> tuple[float, int]:

@@ -264,7 +264,7 @@ class Response(ResponseData):
         ground = np.zeros_like(times) if motion is None else motion.acceleration(times)
         columns = [Column("time", times, "s"), Column(name, rotation, unit), Column(rate, velocity, f"{unit}/s")]
         if self.friction is not None:
-            slips = self._history.slips(times, self.block.gravity)
+            slips = self._history.slip_states(times, self.block.gravity)
             columns += [Column("slip", slips[:, 0], "m"), Column("slip_velocity", slips[:, 1], "m/s")]
         columns.append(Column("ground_acceleration", ground, "m/s^2"))
         if motion is not None and motion.vertical is not None:

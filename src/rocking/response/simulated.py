@@ -262,15 +262,15 @@ class ResponseData(Result):
         height = abs(self.peak_rotation - self.block.stops[0])
         return find_ambiguities(self.sensitivity, self.solution.trail, height, self.rounding_decisions + balanced)
 
-    def perturbed(self, relative: float = RELATIVE_STEP, count: int = FACTOR_COUNT) -> PerturbedSimulations:
+    def perturbed(self, relative_step: float = RELATIVE_STEP, count: int = FACTOR_COUNT) -> PerturbedSimulations:
         """Repeat the simulation with the motion scaled by factors near 1.
 
         Parameters
         ----------
-        relative : float
+        relative_step : float
             Relative step of the factors, from 1e-12 to 0.1.
         count : int
-            Number of factors, odd and at least 3: 1, 1 +- relative, 1 +- 3 relative, 1 +- 5 relative, and so on.
+            Number of factors, odd and at least 3: 1, 1 +- step, 1 +- 3 step, 1 +- 5 step, and so on.
 
         Returns
         -------
@@ -283,13 +283,13 @@ class ResponseData(Result):
         motion, or alone without a motion. An outcome that changes within a few millionths is undecided in practice. An
         outcome shared by all simulations may still change between their factors.
         """
-        if (relative, count) not in self._perturbations:
-            repeats = tuple(self._repeat(factor) for factor in check_factors(relative, count))
-            scaled = "initial states" if self.motion is None else "motions"
-            self._perturbations[relative, count] = PerturbedSimulations(
-                float(relative), repeats, self.block.coordinate, scaled
+        if (relative_step, count) not in self._perturbations:
+            repeats = tuple(self._repeat(factor) for factor in check_factors(relative_step, count))
+            scaled_input = "initial states" if self.motion is None else "motions"
+            self._perturbations[relative_step, count] = PerturbedSimulations(
+                float(relative_step), repeats, self.block.coordinate, scaled_input
             )
-        return self._perturbations[relative, count]
+        return self._perturbations[relative_step, count]
 
     @cached_property
     def _perturbations(self) -> dict[tuple[float, int], PerturbedSimulations]:
@@ -330,11 +330,11 @@ class ResponseData(Result):
 
         It is the displacement of the pivot in contact, positive to side + and zero at the start.
         """
-        return unwrap_scalar(self._history.slips(time, self.block.gravity)[..., 0])
+        return unwrap_scalar(self._history.slip_states(time, self.block.gravity)[..., 0])
 
     def slip_velocity(self, time: ArrayLike) -> Floats:
         """Return the rate of `slip`, m/s, at any time (at an impact, just after it); NaN outside [0, duration]."""
-        return unwrap_scalar(self._history.slips(time, self.block.gravity)[..., 1])
+        return unwrap_scalar(self._history.slip_states(time, self.block.gravity)[..., 1])
 
     @property
     def residual_slip(self) -> float:

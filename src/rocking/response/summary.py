@@ -220,7 +220,8 @@ def _create_event_rows(response: ResponseData) -> list[Row]:
             note = _describe_proof(_compute_uncertainty(time, low, high), sequences[time])
         rows.append(Row(kind, text, note=note))
     if remaining := len(response.events) - len(rows):
-        note = "" if len(rows) == _MAX_EVENTS else f", not the same in all {len(perturbed.repeats)} {perturbed.scaled}"
+        repeats = f"{len(perturbed.repeats)} {perturbed.scaled_input}"
+        note = "" if len(rows) == _MAX_EVENTS else f", not the same in all {repeats}"
         rows.append(Row("...", f"{format_count(remaining, 'more event')}{note}"))
     return rows or [Row("uplift", "none")]
 
@@ -253,7 +254,7 @@ def _create_peak_rows(response: ResponseData) -> list[Row]:
         ratios = f"{low / balance:.3g} to {high / balance:.3g}" if shows_range else format_ratio(response)
         note += f", {ratios} of the {limit}"
     if not perturbed.is_decided:
-        note += f", in {len(perturbed.agreeing_repeats)} of {len(perturbed.repeats)} {perturbed.scaled}"
+        note += f", in {len(perturbed.agreeing_repeats)} of {len(perturbed.repeats)} {perturbed.scaled_input}"
     return [Row(f"peak {name}", value, unit, note)]
 
 

@@ -356,7 +356,7 @@ def simulate_many(
     measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
     duration: float | None = None,
-    times: bool = False,
+    include_times: bool = False,
     friction: Friction | None = None,
     robust: bool = False,
 ) -> xr.Dataset:
@@ -379,7 +379,7 @@ def simulate_many(
         Original motions, reversed motions, or both, which adds the dimension ``polarity``.
     duration : float, optional
         As for `simulate`.
-    times : bool
+    include_times : bool
         Whether to include the times of the first uplift and of the first and the last rest.
     friction : float or pair, optional
         As for `simulate`. Adds the variables lost_contact, largest_slip and residual_slip (m).
@@ -394,9 +394,9 @@ def simulate_many(
         peak_time (s), impacts (without those after a certificate), uplifts, rests, time_at_rest (s),
         complete_chattering (whether the block came to rest after its first uplift before the motion passed a threshold
         again), rests_by_rounding (rests without a certificate), unfinished, and stopped (by `duration`, which leaves
-        overturned undetermined). `times` adds first_uplift, first_rest and last_rest (s, or 0 without such an event).
-        `robust` adds overturned_share, the share of the five simulations that overturn. Shares other than 0 and 1 are
-        undecided. Coordinates contain the names of the motions and the parameters of the blocks.
+        overturned undetermined). `include_times` adds first_uplift, first_rest and last_rest (s, or 0 without such an
+        event). `robust` adds overturned_share, the share of the five simulations that overturn. Shares other than 0 and
+        1 are undecided. Coordinates contain the names of the motions and the parameters of the blocks.
 
     See Also
     --------
@@ -420,7 +420,7 @@ def simulate_many(
     [[True, False, True, False]]
     """
     product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration, friction)
-    names = [*VARIABLES, *(TIMES if checks.boolean(times, "times", OptionError) else ())]
+    names = [*VARIABLES, *(TIMES if checks.boolean(include_times, "include_times", OptionError) else ())]
     names += SLIPS if product.friction is not None else ()
     setup = create_setup(product)
     outcomes = simulate_product(product, setup, names)

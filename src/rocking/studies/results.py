@@ -21,10 +21,10 @@ from rocking.analysis.levels import (
     assign_pairs,
     check_limit,
     check_limit_states,
+    compute_block_units,
     compute_exceedances,
     compute_intensities,
     compute_ratios,
-    compute_units,
     describe_polarities,
     describe_pool,
     describe_sample,
@@ -429,7 +429,7 @@ def fit_pooled_fragility(
     """Fit one curve to the outcomes of all blocks, with optional weights."""
     limits = _check_limit_states(limit_states, confidence)
     product, bodies = store.product, store.product.bodies
-    units, unit_indices = np.unique(compute_units(bodies, measure, product.model), return_inverse=True)
+    units, unit_indices = np.unique(compute_block_units(bodies, measure, product.model), return_inverse=True)
     shares = normalise_positive_weights(weights, len(bodies))
     motions = _list_counted_motions(product, measure, larger=larger)
     scales = product.scales.count
@@ -495,7 +495,7 @@ def fit_block_fragilities(
     faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
     motions = _list_counted_motions(product, measure, larger=larger)
     intensities = _compute_intensities(product, measure)[motions].ravel()
-    units = compute_units(bodies, measure, product.model)
+    units = compute_block_units(bodies, measure, product.model)
     labels = np.repeat(assign_clusters(product.motions, clusters)[motions], scales)
     fit = partial(fit_fragility, measure=measure, confidence=confidence)
     with Progress("fitting", len(bodies) * len(limits)) as bar:

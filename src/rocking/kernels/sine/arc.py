@@ -6,7 +6,7 @@ No argument may be NaN. A search without a result is UNRESOLVED.
 import math
 from typing import Final, NamedTuple
 
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.sine import SequenceStatus
 
 #: Orders of the sums, and the largest t^2 (1 + delta) at which they reach full precision.
@@ -72,7 +72,7 @@ def closed_form_basis(t: float, delta: float) -> Basis:
     return Basis(sine, versine, (S - decay * sine) / total, (C - decay * versine) / total, decay)
 
 
-@shared
+@not_inlined
 def compute_basis(t: float, delta: float) -> Basis:
     """Compute the basis at t > 0, by the shortest sum of full precision or else by its definition."""
     q = t * t
@@ -203,7 +203,7 @@ def is_precise(correction: Correction, t: float, delta: float) -> bool:
     return correction.change * correction.change * (1.0 + reach) <= _MAX_CORRECTION * _MAX_CORRECTION * (t * t)
 
 
-@shared
+@not_inlined
 def solve_arc(start: State, t: float, s: float, delta: float, max_duration: float) -> tuple[int, float, State]:
     """Compute the duration of an arc, from an estimate t, and the state just before its impact.
 
@@ -219,7 +219,7 @@ def solve_arc(start: State, t: float, s: float, delta: float, max_duration: floa
     return bracket_arc(start, s, delta, max_duration)
 
 
-@shared
+@not_inlined
 def bracket_arc(start: State, s: float, delta: float, max_duration: float) -> tuple[int, float, State]:
     """Compute the same as `solve_arc` in a bracket if the corrections do not converge (long arc, or arc without end).
 
@@ -267,7 +267,7 @@ def uplift_state(excess: float) -> State:
     return State(0.0, 0.0, -math.sqrt(excess * (2.0 + excess)))
 
 
-@shared
+@not_inlined
 def solve_first_arc(excess: float, delta: float) -> tuple[int, float, State]:
     """Compute status and phase of the first impact for a = 1 + excess > 1, and the state just before."""
     start = uplift_state(min(excess, MAX_EXCESS))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rocking.core.arrays import Floats, Integers
 from rocking.kernels.certificate import Bounds, bracket_geometrically
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.remaining import ImpactSide, estimate_remaining_time
 from rocking.kernels.sine import SequenceStatus
 from rocking.kernels.sine.arc import MAX_EXCESS, State, apply_restitution, estimate_duration, solve_arc, solve_first_arc
@@ -133,7 +133,7 @@ def write_rest_phases(sequences: Sequences, phases: Floats, statuses: NDArray[np
         statuses[i], phases[i] = find_rest_phase(a[i] - 1.0, 1.0 / (omega[i] * omega[i]), eta[i])
 
 
-@shared
+@not_inlined
 def find_rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float]:
     """Compute status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase is valid only if FOUND."""
     status, x, impact = solve_first_arc(excess, delta)
@@ -204,23 +204,23 @@ def resolve_impacts(
 
 @kernel
 def write_semianalytical_phases(
-    sequences: Sequences, resolved: Integers, phases: Floats, statuses: NDArray[np.int8]
+    sequences: Sequences, impact_counts: Integers, phases: Floats, statuses: NDArray[np.int8]
 ) -> None:
-    """Write status and phase of rest by Eq. 75 for each (a > 1, omega, eta) and number of ``resolved`` intervals."""
+    """Write status and phase of rest by Eq. 75 for each (a > 1, omega, eta) and number of resolved intervals."""
     a, omega, eta = sequences
     for i in range(phases.size):
         delta = 1.0 / (omega[i] * omega[i])
-        statuses[i], phases[i] = find_semianalytical_phase(a[i] - 1.0, delta, eta[i], resolved[i])
+        statuses[i], phases[i] = find_semianalytical_phase(a[i] - 1.0, delta, eta[i], impact_counts[i])
 
 
-@shared
-def find_semianalytical_phase(excess: float, delta: float, eta: float, resolved: int) -> tuple[int, float]:
+@not_inlined
+def find_semianalytical_phase(excess: float, delta: float, eta: float, impact_count: int) -> tuple[int, float]:
     """Compute Eq. 75 in phase: the resolved intervals, then two more that start two geometric sums."""
     status, current, impact = solve_first_arc(excess, delta)
     previous = 0.0
     x = current
     s = 1.0
-    for _ in range(resolved + 1):
+    for _ in range(impact_count + 1):
         if status != SequenceStatus.FOUND:
             return status, x
         s = -s

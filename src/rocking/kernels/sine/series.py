@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.remaining import ImpactSide, estimate_remaining_time
 from rocking.kernels.sine.sequence import LEVELS, MIN_MOVING_SPEED, richardson_weights
 
@@ -318,7 +318,7 @@ def estimate_leading_duration(v: float, p: float, d: float) -> float:
     return find_positive_root(d / 6.0, p / 2.0, v)
 
 
-@shared
+@not_inlined
 def write_series_basis(q: Series, delta: float, work: Series, basis: FourSeries) -> None:
     """Compute sine, versine, E and W of `sine.arc.Basis` at a series q without constant term."""
     sine, versine, E, W = basis
@@ -359,7 +359,7 @@ def _write_forcing(z: Series, forces: ThreeSeries, basis: ThreeSeries, work: Ser
         effect[k] = total[k]
 
 
-@shared
+@not_inlined
 def _multiply(a: Series, b: Series, c: Series) -> None:
     """Write the truncated product of two series into a third one."""
     for k in range(c.size):
