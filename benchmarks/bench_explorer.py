@@ -45,7 +45,7 @@ def main():
     if shutil.which("chromium") is None:
         print("no browser: install Chromium")
         return
-    here = start_listening(Explorer(), {})
+    here = start_listening(Explorer())
     here.run_in_background()
     flags = ["--disable-gpu", "--disable-background-networking", *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with sync_playwright() as player:

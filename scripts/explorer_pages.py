@@ -35,7 +35,7 @@ COLOURS = 96
 def main() -> None:
     """Take all pictures, or those of the views that are named."""
     wanted = sys.argv[1:] or [*VIEWS]
-    here = start_listening(Explorer(), {})
+    here = start_listening(Explorer())
     here.run_in_background()
     flags = ["--disable-gpu", "--disable-background-networking", *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with sync_playwright() as player:

@@ -62,7 +62,8 @@ def remembering(browser, folder):
 
 
 def slowed(page):
-    """Return a page whose processor is as slow as the tests are to find it."""
+    """Return a page whose processor is as slow as the tests are to find it, and which has time where it is busy."""
+    page.set_default_timeout(60_000.0 * _busy())
     if SLOWDOWN > 1.0:
         page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": SLOWDOWN})
     return page

@@ -3,6 +3,7 @@
 import math
 import re
 
+from rocking.explorer.core import Query
 from rocking.explorer.payload import load_english_texts
 
 #: Kinds of quantities in texts: the unit in which the page shows them unless another is chosen, in SI units.
@@ -15,9 +16,6 @@ def in_english(said):
         return said
     values = said["values"]
     form = load_english_texts()[said["phrase"]]
-    if isinstance(form, dict):
-        count = values["count"]
-        form = form.get(str(count)) or form.get("one" if count == 1 else "other") or form["other"]
 
     def written(place):
         name, digits, kind = place.groups()
@@ -30,3 +28,9 @@ def in_english(said):
         return f"{value:.{digits or 6}{kind}}" if kind else f"{value:.0f}"
 
     return re.sub(r"\{(\w+)(?::\.?(\d*)([a-z]+))?\}", written, form)
+
+
+def page_answer(explorer, name, texts, window=None, **others):
+    """Answer of an explorer to a request of the page on a case, in a window (s)."""
+    ends = {} if window is None else {"from": repr(window[0]), "to": repr(window[1])}
+    return explorer.answer(name, Query({**texts, **ends, **others}))

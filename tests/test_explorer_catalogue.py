@@ -8,7 +8,7 @@ import pytest
 import rocking
 from rocking.errors import OptionError, RecordError
 from rocking.explorer import uploads
-from rocking.explorer.catalogue import find_title, list_records, number_stations, read_entries
+from rocking.explorer.catalogue import describe_entries, list_records, read_entries
 from rocking.explorer.motions import read_motion
 from rocking.explorer.uploads import UploadStore
 
@@ -79,7 +79,7 @@ def test_another_length_or_step_is_another_station_and_headings_are_believed():
     key = store.add_file("two.v2", (FORMATS / "two.v2").read_bytes())
     (group,) = groups_of(store)
     assert group["reason"] == "" and len(group["rows"]) == 2
-    assert find_title(group["rows"][1]["texts"], store) == "two.v2, 90 Deg"
+    assert describe_entries([group["rows"][1]["texts"]], store) == [("two.v2, 90 Deg", 0)]
     assert read_motion(group["rows"][1]["texts"], store).motion.pga == group["rows"][1]["measures"]["pga"]
     assert store.list_records() == (key,)
 
@@ -95,7 +95,7 @@ def test_entries_of_one_station_have_one_number():
     entries += [{"motion": f"file:{two}", "channel": channel} for channel in ("1", "2")]
     shipped = ("el-centro-meloland-360", "ridgecrest-clc-090", "el-centro-meloland-270", "el-centro-meloland-360")
     entries += [{"motion": name} for name in shipped]
-    assert number_stations(entries, store) == [0, 1, 0, 2, 2, 3, 3, 4, 5, 4, 4]
+    assert [number for _, number in describe_entries(entries, store)] == [0, 1, 0, 2, 2, 3, 3, 4, 5, 4, 4]
 
 
 @pytest.mark.parametrize("said", ["names", "headings", "both"])
@@ -121,7 +121,7 @@ def test_nothing_is_said_of_a_file_before_its_units_and_step_are_answered():
     key = store.add_file("a.txt", samples(1).encode())
     (row,) = groups_of(store)[0]["rows"]
     assert set(row["missing"]) == {"dt", "units"} and row["measures"] is None and "units" not in row["texts"]
-    assert row["choices"]["units"][0][0] == "g"
+    assert set(row["raw"]) == {"pga", "duration"}
     (row,) = groups_of(store, [{"key": key, "dt": "0.02", "units": "gal"}])[0]["rows"]
     assert row["missing"] == [] and row["texts"] == {"motion": f"file:{key}", "dt": "0.02", "units": "gal"}
     assert row["measures"]["pga"] == read_motion(row["texts"], store).motion.pga
@@ -143,7 +143,7 @@ def test_what_is_said_of_a_file_is_said_for_the_step_and_the_units_that_are_give
     store = UploadStore()
     key = store.add_file("a.txt", samples(1).encode())
     for dt, units, size in ((0.01, "g", 9.80665), (0.01, "gal", 0.01), (0.02, "gal", 0.01), (0.01, "g", 9.80665)):
-        ((told,),) = [store.describe_file(key, dt, units)["channels"]]
+        ((told,),) = [store.describe_file(key, dt=dt, units=units)["channels"]]
         assert told["measures"]["duration"] == pytest.approx(399 * dt)
         assert told["measures"]["pga"] == pytest.approx(size * np.max(np.abs(np.array(samples(1).split(), float))))
 
@@ -167,14 +167,12 @@ def test_a_wrong_answer_is_said_of_its_file_and_leaves_the_list(answer, words):
     groups = groups_of(store, [{"key": wrong, **given, **answer}, {"key": right, **given}])
     assert len(groups) == 2 and [group["rows"][0]["key"] for group in groups] == [wrong, right]
     assert groups[0]["reason"].startswith("odd.txt: ") and words in groups[0]["reason"]
-    assert set(groups[0]["rows"][0]["missing"]) == {"dt", "units"}
+    assert groups[0]["rows"][0]["missing"] == [*answer] and groups[0]["rows"][0]["measures"] is None
     assert groups[1]["reason"] == "" and groups[1]["rows"][0]["missing"] == []
 
 
 def test_entries_of_an_address_are_those_of_motions_and_not_too_many():
     assert read_entries("") == []
-    with pytest.raises(OptionError, match="not 'width'"):
-        read_entries("motion=none&width=1")
     with pytest.raises(OptionError, match="has 160 entries"):
         read_entries("motion=none;" * 161)
     assert read_entries("motion=" + "n" * 39_993) == [{"motion": "n" * 39_993}]
@@ -190,7 +188,7 @@ def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch
         store.add_file("4.txt", samples(4).encode())
     assert store.add_file("1.txt", samples(1).encode()) == keys[1]
     store.describe_file(keys[0])
-    store.read(keys[0], None, 0.01, "g")
+    store.read(keys[0], dt=0.01, units="g")
     store.remove(keys[0])
     assert store.usage()["files"] == 2
     with pytest.raises(RecordError, match="not here any more"):
@@ -207,14 +205,31 @@ def test_new_files_take_none_out_and_of_what_was_read_what_was_used_longest_ago_
     store = UploadStore()
     keys = [store.add_file(f"{seed}.txt", samples(seed, count).encode()) for seed in range(5)]
     assert store.list_records() == tuple(keys)
-    first, *_ = [store.read(key, None, 0.01, "g") for key in keys[:3]]
-    assert store.read(keys[0], None, 0.01, "g") is first
-    third = store.read(keys[2], None, 0.01, "g")
+    first, *_ = [store.read(key, dt=0.01, units="g") for key in keys[:3]]
+    assert store.read(keys[0], dt=0.01, units="g") is first
+    third = store.read(keys[2], dt=0.01, units="g")
     for k in (0, 3, 0, 4, 0):
-        again = store.read(keys[k], None, 0.01, "g")
+        again = store.read(keys[k], dt=0.01, units="g")
         assert len(again.breakpoints) == count and (k != 0 or again is first)
-    assert store.read(keys[2], None, 0.01, "g") is not third
+    assert store.read(keys[2], dt=0.01, units="g") is not third
     store.remove(keys[2])
     assert store.list_records() == (keys[0], keys[1], keys[3], keys[4])
     assert store.add_file("2.txt", samples(2, count).encode()) == keys[2]
     assert store.list_records() == (keys[0], keys[1], keys[3], keys[4], keys[2])
+
+
+def test_a_corrected_record_is_listed_and_read_as_corrected():
+    store = UploadStore()
+    key = store.add_file("a.csv", "\n".join(f"{0.01 * k:.2f},{0.001 * k}" for k in range(900)).encode())
+    given = {"key": key, "units": "g"}
+    (plain,) = groups_of(store, [given])[0]["rows"]
+    (row,) = groups_of(store, [{**given, "baseline": "1"}])[0]["rows"]
+    assert row["texts"] == {"motion": f"file:{key}", "units": "g", "baseline": "1"}
+    assert row["measures"]["pga"] < 1e-9 < plain["measures"]["pga"] == pytest.approx(0.899 * 9.80665)
+    read = read_motion(row["texts"], store)
+    assert read.motion.pga == row["measures"]["pga"] and read.python == "rocking.read('a.csv', units='g', baseline='1')"
+    (wrong,) = groups_of(store, [{**given, "baseline": "much"}])
+    assert "“Baseline, degree” must be the degree" in wrong["reason"]
+    assert wrong["rows"][0]["measures"] == plain["measures"]
+    with pytest.raises(OptionError, match="baseline corrects the record of a file"):
+        read_motion({"motion": "ridgecrest-clc-090", "baseline": "1"}, store)

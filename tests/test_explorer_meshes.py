@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 from explorer_client import Client, clients, let_in
-from explorer_texts import in_english
+from explorer_texts import in_english, page_answer
 
 import rocking
 from rocking.errors import BlockError, OptionError, RecordError, RockingError
@@ -83,7 +83,7 @@ def test_the_picture_of_a_body_is_of_its_plane():
     solid = rocking.Solid.from_mesh("statue")
     for azimuth in (0.0, 30.0, 90.0, 271.0):
         texts = {**STATUE, "azimuth": repr(azimuth)}
-        payload = explorer.case(texts)
+        payload = page_answer(explorer, "case", texts)
         plus, minus = solid.block(azimuth).sides
         block, profile = payload.header["block"], payload.arrays["outline"].reshape(-1, 6)
         assert block["body"]["azimuth"] == azimuth
@@ -93,14 +93,14 @@ def test_the_picture_of_a_body_is_of_its_plane():
         assert np.allclose(profile[0, :4], [0.0, 0.2, -edges[1, 0], edges[0, 0]], atol=1e-6)
         assert profile[:, 1].max() == pytest.approx(solid.height, rel=1e-9) == block["outline"]["top"]
         assert block["outline"]["widest"] >= edges[:, 0].max() - 1e-6
-    plain = explorer.case({"width": "0.3", "height": "1", "motion": "none", "initial_rotation": "1deg"})
+    plain = page_answer(explorer, "case", {"width": "0.3", "height": "1", "motion": "none", "initial_rotation": "1deg"})
     assert "outline" not in plain.arrays
     assert plain.header["block"]["body"] is None
 
 
 def test_what_is_said_of_a_body_are_its_own_numbers():
     explorer = Explorer()
-    found = explorer.details({**STATUE, "density": DENSITY})
+    found = page_answer(explorer, "details", {**STATUE, "density": DENSITY})
     header, arrays = found.header["body"], found.arrays
     solid = rocking.Solid.from_mesh("statue", density=DENSITIES)
     rose = solid.rose(arrays["azimuth"])
@@ -109,13 +109,13 @@ def test_what_is_said_of_a_body_are_its_own_numbers():
     assert (header["weakest_azimuth"], header["weakest"]) == (90.0, rose.data.weakest_acceleration)
     about = "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³, 455.4 kg."
     assert in_english(header["about"]) == about
-    without_mass = in_english(explorer.details(STATUE).header["body"]["about"])
+    without_mass = in_english(page_answer(explorer, "details", STATUE).header["body"]["about"])
     assert without_mass == "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³."
     assert "Towards 30° the products of inertia are" in in_english(header["left_out"])
     assert in_english(header["repaired"]) == "Nothing had to be repaired in the mesh."
     assert np.allclose(arrays["support"].reshape(-1, 2), solid.support - solid.centre[:2])
     assert arrays["piece"][-1] == len(arrays["plan"]) / 2 > 100
-    assert explorer.details({"width": "0.3", "height": "1"}).header["body"] is None
+    assert page_answer(explorer, "details", {"width": "0.3", "height": "1"}).header["body"] is None
 
 
 def test_what_was_mended_is_said_and_what_looks_wrong_is_noted():
@@ -125,11 +125,11 @@ def test_what_was_mended_is_said_and_what_looks_wrong_is_noted():
     scan.invert()
     taken = explorer.add_file("scan.obj", content(scan, "obj"))
     texts = {**STATUE, "mesh": f"file:{taken['key']}", "azimuth": str(taken["azimuth"])}
-    assert in_english(explorer.details(texts).header["body"]["repaired"]).startswith(
+    assert in_english(page_answer(explorer, "details", texts).header["body"]["repaired"]).startswith(
         "Repaired in the mesh: 1 hole filled"
     )
-    assert "the body is 1000 m high" in explorer.case(texts).header["block"]["notes"][-1]
-    assert explorer.case({**texts, "unit": "mm"}).header["block"]["notes"] == []
+    assert "the body is 1000 m high" in page_answer(explorer, "case", texts).header["block"]["notes"][-1]
+    assert page_answer(explorer, "case", {**texts, "unit": "mm"}).header["block"]["notes"] == []
 
 
 def test_meshes_are_known_by_their_content_and_so_many_at_most():
@@ -214,7 +214,8 @@ def test_a_hostile_mesh_is_answered_in_one_sentence(name, tmp_path, monkeypatch)
     explorer = Explorer()
     with pytest.raises(BlockError, match=words) as caught:
         taken = explorer.add_file(name, data)
-        explorer.case({**STATUE, "mesh": f"file:{taken['key']}"})  # what a choice on the page may correct is taken
+        # What a choice on the page may correct is taken.
+        page_answer(explorer, "case", {**STATUE, "mesh": f"file:{taken['key']}"})
     said = str(caught.value)
     assert said.startswith(f"{name}: ") or name == "point.obj"
     assert "\n" not in said and str(tmp_path) not in said
@@ -242,8 +243,9 @@ def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned():
     assert taken["azimuth"] == 0.0
     texts = {**STATUE, "mesh": f"file:{taken['key']}"}
     with pytest.raises(BlockError, match="does not stand"):
-        explorer.case(texts)
-    assert explorer.case({**texts, "up": "-z", "azimuth": "0"}).header["block"]["body"]["name"] == "lying.stl"
+        page_answer(explorer, "case", texts)
+    turned = page_answer(explorer, "case", {**texts, "up": "-z", "azimuth": "0"})
+    assert turned.header["block"]["body"]["name"] == "lying.stl"
 
 
 def test_what_reads_meshes_may_be_missing(monkeypatch):
@@ -255,7 +257,7 @@ def test_what_reads_meshes_may_be_missing(monkeypatch):
 @pytest.fixture(scope="module")
 def page():
     with clients() as portal:
-        app = App(Explorer(), {})
+        app = App(Explorer())
         yield let_in(Client(portal, app.asgi, "http://127.0.0.1:8123"), app.new_token())
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from explorer_texts import page_answer
 
 import rocking
 from rocking.explorer.code import case_as_command, case_as_python
@@ -97,6 +98,6 @@ def test_the_name_of_a_motion_ends_no_comment():
     explorer = Explorer()
     motion = rocking.Motion.from_samples(np.sin(np.arange(50.0)), dt=0.02, name="x\nimport os\rimport sys\x0cy")
     response = rocking.simulate(rocking.Block(width=0.24, height=1.1), motion)
-    python = explorer.details(response_to_texts(response, explorer.uploads)).header["python"]
+    python = page_answer(explorer, "details", response_to_texts(response, explorer.uploads)).header["python"]
     assert "# ximport osimport sysy: the motion" in python
     assert len(ast.parse(python).body) == 6

@@ -6,12 +6,7 @@ import pytest
 
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import OptionError
-from rocking.explorer.parameters import (
-    PARAMETERS,
-    PULSES,
-    field_label,
-    specification,
-)
+from rocking.explorer.parameters import PARAMETERS, PULSES, field_label, specification
 from rocking.explorer.payload import load_english_texts
 from rocking.inputs import quantities
 from rocking.inputs.pulses import FAMILIES, named_pulse

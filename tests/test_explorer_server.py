@@ -57,7 +57,7 @@ def opened():
 
 @pytest.fixture(scope="module")
 def page(explorer, opened):
-    return opened(App(explorer, {}))
+    return opened(App(explorer))
 
 
 def unpacked(data):
@@ -116,7 +116,7 @@ def test_a_map_comes_coarse_to_fine_and_whole(page):
     (about, _), *parts = parts_of(page.get("/api/map", params={**SINE, **axes}).content)
     assert about["shape"] == [24, 24]
     assert about["outcomes"][1] == "complete"
-    assert len(about["curves"]["exact"]) == 24
+    assert len(about["curve"]) == 24
     case = read_case(SINE, UploadStore())
     threshold = min(case.block.uplift_thresholds("nonlinear"))
     assert about["case"] == pytest.approx([2.0 * math.pi * 0.3, case.motion.pga / threshold])
@@ -150,7 +150,7 @@ def test_an_instant_is_read_or_refused_by_name(page):
 def test_what_a_case_settles_on_comes_as_header_and_arrays(page):
     texts = {**SINE, "motion": "sine:amplitude=3,frequency=0.5,cycles=2"}
     header, arrays = unpacked(page.get("/api/orbit", params=texts).content)
-    assert header["offer"] is None and header["sentence"]["phrase"].startswith("orbit.")
+    assert header["offer"] is None and "orbit of" in header["sentence"]
     assert len(arrays["rotation"]) == len(arrays["velocity"]) > 1000
     header, arrays = unpacked(page.get("/api/orbit", params=STATUE).content)
     assert header["offer"]["motion"].startswith("sine:") and not arrays
@@ -169,7 +169,7 @@ def test_a_sweep_comes_coarse_to_fine_and_whole(page):
         if stride == 1:
             seen[header["direction"]] += header["indices"]
         assert 2 * len(arrays["drawn"]) == len(arrays["states"])
-    assert share == 1.0 and seen == {"up": [*range(24)], "down": [*range(23, -1, -1)]}
+    assert share == 1.0 and seen == {"up": [*range(24)], "down": [*range(24)]}
 
 
 def test_the_case_at_a_point_of_a_sweep(page):
@@ -204,7 +204,7 @@ def test_the_page_has_a_policy(page):
 
 
 def test_the_secret_is_given_once_and_required(explorer):
-    app = App(explorer, {})
+    app = App(explorer)
     with clients() as portal:
         stranger = Client(portal, app.asgi, OURS)
         paths = [route.path for route in app.asgi.routes if route.path.startswith("/api/") and route.path != EXCHANGE]
@@ -277,7 +277,7 @@ def test_an_error_names_the_field_by_its_label_and_the_argument_that_is_wrong(pa
 
 
 def test_what_went_wrong_inside_says_nothing_of_the_inside(page, explorer, monkeypatch):
-    monkeypatch.setattr(explorer, "details", lambda texts, window: 1 / 0)
+    monkeypatch.setitem(explorer._answers, "details", lambda query: 1 / 0)
     answer = page.get("/api/details", params=STATUE)
     assert answer.status_code == 500
     problem = "this could not be computed (ZeroDivisionError); please report it"
@@ -302,7 +302,7 @@ def test_a_record_is_uploaded_told_about_and_simulated(page):
 
 
 @pytest.mark.thorough
-def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
+def test_a_list_of_records_is_assessed_and_a_file_taken_out(page):
     key = page.post("/api/files", params={"name": "b_ns.txt"}, content=b"0\n1\n-1\n0\n" * 99).json()["key"]
     rows = [row for group in page.get("/api/list").json()["groups"] for row in group["rows"]]
     assert next(row for row in rows if row["key"] == key)["measures"] is None
@@ -313,10 +313,11 @@ def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
     assert page.get("/api/list").json()["usage"] == answered["usage"]
     records = "motion=el-centro-meloland-270;motion=el-centro-meloland-360"
     params = {**STATUE, "records": records, "levels": "4", "level_from": "0.2g", "level_to": "0.8g"}
-    (about, _), *found = parts_of(page.get("/api/assessment", params=params).content)
-    assert len(about["records"]) == 2 and "rocking.fragility" in about["python"]
-    shares = [header["share"] for header, _ in found]
-    assert len(shares) == 3 and shares[-1] == 1.0 and shares == sorted(shares)
+    header, arrays = unpacked(page.get("/api/assessment", params=params).content)
+    assert len(header["records"]) == 2 and "rocking.assess" in header["python"] and len(arrays["levels"]) == 4
+    report = page.get("/api/export", params={**params, "form": "report.html"})
+    assert report.content.startswith(b"<!DOCTYPE html>")
+    assert report.headers["content-type"] == "application/octet-stream"
     assert page.get("/api/assessment", params=STATUE).status_code == 422
     assert page.get("/api/remove", params={"key": key}).status_code == 200
     assert page.get("/api/remove", params={"key": key}).status_code == 422
@@ -427,7 +428,7 @@ def test_twenty_clients_at_once_are_all_answered(page):
 
 @pytest.fixture(scope="module")
 def running():
-    here = start_listening(Explorer(), {"motion": "one-sine:amplitude=0.3g,frequency=1"})
+    here = start_listening(Explorer({"motion": "one-sine:amplitude=0.3g,frequency=1"}))
     here.run_in_background()
     yield here
     here.server.should_exit = True
@@ -450,11 +451,7 @@ def test_the_server_answers_over_a_socket(running, browser):
 @pytest.mark.cases(fast=1, thorough=2)
 @pytest.mark.parametrize(
     ("path", "axes"),
-    [
-        ("map", {"x": "omega", "y": "a", "points": "400"}),
-        ("sweep", {"sweep": "a", "sweep_points": "400"}),
-        ("assessment", {"records": "motion=ridgecrest-clc-090;" * 90, "levels": "60"}),
-    ],
+    [("map", {"x": "omega", "y": "a", "points": "400"}), ("sweep", {"sweep": "a", "sweep_points": "400"})],
 )
 def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):
     base = f"http://127.0.0.1:{running.port}"
@@ -556,11 +553,7 @@ def test_the_command_prints_one_line_and_listens_here_alone():
         (("nowhere.txt",), "there is no such file"),
         (("ridgecrest-cls-090",), "did you mean the shipped record ridgecrest-clc-090"),
         (("--port", "70000"), "from 0 to 65535"),
-        (("--address", "0.0.0.0"), "every address"),
-        (("--address", "0x0"), "every address"),
-        (("--address", "::ffff:0.0.0.0"), "every address"),
         (("tests",), "this folder contains no study; pass one record, and drop the other files on the page"),
-        (("--address", "192.0.2.1"), "cannot be used"),
         (("sine:amplitude=1",), "also requires frequency and cycles"),
     ],
 )
@@ -579,10 +572,10 @@ def test_a_missing_package_is_named(run, monkeypatch):
 
 
 def test_a_port_that_is_taken_is_said_so():
-    here = start_listening(Explorer(), {})
+    here = start_listening(Explorer())
     try:
         with pytest.raises(OptionError, match="cannot be used"):
-            start_listening(Explorer(), {}, port=here.port)
+            start_listening(Explorer(), port=here.port)
     finally:
         here.socket.close()
 
@@ -603,7 +596,7 @@ def test_a_study_is_shown_and_a_point_of_it_opened(tmp_path, opened):
     with pytest.raises(StudyError, match="nothing of the study"):
         StudyView(tmp_path / "museum")
     made.run()
-    browser = opened(App(Explorer(), {"view": "map"}, StudyView(tmp_path / "museum")))
+    browser = opened(App(Explorer({"view": "map"}, StudyView(tmp_path / "museum"))))
     assert [axis["name"] for axis in browser.get("/api/start").json()["study"]["axes"]] == ["p", "alpha", "scale"]
     header, arrays = unpacked(
         browser.get("/api/study", params={"x": "p", "y": "alpha", "quantity": "overturned"}).content

@@ -6,6 +6,7 @@ import shlex
 
 import explorer_addresses
 import pytest
+from explorer_texts import page_answer
 
 from rocking.explorer.core import Explorer
 
@@ -34,8 +35,8 @@ def test_random_states_are_what_their_commands_print(explorer, run, seed, count)
     draw, judged, fates = random.Random(seed), 0, set()
     for _ in range(count):
         texts = explorer_addresses.sound(draw)
-        header = explorer.case(texts).header
-        words = shlex.split(explorer.details(texts).header["command"])
+        header = page_answer(explorer, "case", texts).header
+        words = shlex.split(page_answer(explorer, "details", texts).header["command"])
         code, out, err = run(*words[1:], "--json", "--quiet")
         assert (words[0], code, err) == ("rocking", 0, ""), texts
         result = json.loads(out)

@@ -21,7 +21,7 @@ SHAKES = {"motion", "motions", "pulse"}
 OTHER_WORDS = {"t": "time", "scale": "levels", "pga": "measure", "pgv": "measure", "sa": "measure"}
 
 #: What is built up step by step, within one call.
-CHANGING = {"Component", "Header", "OrbitEquations"}
+CHANGING = {"Header", "OrbitEquations"}
 
 #: Most parameters of one function.
 MOST = 13
@@ -95,7 +95,7 @@ def test_an_error_that_says_what_was_given_keeps_it() -> None:
                 judged += 1
                 # A literal dictionary of keywords may hold it, too.
                 assert {each.arg for each in node.exc.keywords} & {"value", None}, f"{path}, line {node.lineno}"
-    assert judged >= 70
+    assert judged >= 65
 
 
 def test_functions_take_few_parameters_in_plain_words() -> None:

@@ -171,7 +171,7 @@ def test_sines_rest_below_the_critical_amplitude(opened):
 
 @pytest.mark.browser
 def test_the_explorer_opens_on_the_page_and_both_share_the_case(built, browser):
-    server = start_listening(Explorer(), {})
+    server = start_listening(Explorer())
     server.run_in_background()
     context = browser.new_context(viewport={"width": 1280, "height": 800})
     page = Watched(context.new_page())

@@ -385,7 +385,7 @@ class Brackets:
 
 
 #: Number of simulations that take hardly longer together than one.
-_BATCH_SIZE: Final = 16
+_BATCH_SIZE: Final = 48
 
 
 def find_boundaries(

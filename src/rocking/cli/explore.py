@@ -23,7 +23,6 @@ def explore(
     *,
     port: Annotated[int, INTEGER] = 0,
     no_open: Annotated[bool, Parameter(negative="")] = False,
-    address: str = "127.0.0.1",
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
     """Open an interactive page that shows how a block rocks, chatters, comes to rest and overturns.
@@ -41,8 +40,6 @@ def explore(
         Port of the server, by default a free one.
     no_open
         Do not open a browser.
-    address
-        Address of this machine for the server. Addresses other than 127.0.0.1 can be reached from other machines.
     """
     from rocking.explorer.launch import require_packages, start_listening
 
@@ -51,10 +48,11 @@ def explore(
     from rocking.explorer.standalone import is_available
 
     explorer = Explorer()
-    is_study = motion is not None and Path(motion).is_dir()
-    study = _open_study(Path(motion)) if motion is not None and is_study else None
-    texts = {"view": "map"} if is_study else {} if motion is None else _describe_initial_motion(explorer, motion)
-    server = start_listening(explorer, texts, study, address=address, port=port)
+    if motion is not None and Path(motion).is_dir():
+        explorer.opening, explorer.study = {"view": "map"}, _open_study(Path(motion))
+    elif motion is not None:
+        explorer.opening = _describe_initial_motion(explorer, motion)
+    server = start_listening(explorer, port=port)
     path = "/block" if motion is None and is_available() else "/"
     if motion is None and path == "/":
         note("the page of the block needs WebAssembly, which was not built with this installation; the explorer opens")

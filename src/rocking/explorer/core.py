@@ -1,55 +1,129 @@
-"""Arrays, numbers and texts of a case on the page, independent of the web."""
+"""Answers to the page's requests by name, independent of the web."""
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from rocking.errors import BlockError, OptionError
-from rocking.explorer import simulated
-from rocking.explorer.code import case_as_command, case_as_python
-from rocking.explorer.inputs import read_case
+from rocking.explorer import maps, periodic, simulated
+from rocking.explorer.assessment import AssessedCase, assess_case, describe_assessment
+from rocking.explorer.catalogue import list_records, read_entries
+from rocking.explorer.code import case_as_command, case_as_python, map_as_python, sweep_as_python
+from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.meshes import describe_body
-from rocking.explorer.parameters import Texts
+from rocking.explorer.parameters import PARAMETERS, Texts, specification
 from rocking.explorer.payload import Payload
 from rocking.explorer.simulated import SimulatedCase
-from rocking.explorer.uploads import RecentCache, UploadStore, is_mesh
+from rocking.explorer.standalone import is_available
+from rocking.explorer.studies import StudyView
+from rocking.explorer.uploads import RecentCache, UploadStore, is_mesh, list_units
+from rocking.inputs.quantities import read_number
 
-#: Number of stored responses, and maximum size of their steps and motions, some hundreds of MB.
+#: Number of stored responses, and maximum size of their steps and motions, some hundreds of MB; number of assessments.
 _MAX_RESPONSES: Final = 48
 _MAX_ROWS: Final = 2_000_000
+_MAX_ASSESSMENTS: Final = 8
 
-#: File formats of figures and tables, and their content types.
-EXPORTS: Final[Mapping[str, str]] = {
-    "svg": "image/svg+xml",
-    "png": "image/png",
-    "csv": "text/csv; charset=utf-8",
-    "events.csv": "text/csv; charset=utf-8",
-    "impacts.csv": "text/csv; charset=utf-8",
-    "nc": "application/x-netcdf",
-}
+#: Tables of a response by the ending of their files, and other files of a case.
 _TABLES: Final[Mapping[str, Any]] = {"csv": "histories", "events.csv": "events", "impacts.csv": "impacts"}
+EXPORTS: Final = (*_TABLES, "nc", "svg", "png", "report.html", "assessment.nc")
+
+
+class Stream(NamedTuple):
+    """Answer in parts: a description, then the parts in the order of their computation."""
+
+    description: dict[str, Any]
+    parts: Generator[Payload]
+
+
+@dataclass(frozen=True)
+class Query:
+    """Texts of a request: those of its case, and others."""
+
+    fields: Texts
+
+    @property
+    def case(self) -> dict[str, str]:
+        """Texts of the case."""
+        return {name: self.fields[name] for name in PARAMETERS if self.fields.get(name)}
+
+    def get(self, name: str) -> str:
+        """Return a text, empty if it is missing."""
+        return self.fields.get(name, "")
+
+    def numbers(self, *names: str) -> list[float]:
+        """Return required finite numbers."""
+        numbers = [read_number(self.get(name)[:40], name) for name in names]
+        if not all(map(math.isfinite, numbers)):
+            raise OptionError(f"{' and '.join(['{}'] * len(names))} must be finite numbers", *names)
+        return numbers
+
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """Ends of a time window, s, or None if they are missing."""
+        if not (self.get("from") and self.get("to")):
+            return None
+        start, end = self.numbers("from", "to")
+        return start, end
 
 
 class Explorer:
-    """Cases by their texts, with a thread-safe cache of the last responses.
+    """Answers to requests, with a thread-safe cache of the last responses.
+
+    Parameters
+    ----------
+    opening : dict of str to str
+        Texts of the initial case.
+    study : StudyView, optional
+        Study whose maps are shown.
 
     Examples
     --------
     >>> explorer = Explorer()
-    >>> payload = explorer.case({"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"})
-    >>> payload.header["verdict"]["phrase"], payload.header["verdict"]["values"]["resting"]
-    ('verdict.stays', {'phrase': 'verdict.rests', 'values': {'count': 1}})
+    >>> query = Query({"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"})
+    >>> explorer.answer("case", query).header["rests"]
+    1
     """
 
-    def __init__(self) -> None:
+    def __init__(self, opening: Mapping[str, str] | None = None, study: StudyView | None = None) -> None:
+        self.opening, self.study = dict(opening or {}), study
         self.uploads = UploadStore()
         self._drawing = threading.Lock()
         self._simulated = RecentCache[SimulatedCase](_MAX_ROWS, _count_rows)
+        self._assessed = RecentCache[AssessedCase](_MAX_ASSESSMENTS)
+        self._answers: dict[str, Callable[[Query], Any]] = {
+            "start": self._start,
+            "case": lambda query: simulated.describe_case(self.simulate(query.case), query.window),
+            "details": self._details,
+            "at": lambda query: simulated.find_state(self.simulate(query.case), query.get("at"), query.window),
+            "export": self._export,
+            "map": self._map,
+            "map/point": lambda query: maps.map_point_to_texts(self._grid(query), *query.numbers("at_x", "at_y")),
+            "orbit": lambda query: periodic.describe_orbit(self._case(query)),
+            "sweep": self._sweep,
+            "sweep/point": self._sweep_point,
+            "assessment": lambda query: describe_assessment(self._assess(query)),
+            "list": lambda query: list_records(self.uploads, read_entries(query.get("answers"))),
+            "remove": self._remove,
+            "study": lambda query: self._require_study().slice(query.fields),
+            "study/point": lambda query: self._require_study().point_to_texts(query.fields, self.uploads),
+        }
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the requests."""
+        return tuple(self._answers)
+
+    def answer(self, name: str, query: Query) -> Any:
+        """Return the answer to a request: a payload, a stream, bytes of a file, or plain values."""
+        return self._answers[name](query)
 
     def add_file(self, name: str, data: bytes) -> dict[str, Any]:
         """Store a record or a mesh, and describe it; unreadable files are not kept."""
@@ -57,7 +131,7 @@ class Explorer:
         try:
             if not is_mesh(name):
                 return self.uploads.describe_file(key)
-            description = {"key": key, "name": self.uploads.file(key).name, "mesh": True, "azimuth": 0.0}
+            description = {"key": key, "name": self.uploads.file(key).name, "azimuth": 0.0}
             try:
                 solid = self.uploads.body(f"file:{key}", {}, None, None).solid
             except BlockError as error:
@@ -69,31 +143,20 @@ class Explorer:
             self.uploads.remove(key)
             raise
 
-    def remove(self, key: str) -> dict[str, int]:
-        """Remove a file and its responses, and return the number of remaining files."""
-        self.uploads.remove(key)
-        self._simulated.remove(f"file:{key}")
-        return self.uploads.usage()
-
     def simulate(self, texts: Texts) -> SimulatedCase:
         """Return a case with its response."""
+        return self._simulated.get(_create_key(texts), lambda: SimulatedCase.from_case(read_case(texts, self.uploads)))
 
-        def simulate_case() -> SimulatedCase:
-            case = read_case(texts, self.uploads)
-            return SimulatedCase(case, case.simulate())
+    def _start(self, _: Query) -> dict[str, Any]:
+        study = None if self.study is None else self.study.describe()
+        axes = [maps.describe_axis_kind(name) for name in maps.AXES]
+        own = {"axes": axes, "opening": self.opening, "study": study, "block_page": is_available()}
+        return specification() | own | {"record_units": list_units()}
 
-        return self._simulated.get(
-            tuple(sorted(f"{name}={value}" for name, value in texts.items() if value)), simulate_case
-        )
-
-    def case(self, texts: Texts, window: tuple[float, float] | None = None) -> Payload:
-        """Return all words on a case, and its arrays in a window (s; by default the time of its motion)."""
-        return simulated.describe_case(self.simulate(texts), window)
-
-    def details(self, texts: Texts, window: tuple[float, float] | None = None) -> Payload:
+    def _details(self, query: Query) -> Payload:
         """Return what the page shows after a pause: phase plane, ground displacement, body, summary and code."""
-        shown = self.simulate(texts)
-        payload = simulated.describe_details(shown, window)
+        shown = self.simulate(query.case)
+        payload = simulated.describe_details(shown, query.window)
         payload.header["summary"] = [(row.name, row.text) for row in shown.response.summary_rows()]
         payload.header.update(python=case_as_python(shown.case), command=case_as_command(shown.case), body=None)
         if shown.case.body is not None:
@@ -102,32 +165,79 @@ class Explorer:
             payload.arrays.update(body.arrays)
         return payload
 
-    def state(self, texts: Texts, time: str, window: tuple[float, float] | None = None) -> dict[str, Any]:
-        """Return the state of a case at a time (text), in the response of a window (s)."""
-        return simulated.find_state(self.simulate(texts), time, window)
+    def _case(self, query: Query) -> Case:
+        return read_case(query.case, self.uploads)
 
-    def export(self, texts: Texts, form: str, window: tuple[float, float] | None = None) -> bytes:
-        """Return a response as the content of a file in one of `EXPORTS`; a figure shows a window (s)."""
+    def _grid(self, query: Query) -> maps.MapGrid:
+        return maps.read_grid(self._case(query), query.fields)
+
+    def _map(self, query: Query) -> Stream:
+        grid = self._grid(query)
+        return Stream(maps.describe_map(grid) | {"python": map_as_python(grid)}, maps.simulate_grid(grid))
+
+    def _sweep(self, query: Query) -> Stream:
+        sweep = periodic.read_sweep(self._case(query), query.fields)
+        description = periodic.describe_sweep(sweep) | {"python": sweep_as_python(sweep)}
+        return Stream(description, periodic.simulate_sweep(sweep))
+
+    def _sweep_point(self, query: Query) -> dict[str, str]:
+        sweep = periodic.read_sweep(self._case(query), query.fields)
+        (value,), state = query.numbers("at"), query.numbers("u", "v") if query.get("u") else []
+        return periodic.sweep_point_to_texts(sweep, value, state)
+
+    def _assess(self, query: Query) -> AssessedCase:
+        return self._assessed.get(
+            _create_key(query.fields), lambda: assess_case(self._case(query), query.fields, self.uploads)
+        )
+
+    def _remove(self, query: Query) -> dict[str, int]:
+        """Remove a file and its responses, and return the number of remaining files."""
+        self.uploads.remove(query.get("key"))
+        for cache in (self._simulated, self._assessed):
+            cache.remove(f"file:{query.get('key')}")
+        return self.uploads.usage()
+
+    def _require_study(self) -> StudyView:
+        if self.study is None:
+            raise OptionError("no study is open: start with rocking explore FOLDER")
+        return self.study
+
+    def _export(self, query: Query) -> bytes:
+        """Return a file in one of `EXPORTS`; a figure shows a window."""
+        form = query.get("form")
         if form not in EXPORTS:
             raise OptionError(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
-        response = self.simulate(texts).response
         with tempfile.TemporaryDirectory(prefix="rocking-") as folder:
-            file = Path(folder) / f"response.{form}"
-            if form in _TABLES:
-                response.to_csv(file, _TABLES[form])
+            file = Path(folder) / f"file.{form}"
+            if form == "report.html":
+                self._assess(query).result.to_html(file)
+            elif form == "assessment.nc":
+                self._assess(query).result.to_netcdf(file)
+            elif form in _TABLES:
+                self.simulate(query.case).response.to_csv(file, _TABLES[form])
             elif form == "nc":
-                response.to_netcdf(file)
+                self.simulate(query.case).response.to_netcdf(file)
             else:
-                ends = None if window is None else simulated.check_window(window, response.duration)
                 with self._drawing:
-                    from matplotlib import rc_context
-
-                    figure = response.plot(window=ends, longest_sequence=bool(len(response.sequences)))
-                    with rc_context({"svg.hashsalt": "rocking"}):
-                        figure.savefig(file, dpi=160)
-                    if "matplotlib.pyplot" in sys.modules:
-                        sys.modules["matplotlib.pyplot"].close(figure)
+                    _draw(self.simulate(query.case), query.window, file)
             return file.read_bytes()
+
+
+def _draw(shown: SimulatedCase, window: tuple[float, float] | None, file: Path) -> None:
+    """Draw a response in a window."""
+    from matplotlib import rc_context
+
+    response = shown.response
+    ends = None if window is None else simulated.check_window(window, response.duration)
+    figure = response.plot(window=ends, longest_sequence=bool(len(response.sequences)))
+    with rc_context({"svg.hashsalt": "rocking"}):
+        figure.savefig(file, dpi=160)
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close(figure)
+
+
+def _create_key(texts: Texts) -> tuple[str, ...]:
+    return tuple(sorted(f"{name}={value}" for name, value in texts.items() if value))
 
 
 def _count_rows(shown: SimulatedCase) -> int:

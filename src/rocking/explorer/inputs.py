@@ -137,7 +137,7 @@ def require_possible(peak: float) -> None:
 def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str]:
     """Write a response as the texts of its case; the store keeps a motion that no text can name."""
     block, motion = require_block(response.block), response.motion
-    texts = _block_to_texts(block)
+    texts = block_to_texts(block)
     texts |= {"motion": "none"} if motion is None else motion_to_texts(motion, uploads)
     if response.friction is not None:
         texts["friction"] = ",".join(map(repr, dict.fromkeys(response.friction)))
@@ -154,10 +154,10 @@ def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str
     return texts
 
 
-def _block_to_texts(block: Block) -> dict[str, str]:
+def block_to_texts(block: Block) -> dict[str, str]:
     """Return the sizes of a rectangular block, else the parameters of both sides."""
     pairs = {name: [getattr(side, name) for side in block.sides] for name in ("p", "alpha", "restitution")}
-    texts = {name: ",".join(repr(value) for value in pair) for name, pair in pairs.items()}
+    texts = {name: ",".join(map(repr, dict.fromkeys(pair))) for name, pair in pairs.items()}
     if block.gravity != STANDARD_GRAVITY:
         texts["gravity"] = repr(block.gravity)
     if block.width is None or block.height is None:

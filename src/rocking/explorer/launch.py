@@ -10,11 +10,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from html import escape
 from importlib import util
-from ipaddress import IPv6Address, ip_address
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
-from rocking.core.progress import note
+from rocking.core import checks
 from rocking.core.threads import set_options
 from rocking.errors import OptionError, describe_install
 from rocking.response import Response
@@ -24,12 +23,9 @@ if TYPE_CHECKING:
 
     from rocking.explorer.core import Explorer
     from rocking.explorer.server import App
-    from rocking.explorer.studies import StudyView
 
-#: Address that only this machine can reach.
+#: Address that only this machine can reach, and maximum number of connections.
 LOCAL_ADDRESS: Final = "127.0.0.1"
-
-#: Maximum number of connections.
 _MAX_CONNECTIONS: Final = 400
 
 
@@ -46,13 +42,12 @@ class Server:
     app: App
     server: uvicorn.Server
     socket: socket.socket
-    host: str
     port: int
 
     def link(self, texts: Mapping[str, str] | None = None, *, path: str = "/") -> str:
         """Return a link that opens the page at a path once, with the texts of a case."""
         query = f"?{urlencode(texts)}" if texts else ""
-        return f"http://{self.host}:{self.port}{path}{query}#token={self.app.new_token()}"
+        return f"http://{LOCAL_ADDRESS}:{self.port}{path}{query}#token={self.app.new_token()}"
 
     def run(self) -> None:
         """Serve until interrupted."""
@@ -71,54 +66,25 @@ class Server:
             threading.Thread(target=webbrowser.open, args=(link,), daemon=True).start()
 
 
-def start_listening(
-    explorer: Explorer,
-    opening: Mapping[str, str],
-    study: StudyView | None = None,
-    *,
-    address: str = LOCAL_ADDRESS,
-    port: int = 0,
-    framed_by: str = "'none'",
-) -> Server:
-    """Bind the explorer's application to an address of this machine and a port (0: a free one)."""
+def start_listening(explorer: Explorer, *, port: int = 0, framed_by: str = "'none'") -> Server:
+    """Bind the explorer's application to a port of this machine (0: a free one)."""
     require_packages()
     import uvicorn
 
     from rocking.explorer.server import App
 
-    app, listener = App(explorer, opening, study, framed_by), _bind_socket(address, port)
-    config = uvicorn.Config(
-        app.asgi,
-        log_level="error",
-        access_log=False,
-        ws="none",
-        timeout_keep_alive=10,
-        limit_concurrency=_MAX_CONNECTIONS,
-        timeout_graceful_shutdown=1,
-    )
-    host = f"[{address}]" if ":" in address else address
-    return Server(app, uvicorn.Server(config), listener, host, listener.getsockname()[1])
-
-
-def _bind_socket(address: str, port: int) -> socket.socket:
-    if not 0 <= port <= 65535:
-        raise OptionError(f"{{}} must be a whole number from 0 to 65535, not {port}", "port", value=port)
+    checks.integer(port, "port", OptionError, 0, 65535)
     try:
-        family, _, _, _, target = socket.getaddrinfo(address or "::", port, type=socket.SOCK_STREAM)[0]
-        ip = ip_address(str(target[0]).partition("%")[0])
-        ip = (ip.ipv4_mapped if isinstance(ip, IPv6Address) else None) or ip
-        if ip.is_unspecified:
-            message = f"{{}} {address!r} is every address of this machine: name the one that others shall use"
-            raise OptionError(message, "address", value=address)
-        listener = socket.create_server(target[:2], family=family)
-    except socket.gaierror as error:
-        raise OptionError(f"{{}}: this machine has no {address} ({error.strerror})", "address", value=address) from None
+        listener = socket.create_server((LOCAL_ADDRESS, port))
     except OSError as error:
-        message = f"{{}} {port} of {address} cannot be used ({error.strerror}): choose another one"
+        message = f"{{}} {port} cannot be used ({error.strerror}): choose another one"
         raise OptionError(message, "port", value=port) from None
-    if not ip.is_loopback:
-        note(f"{address} can be reached from other machines, and what is sent is not encrypted")
-    return listener
+    app = App(explorer, framed_by)
+    config = uvicorn.Config(
+        app.asgi, log_level="error", access_log=False, ws="none", timeout_keep_alive=10,
+        limit_concurrency=_MAX_CONNECTIONS, timeout_graceful_shutdown=1,
+    )  # fmt: skip
+    return Server(app, uvicorn.Server(config), listener, listener.getsockname()[1])
 
 
 @dataclass(frozen=True)
@@ -217,7 +183,7 @@ def _get_shared_server() -> tuple[Explorer, Server]:
         if _running is None:
             explorer = Explorer()
             # notebooks served by this machine
-            server = start_listening(explorer, {}, framed_by="http://localhost:* http://127.0.0.1:*")
+            server = start_listening(explorer, framed_by="http://localhost:* http://127.0.0.1:*")
             server.run_in_background()
             _running = explorer, server
         return _running

@@ -101,6 +101,8 @@ def _add_vertical(
 
 def _read_unscaled(name: str, values: Values, uploads: UploadStore) -> WrittenMotion:
     kind, _, key = name.partition(":")
+    if corrections := [name for name in ("baseline", "highpass") if name in values and kind != "file"]:
+        raise OptionError("{} corrects the record of a file: choose one, or leave it empty", *corrections)
     if name == "none":
         return WrittenMotion(None, "None", ())
     if is_pulse(name):
@@ -122,14 +124,16 @@ def _read_unscaled(name: str, values: Values, uploads: UploadStore) -> WrittenMo
 
 def _read_file(key: str, values: Values, channel: str | None, uploads: UploadStore) -> WrittenMotion:
     """Read a channel of a file with the step and units of the texts, unless a separate vertical lacks them."""
-    options: dict[str, Any] = {name: values[name] for name in ("dt", "units") if name in values}
+    names = ("dt", "units", "baseline", "highpass")
+    options: dict[str, Any] = {"channel": channel} | {name: values[name] for name in names if name in values}
     vertical = values.get("vertical", "")
     if vertical.startswith("file:") or vertical in records.names():
-        options = {name: value for name, value in options.items() if name in uploads.describe_file(key)["missing"]}
-    file, read_options = uploads.file(key).name, {"channel": channel, "dt": None, "units": None} | options
-    arguments = written_arguments({name: value for name, value in read_options.items() if value is not None})
+        stated = {"dt", "units"} - {*uploads.describe_file(key)["missing"]}
+        options = {name: value for name, value in options.items() if name not in stated}
+    options = {name: value for name, value in options.items() if value is not None}
+    file, arguments = uploads.file(key).name, written_arguments(options)
     call = f"rocking.read({file!r}{', ' if arguments else ''}{arguments})"
-    return WrittenMotion(uploads.read(key, **read_options), call, (write_path(file),))
+    return WrittenMotion(uploads.read(key, **options), call, (write_path(file),))
 
 
 def is_pulse(text: str) -> bool:

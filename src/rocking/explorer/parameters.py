@@ -10,13 +10,14 @@ import functools
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
-from rocking.core.constants import VERSION
+from rocking.core import checks
+from rocking.core.constants import MODELS, VERSION
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import OptionError
 from rocking.explorer.payload import load_english_texts
-from rocking.inputs.declared import BLOCK_DESCRIPTIONS, INPUTS, SCALINGS, Input, index_by_name
+from rocking.inputs.declared import BLOCK_DESCRIPTIONS, INPUTS, SCALINGS, Input
 from rocking.inputs.pulses import FAMILIES
-from rocking.solid.mesh import LENGTH_UNITS as MESH_UNITS
+from rocking.inputs.quantities import read_number
 from rocking.solid.mesh import SHIPPED_MESHES
 
 Texts = Mapping[str, str]
@@ -30,44 +31,16 @@ PARAMETERS: Final = {name: declared_input for name, declared_input in INPUTS.ite
 _MAX_TEXT_LENGTH: Final = 300
 
 
-def _declare_texts(group: str, numbers: str, **texts: str) -> dict[str, Input]:
-    """Declare names of an address in order: numbers, except for some texts with their defaults."""
-    return {
-        name: Input(
-            name,
-            group,
-            "text" if name in texts else "number",
-            default=texts.get(name, "200" if "points" in name else ""),
-        )
-        for name in numbers.split()
-    }
-
-
-#: Texts for a map of a case or of a study.
-MAP: Final = _declare_texts(
-    "map",
-    "x x_from x_to y y_from y_to points quantity motion_index polarity_index scale_index "
-    "fix_p fix_alpha fix_restitution fix_block",
-    x="", y="", quantity="",
+#: Texts for a map of a case or of a study, for a diagram, and for an assessment, by name.
+MAP: Final = (
+    "x", "x_from", "x_to", "y", "y_from", "y_to", "points", "quantity",
+    *(f"{name}_index" for name in ("p", "alpha", "restitution", "block", "motion", "scale", "polarity")),
 )  # fmt: skip
-
-#: Texts for a sweep under periodic motion.
-SWEEP: Final = _declare_texts("sweep", "sweep sweep_from sweep_to sweep_points", sweep="a")
-
-#: Text for the time of a reading.
-READING: Final = index_by_name(Input("at", "reading", "duration", "", "s"))
+SWEEP: Final = ("sweep", "sweep_from", "sweep_to", "sweep_points")
+ASSESSMENT: Final = ("records", "measure", "measure_period", "level_from", "level_to", "levels")
 
 #: File name extensions of meshes.
 MESH_KINDS: Final = ("obj", "ply", "stl", "glb", "gltf")
-#: Texts for an assessment and its list of records.
-ASSESSMENT: Final = index_by_name(
-    Input("records", "assessment", "text"),
-    Input("measure", "assessment", "text", default="pga"),
-    Input("measure_period", "assessment", "duration", "", "s", "1"),
-    Input("level_from", "assessment", "acceleration", "", "g"),
-    Input("level_to", "assessment", "acceleration", "", "g"),
-    Input("levels", "assessment", default="16"),
-)
 
 #: Units of lengths, angles and accelerations on the page; the first is the default.
 SHOWN_IN: Final[Mapping[str, tuple[str, ...]]] = {
@@ -167,11 +140,22 @@ def clean_texts(texts: Texts) -> dict[str, str]:
     return {"motion": DEFAULT["motion"], **nonempty} if nonempty else dict(DEFAULT)
 
 
-def field_label(name: str, motion: str = "", texts: Mapping[str, Any] | None = None) -> str:
+def read_count(text: str, name: str, minimum: int, maximum: int) -> int:
+    """Return a whole number within a range.
+
+    Examples
+    --------
+    >>> read_count("12", "points", 8, 400)
+    12
+    """
+    number = read_number(text, name)
+    return checks.integer(int(number) if number.is_integer() else number, name, OptionError, minimum, maximum)
+
+
+def field_label(name: str, motion: str = "") -> str:
     """Return the label of an argument's field for messages, or the argument itself.
 
-    A parameter of a pulse has the label for the pulse in `motion`, or the labels of all pulses that have it. The labels
-    come from ``texts``, by default the English ones.
+    A parameter of a pulse has the label for the pulse in `motion`, or the labels of all pulses that have it.
 
     Examples
     --------
@@ -180,18 +164,12 @@ def field_label(name: str, motion: str = "", texts: Mapping[str, Any] | None = N
     >>> field_label("amplitude", "sine:amplitude=0.2g"), field_label("amplitude", "mavroeidis-papageorgiou")
     ('“Amplitude”', '“Velocity amplitude”')
     """
-    pulse_in_motion = PULSES.get(motion.partition(":")[0])
-    inputs = PARAMETERS | MAP | SWEEP | READING | ASSESSMENT | index_by_name(_PERIOD)
-    labels = load_english_texts() if texts is None else texts
-    fields = {
-        field.text
-        for pulse in (PULSES.values() if pulse_in_motion is None else [pulse_in_motion])
-        for field in pulse["parameters"]
-        if field.name == name
-    }
-    by_argument = {each.argument: each for each in inputs.values() if each.argument}
-    if (declared := inputs.get(name) or by_argument.get(name)) is not None:
-        fields = {declared.text or declared.name}
+    pulse_in_motion, labels = PULSES.get(motion.partition(":")[0]), load_english_texts()
+    pulses = PULSES.values() if pulse_in_motion is None else [pulse_in_motion]
+    fields = {field.text for pulse in pulses for field in pulse["parameters"] if field.name == name}
+    by_argument = {each.argument: each.name for each in PARAMETERS.values() if each.argument}
+    field = name if f"field.{name}" in labels else by_argument.get(name, "")
+    fields = {field} if f"field.{field}" in labels else fields
     return f"“{labels[f'field.{fields.pop()}']}”" if len(fields) == 1 else name
 
 
@@ -215,8 +193,7 @@ def specification() -> dict[str, Any]:
         },
         "meshes": [*SHIPPED_MESHES],
         "mesh_kinds": list(MESH_KINDS),
-        "mesh_units": list(MESH_UNITS),
-        "models": ["nonlinear", "linear"],
+        "models": list(MODELS),
         "treatments": list(_TREATMENTS),
         "quantities": list(QUANTITIES),
     }

@@ -48,8 +48,8 @@ def phrase(key: str, **values: Any) -> dict[str, Any]:
 
     Examples
     --------
-    >>> phrase("verdict.overturns", time=1.5)
-    {'phrase': 'verdict.overturns', 'values': {'time': 1.5}}
+    >>> phrase("sweep.period", period=2)
+    {'phrase': 'sweep.period', 'values': {'period': 2}}
     """
     return {"phrase": key, "values": values}
 
@@ -59,15 +59,15 @@ def fill_page(page: str, texts: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> fill_page("<script>TEXTS</script>", {"state.rests": "is at rest</script>"})
-    '<script>{"state.rests": "is at rest\\u003c/script>"}</script>'
+    >>> fill_page("<script>TEXTS</script>", {"sweep.still": "stays at rest</script>"})
+    '<script>{"sweep.still": "stays at rest\\u003c/script>"}</script>'
     """
     return page.replace("TEXTS", json.dumps(texts, ensure_ascii=False).replace("<", "\\u003c"), 1)
 
 
 @functools.cache
-def load_english_texts() -> dict[str, Any]:
-    """Return the English texts by key; a text with several forms is a dictionary of them."""
+def load_english_texts() -> dict[str, str]:
+    """Return the English texts by key."""
     file = resources.files("rocking.explorer") / "page" / "texts.json"
-    texts: dict[str, Any] = json.loads(file.read_text("utf-8"))
+    texts: dict[str, str] = json.loads(file.read_text("utf-8"))
     return texts

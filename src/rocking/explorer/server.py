@@ -1,16 +1,15 @@
-"""Web application: converts requests to calls of the explorer, and payloads to bytes."""
+"""Web application: passes requests to the explorer, and sends its answers."""
 
 from __future__ import annotations
 
 import hmac
-import math
 import secrets
 import struct
-from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
-from functools import cache, cached_property
+from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import cache
 from importlib import resources
-from importlib.resources.abc import Traversable
-from typing import Any, Final, NamedTuple, TypeVar
+from pathlib import PurePosixPath
+from typing import Any, Final, TypeVar
 
 import anyio
 import anyio.to_thread
@@ -20,20 +19,15 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rocking.core.tables import to_plain
-from rocking.errors import OptionError, RockingError
-from rocking.explorer import assessment, maps, periodic
-from rocking.explorer.catalogue import list_records, read_entries
-from rocking.explorer.code import map_as_python, sweep_as_python
-from rocking.explorer.core import EXPORTS, Explorer
-from rocking.explorer.inputs import Case, read_case
-from rocking.explorer.parameters import PARAMETERS, QUANTITIES, field_label, specification
+from rocking.errors import RockingError
+from rocking.explorer.core import Explorer, Query, Stream
+from rocking.explorer.parameters import field_label
 from rocking.explorer.payload import Payload, fill_page, load_english_texts, pack
-from rocking.explorer.standalone import build_page, is_available
-from rocking.explorer.studies import StudyView
+from rocking.explorer.standalone import build_page
 from rocking.explorer.uploads import MAX_FILE_SIZE, TOO_LARGE
-from rocking.inputs.quantities import read_number
 
 T = TypeVar("T")
+Handler = Callable[[Request], Awaitable[Response]]
 
 #: Path that exchanges the token of a link for the secret.
 EXCHANGE: Final = "/api/secret"
@@ -42,12 +36,9 @@ EXCHANGE: Final = "/api/secret"
 _MAX_LINKS: Final = 100
 
 #: Content types of the page's own files.
-CONTENT_TYPES: Final = {
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".svg": "image/svg+xml",
-}
+CONTENT_TYPES: Final = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
+_BINARY: Final = "application/octet-stream"
 _HEADERS: Final = {"x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-store"}
 
 _LINK_REQUIRED: Final = (
@@ -58,58 +49,18 @@ _LINK_REQUIRED: Final = (
 
 def page_files() -> dict[str, bytes]:
     """Return the page's own files by path."""
-
-    def walk(folder: Traversable, path: str) -> dict[str, bytes]:
-        files: dict[str, bytes] = {}
-        for entry in folder.iterdir():
-            files |= walk(entry, f"{path}{entry.name}/") if entry.is_dir() else {path + entry.name: entry.read_bytes()}
-        return files
-
-    return walk(resources.files("rocking.explorer") / "page", "")
-
-
-class Query:
-    """Query of an address, parsed on access."""
-
-    def __init__(self, fields: Mapping[str, str]) -> None:
-        self.fields = fields
-        self.texts = {name: fields[name] for name in PARAMETERS if fields.get(name)}
-
-    @cached_property
-    def others(self) -> dict[str, str]:
-        """All texts that do not belong to the case."""
-        return {name: value for name, value in self.fields.items() if name not in PARAMETERS}
-
-    def numbers(self, first: str, second: str) -> tuple[float, float]:
-        """Return two required finite numbers."""
-        texts = [self.fields.get(name, "")[:40] for name in (first, second)]
-        low, high = (read_number(text, name) for text, name in zip(texts, (first, second), strict=True))
-        if not (math.isfinite(low) and math.isfinite(high)):
-            raise OptionError("{} and {} must be finite numbers", first, second)
-        return low, high
-
-    @property
-    def window(self) -> tuple[float, float] | None:
-        """Ends of a time window, s, or None if they are missing."""
-        return self.numbers("from", "to") if self.fields.get("from") and self.fields.get("to") else None
-
-
-class Download(NamedTuple):
-    """File to save: its form, one of `EXPORTS`, and its content."""
-
-    form: str
-    content: bytes
-
-
-class Stream(NamedTuple):
-    """Response in parts: a description, then the parts in the order of their computation."""
-
-    description: dict[str, Any]
-    parts: Generator[Payload]
+    root = resources.files("rocking.explorer") / "page"
+    folders = ("", "standalone/")
+    return {
+        folder + entry.name: entry.read_bytes()
+        for folder in folders
+        for entry in root.joinpath(folder).iterdir()
+        if not entry.is_dir()
+    }
 
 
 class App:
-    """Application; ``opening`` contains the texts of the initial case, ``framed_by`` the pages that may frame it.
+    """Application; ``framed_by`` contains the pages that may frame it.
 
     The page and its files are the same for all users, and public. Every other request must carry the secret in its
     Authorization header. A link contains a token behind ``#``, a part that browsers never send. The page exchanges the
@@ -117,39 +68,17 @@ class App:
     it. Pages of other origins can neither read it nor send this header without permission, which is never granted.
     """
 
-    def __init__(
-        self, explorer: Explorer, opening: Mapping[str, str], study: StudyView | None = None, framed_by: str = "'none'"
-    ) -> None:
-        self.explorer, self.opening, self.study = explorer, dict(opening), study
-        self._framed_by = framed_by
+    def __init__(self, explorer: Explorer, framed_by: str = "'none'") -> None:
+        self.explorer = explorer
         self._secret, self._tokens = secrets.token_urlsafe(32), list[str]()
         self._files = page_files()
         self._html = fill_page(self._files["index.html"].decode(), load_english_texts())
-        self._page_headers = _HEADERS | {
-            "content-security-policy": "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'self'; "
-            f"img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors {framed_by}"
-        }
+        self._frames = f"frame-ancestors {framed_by}"
+        self._policy = (
+            "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+            f"base-uri 'none'; form-action 'none'; {self._frames}"
+        )
         self._threads, self._streams = anyio.CapacityLimiter(4), anyio.CapacityLimiter(2)
-        uploads = explorer.uploads
-        computations: dict[str, Callable[[Query], Any]] = {
-            "/api/start": lambda query: self._describe_page(),
-            "/api/case": lambda query: explorer.case(query.texts, query.window),
-            "/api/details": lambda query: explorer.details(query.texts, query.window),
-            "/api/at": lambda query: explorer.state(query.texts, query.fields.get("at", ""), query.window),
-            "/api/export": self._export,
-            "/api/map": self._stream_map,
-            "/api/map/point": lambda query: maps.map_point_to_texts(
-                self._read_grid(query), *query.numbers("at_x", "at_y")
-            ),
-            "/api/orbit": lambda query: periodic.describe_orbit(self._read_case(query)),
-            "/api/sweep": self._stream_sweep,
-            "/api/sweep/point": self._find_sweep_texts,
-            "/api/list": lambda query: list_records(uploads, read_entries(query.fields.get("answers", ""))),
-            "/api/remove": lambda query: explorer.remove(query.fields.get("key", "")),
-            "/api/assessment": self._stream_assessment,
-            "/api/study": lambda query: self._require_study().slice(query.others),
-            "/api/study/point": lambda query: self._require_study().point_to_texts(query.others, uploads),
-        }
         self.asgi = Starlette(
             routes=[
                 Route("/", self._send_page),
@@ -157,7 +86,7 @@ class App:
                 Route("/page/{path:path}", self._send_file),
                 Route(EXCHANGE, self._exchange, methods=["POST"]),
                 Route("/api/files", self._guard(self._receive_file), methods=["POST"]),
-                *(Route(path, self._guard(self._respond_with(compute))) for path, compute in computations.items()),
+                *(Route(f"/api/{name}", self._guard(self._answer(name))) for name in explorer.names),
             ],
             exception_handlers={RockingError: _respond_invalid, Exception: _respond_failure},
         )
@@ -169,20 +98,19 @@ class App:
         return self._tokens[-1]
 
     async def _send_page(self, _: Request) -> Response:
-        return Response(self._html, media_type="text/html", headers=self._page_headers)
+        return _respond(self._html, "text/html", {"content-security-policy": self._policy})
 
     async def _send_block(self, _: Request) -> Response:
         """Return the standalone page, which leads to this one."""
         html = await self._run_in_thread(_build_block_page)
-        headers = {**_HEADERS, "content-security-policy": f"frame-ancestors {self._framed_by}"}
-        return Response(html, media_type="text/html", headers=headers)
+        return _respond(html, "text/html", {"content-security-policy": self._frames})
 
     async def _send_file(self, request: Request) -> Response:
         path = request.path_params["path"]
-        content_type = CONTENT_TYPES.get(path[path.rfind(".") :])
+        content_type = CONTENT_TYPES.get(PurePosixPath(path).suffix)
         if content_type is None or path not in self._files:
             return Response("there is no such file", 404, _HEADERS, "text/plain")
-        return Response(self._files[path], media_type=content_type, headers=_HEADERS | {"cache-control": "no-cache"})
+        return _respond(self._files[path], content_type, {"cache-control": "no-cache"})
 
     async def _exchange(self, request: Request) -> Response:
         """Return the secret for an unused token."""
@@ -190,9 +118,9 @@ class App:
         if token is None:
             return _respond_problem(_LINK_REQUIRED, 403)
         self._tokens.remove(token)
-        return Response(self._secret, headers=_HEADERS, media_type="text/plain")
+        return _respond(self._secret, "text/plain")
 
-    def _guard(self, respond: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+    def _guard(self, respond: Handler) -> Handler:
         """Return a handler that requires the secret."""
 
         async def check(request: Request) -> Response:
@@ -200,19 +128,17 @@ class App:
 
         return check
 
-    def _respond_with(self, compute: Callable[[Query], Any]) -> Callable[[Request], Awaitable[Response]]:
-        """Return a handler that responds with a payload, a stream, a file, or plain values, computed in a thread."""
+    def _answer(self, name: str) -> Handler:
+        """Return a handler that sends the explorer's answer, computed in a thread."""
 
         async def respond(request: Request) -> Response:
-            result = await self._run_in_thread(lambda: compute(Query(request.query_params)))
-            if isinstance(result, Payload):
-                return Response(pack(result), media_type="application/octet-stream", headers=_HEADERS)
-            if isinstance(result, Stream):
-                parts = self._encode_parts(result, request.query_params.get("motion", ""))
-                return StreamingResponse(parts, media_type="application/octet-stream", headers=_HEADERS)
-            if isinstance(result, Download):
-                return Response(result.content, media_type=EXPORTS[result.form], headers=_HEADERS)
-            return JSONResponse(to_plain(result), headers=_HEADERS)
+            answer = await self._run_in_thread(lambda: self.explorer.answer(name, Query(request.query_params)))
+            if isinstance(answer, Stream):
+                parts = self._encode_parts(answer, request.query_params.get("motion", ""))
+                return StreamingResponse(parts, media_type=_BINARY, headers=_HEADERS)
+            if isinstance(answer, Payload | bytes):
+                return _respond(answer if isinstance(answer, bytes) else pack(answer), _BINARY)
+            return JSONResponse(to_plain(answer), headers=_HEADERS)
 
         return respond
 
@@ -254,47 +180,6 @@ class App:
         description = await self._run_in_thread(lambda: self.explorer.add_file(name, bytes(data)))
         return JSONResponse(to_plain(description), headers=_HEADERS)
 
-    def _describe_page(self) -> dict[str, Any]:
-        """Return the specification of the page and its initial case."""
-        study = None if self.study is None else self.study.describe()
-        own = {"axes": maps.describe_axes(), "opening": self.opening, "study": study, "block_page": is_available()}
-        return specification() | own
-
-    def _export(self, query: Query) -> Download:
-        form = query.fields.get("form", "")
-        return Download(form, self.explorer.export(query.texts, form, query.window))
-
-    def _read_case(self, query: Query) -> Case:
-        return read_case(query.texts, self.explorer.uploads)
-
-    def _read_grid(self, query: Query) -> maps.MapGrid:
-        return maps.read_grid(self._read_case(query), query.others)
-
-    def _stream_map(self, query: Query) -> Stream:
-        grid = self._read_grid(query)
-        python = {quantity: map_as_python(grid, quantity) for quantity in QUANTITIES}
-        return Stream({**maps.describe_map(grid), "python": python}, maps.simulate_grid(grid))
-
-    def _stream_sweep(self, query: Query) -> Stream:
-        sweep = periodic.read_sweep(self._read_case(query), query.others)
-        return Stream(
-            periodic.describe_sweep(sweep) | {"python": sweep_as_python(sweep)}, periodic.simulate_sweep(sweep)
-        )
-
-    def _find_sweep_texts(self, query: Query) -> dict[str, str]:
-        sweep = periodic.read_sweep(self._read_case(query), query.others)
-        state = query.numbers("u", "v") if query.fields.get("u") else None
-        return periodic.sweep_point_to_texts(sweep, query.numbers("at", "at")[0], state)
-
-    def _stream_assessment(self, query: Query) -> Stream:
-        evaluation = assessment.read_assessment(self._read_case(query), query.others, self.explorer.uploads)
-        return Stream(assessment.describe_assessment(evaluation), assessment.simulate_records(evaluation))
-
-    def _require_study(self) -> StudyView:
-        if self.study is None:
-            raise OptionError("no study is open: start with rocking explore FOLDER")
-        return self.study
-
 
 @cache
 def _build_block_page() -> str:
@@ -314,6 +199,10 @@ def _add_length(data: bytes) -> bytes:
 def _describe_error(error: RockingError, motion: str) -> dict[str, Any]:
     """Return the message of an error, with the page's names of the fields, and the argument."""
     return {"problem": error.text(lambda name: field_label(name, motion)), "argument": error.argument}
+
+
+def _respond(content: str | bytes, media_type: str, headers: dict[str, str] | None = None) -> Response:
+    return Response(content, media_type=media_type, headers=_HEADERS | (headers or {}))
 
 
 def _respond_problem(problem: str, status: int) -> Response:

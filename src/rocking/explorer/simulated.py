@@ -16,9 +16,9 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.schemes import Certified
 from rocking.errors import OptionError
 from rocking.explorer.inputs import Case
-from rocking.explorer.parameters import READING
-from rocking.explorer.payload import Payload, phrase
+from rocking.explorer.payload import Payload
 from rocking.inputs.notes import list_block_notes, list_motion_notes
+from rocking.inputs.quantities import read_duration
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.response.figure import compute_active_span, compute_boundary, find_event_times, sample_interval
@@ -53,6 +53,11 @@ class SimulatedCase:
 
     case: Case
     response: Response
+
+    @classmethod
+    def from_case(cls, case: Case) -> SimulatedCase:
+        """Simulate a case."""
+        return cls(case, case.simulate())
 
     @functools.cached_property
     def refined(self) -> Response:
@@ -113,7 +118,6 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
     share = chattering_episodes(response).share_at_rest
     header = {
         "block": {
-            "description": block.description,
             "sides": [vars(side) for side in block.sides],
             "thresholds_g": [threshold / STANDARD_GRAVITY for threshold in thresholds],
             "gravity_g": block.gravity / STANDARD_GRAVITY,
@@ -122,7 +126,6 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
             "body": None if case.body is None else case.body.plane(case.azimuth),
         },
         "motion": None if motion is None else _describe_motion(motion),
-        "model": case.model,
         "treatment": str(case.chattering),
         **{name: getattr(response, name) for name in _RESPONSE_PROPERTIES},
         "peak_over_slenderness": round_ratio(response),
@@ -130,8 +133,7 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
         "rests": int(np.sum(response.events["kind"] == "rest")),
         "proven": int(np.sum(~np.isnan(response.sequences["upper"]))),
         "share_at_rest": 0.0 if share < _MIN_SHARE else share,
-        "eta_squared": math.prod(side.restitution for side in block.sides),
-        "verdict": describe_outcome(response, thresholds),
+        "verdict": describe_outcome(response),
         "window": {
             "from": start, "to": end if end > start else start + 1.0, "impacts": len(marks),
             "unresolved": max(find_unresolved(response, start, end), default=None),
@@ -141,36 +143,18 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
     return Payload(header, {**_sample_window(case, visible, start, end, marks), **sample_events(response), **outline})
 
 
-def describe_outcome(response: Response, thresholds: tuple[float, float]) -> dict[str, Any] | str:
-    """Describe the outcome of a block with these uplift accelerations (m/s^2) in one sentence, overturning first."""
-    if response.stopped or response.lost_contact or (response.slips and response.peak_rotation == 0.0):
-        sentence = format_outcome(response, "")
-        return f"{sentence[0].upper()}{sentence[1:]}."
-    if not response.moved and response.peak_rotation == 0.0:
-        if response.motion is None:
-            return phrase("verdict.still")
-        if response.motion.vertical is not None:
-            return phrase("verdict.unlifted")
-        return phrase("verdict.below", lifting=min(thresholds))
-    perturbed = response.perturbed()
+def describe_outcome(response: Response) -> str:
+    """Describe the outcome in one sentence; a small change of the motion does not change it unless it is undecided."""
+    perturbed, ratio = response.perturbed(), round_ratio(response)
+    text = format_outcome(response, f"{response.tipping_time:.2f} s, and lies flat at {response.overturn_time:.2f} s")
     if not perturbed.is_decided:
-        return phrase("verdict.undecided", overturned=int(perturbed.overturned.sum()), count=len(perturbed.repeats))
-    rests = int(np.sum(response.events["kind"] == "rest"))
-    if response.overturned:
-        times = {"time": response.overturn_time, "balance": response.tipping_time}
-        return (
-            phrase("verdict.overturns_later", count=rests, **times) if rests else phrase("verdict.overturns", **times)
-        )
-    if response.unfinished:
-        return phrase("verdict.given_up", time=response.duration)
-    unproven = rests - int(np.sum(~np.isnan(response.sequences["upper"])))
-    rest_phrase = phrase("verdict.rests", count=rests) if rests else phrase("verdict.no_rest")
-    if unproven:
-        rest_phrase = phrase("verdict.unproven", rests=rest_phrase, unproven=unproven)
-    ratio = round_ratio(response)
-    # Two digits, or four near 100 %, where they matter.
-    ratio_phrase = phrase("verdict.percent" if ratio < 0.99 else "verdict.near_percent", value=100.0 * ratio)
-    return phrase("verdict.stays", share=ratio_phrase, resting=rest_phrase)
+        text = perturbed.describe_outcome()
+    elif response.moved and not (response.overturned or response.unfinished or response.stopped):
+        # Two digits, or four near 100 %, where they matter.
+        text = f"It {text}: it reaches {100.0 * ratio:.{2 if ratio < 0.99 else 4}g} % of the overturning rotation"
+    elif not (response.unfinished or response.stopped):
+        text = f"It {text}"
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def describe_details(shown: SimulatedCase, window: tuple[float, float] | None) -> Payload:
@@ -194,29 +178,25 @@ def describe_details(shown: SimulatedCase, window: tuple[float, float] | None) -
 
 def find_state(shown: SimulatedCase, time: str, window: tuple[float, float] | None) -> dict[str, Any]:
     """Return the state at a time (text), in the response of a window (s)."""
-    value, duration = READING["at"].read(time), shown.response.duration
+    value, duration = read_duration(time, "at"), shown.response.duration
     if not 0.0 <= value <= duration:
         message = f"{{}} must be within the response, from 0 to {duration:.6g} s, not {value:g} s"
         raise OptionError(message, "at", value=time)
     response = shown.select_response(*shown.choose_window(window))
     rotation, velocity, _ = response.states(value).tolist()
-    rests, motion = response.rest_intervals, shown.case.motion
-    is_at_rest = np.any((rests[:, 0] <= value) & (value < rests[:, 1]))
-    state = "rests" if is_at_rest else "stands" if rotation == 0.0 else "right" if rotation > 0.0 else "left"
+    motion = shown.case.motion
     components = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}
-    grounds = {
-        name: None if part is None else float(clear_rounding(part.acceleration(value), part.pga)) / STANDARD_GRAVITY
-        for name, part in components.items()
-    }
     return {
         "time": value,
-        "state": phrase(f"state.{state}"),
         "rotation": rotation,
         "over_slenderness": rotation / shown.case.block.sides[0 if rotation >= 0.0 else 1].alpha,
         "velocity": velocity,
         "energy": float(response.kinetic_energy(value) + response.potential_energy(value)),
         "slip": float(response.slip(value)) if response.friction is not None else None,
-        **grounds,
+        **{
+            name: None if part is None else float(clear_rounding(part.acceleration(value), part.pga)) / STANDARD_GRAVITY
+            for name, part in components.items()
+        },
     }
 
 
@@ -229,7 +209,6 @@ def _describe_motion(motion: Motion) -> dict[str, Any]:
         "pga_g": motion.pga / STANDARD_GRAVITY,
         "vertical": motion.vertical and {"name": motion.vertical.name, "pga_g": motion.vertical.pga / STANDARD_GRAVITY},
         "notes": list(list_motion_notes(motion)),
-        "filtered": has_drift(motion),
     }
 
 
@@ -246,14 +225,10 @@ def _describe_outline(block: Block, outline: Floats | None) -> dict[str, Any]:
 
 def check_window(window: tuple[float, float], duration: float) -> tuple[float, float]:
     """Return the ends of a window, s, within a response of this duration; reject invalid windows."""
-    start, end = window
-    if not (math.isfinite(start) and math.isfinite(end) and start < end):
-        raise OptionError("the window must go from a time to a later one, both in s", value=window)
-    start, end = max(start, 0.0), min(end, duration)
-    if not start < end:
-        raise OptionError(f"the window is outside the response, which lasts {duration:.6g} s")
-    if end - start < _MIN_WINDOW:
-        raise OptionError(f"the window is {end - start:.3g} s wide; widen it to {_MIN_WINDOW:g} s or more")
+    start, end = max(window[0], 0.0), min(window[1], duration)
+    if not end - start >= _MIN_WINDOW:
+        message = f"the window must be at least {_MIN_WINDOW:g} s wide, within the response from 0 to {duration:.6g} s"
+        raise OptionError(message, value=window)
     return start, end
 
 
@@ -312,16 +287,12 @@ def _sample_ground_acceleration(case: Case, start: float, end: float, points: in
 
 
 def sample_events(response: Response) -> dict[str, Floats]:
-    """Return the lines common to all windows: impacts with intervals, rests, uplifts, chattering sequences."""
-    intervals, ratios = _find_intervals(response)
+    """Return the lines common to all windows: impacts, rests, uplifts, chattering sequences."""
     sequences = response.sequences
     columns = [np.asarray(sequences[name], dtype=float) for name in ("start", "end", "lower", "upper", "impacts")]
     columns.append(_find_rest_spreads(response))
     return {
         "impact_time": np.asarray(response.impacts["time"], dtype=float),
-        "impact_speed": np.asarray(response.impacts["speed_after"], dtype=float),
-        "interval": intervals,
-        "ratio": ratios,
         "rest": response.rest_intervals.ravel(),
         "uplift": np.asarray(response.events["time"][response.events["kind"] == "uplift"], dtype=float),
         "sequence": np.column_stack(columns).ravel(),
@@ -335,16 +306,3 @@ def _find_rest_spreads(response: Response) -> Floats:
     rests = np.searchsorted(response.events["time"], response.sequences["end"])
     spreads = response.perturbed().event_spreads[rests]
     return np.where(spreads > response.duration, math.inf, spreads)  # undetermined
-
-
-def _find_intervals(response: Response) -> tuple[Floats, Floats]:
-    """Return the time from each impact to the next, and the ratio of the next interval but one to it (or NaN)."""
-    impact_times = np.asarray(response.impacts["time"], dtype=float)
-    intervals = np.append(np.diff(impact_times), np.nan)[: len(impact_times)]
-    uplifts = response.events["time"][response.events["kind"] == "uplift"]
-    rocking_phase = np.searchsorted(uplifts, impact_times, side="right")
-    intervals[np.flatnonzero(np.diff(rocking_phase))] = np.nan
-    ratios = np.full(len(impact_times), np.nan)
-    positive = np.where(intervals > 0.0, intervals, np.nan)
-    ratios[:-2] = positive[2:] / positive[:-2]
-    return intervals, ratios

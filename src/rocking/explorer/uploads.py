@@ -16,12 +16,11 @@ from rocking.core import checks
 from rocking.errors import BlockError, MotionError, RecordError
 from rocking.explorer.meshes import MeshBody, read_body, read_options
 from rocking.explorer.parameters import MESH_KINDS
-from rocking.inputs.notes import list_motion_notes
 from rocking.motion.motion import Motion
 from rocking.records import formats
 from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request
-from rocking.records.units import UNIT_NAMES, Unit, find_unit
+from rocking.records.units import UNIT_NAMES, find_unit
 from rocking.solid.mesh import SHIPPED_MESHES
 
 V = TypeVar("V")
@@ -170,13 +169,14 @@ class UploadStore:
                 raise RecordError("the file of {} is not here any more: open it again", argument)
             return self._files[key]
 
-    def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
+    def read(self, key: str, **options: Any) -> Motion:
         """Return the motion of a file, with the arguments of `rocking.read`."""
         upload = self.file(key)
-        request = _create_request(dt, units, channel)
+        corrections = options.get("baseline"), options.get("highpass")
+        request = _create_request(*(options.get(name) for name in ("dt", "units", "channel")))
         return self._record_motions.get(
-            (key, str(channel), str(dt), str(units)),
-            lambda: _read_channel(upload, formats.read_channel(upload.stream(), request)),
+            (key, json.dumps(options)),
+            lambda: _read_channel(upload, formats.read_channel(upload.stream(), request), *corrections),
         )
 
     def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> MeshBody:
@@ -188,73 +188,55 @@ class UploadStore:
         key = name, upload.name if upload else "", json.dumps(options)
         return self._bodies.get(key, lambda: read_body(name, upload and upload.stream(), options))
 
-    def describe_file(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
-        """Describe a file: its format, channels, and arguments that reading requires."""
+    def describe_file(self, key: str, **options: Any) -> dict[str, Any]:
+        """Describe a file, read with arguments of `rocking.read`: channels, and arguments that reading requires."""
         upload = self.file(key)
-        return self._descriptions.get((key, str(dt), str(units)), lambda: self._describe_file(key, upload, dt, units))
+        return self._descriptions.get((key, json.dumps(options)), lambda: self._describe_file(key, upload, options))
 
-    def _describe_file(self, key: str, upload: Upload, dt: float | None, units: str | None) -> dict[str, Any]:
-        options: dict[str, Any] = {"dt": dt, "units": units}
-        missing: list[str] = []
+    def _describe_file(self, key: str, upload: Upload, options: dict[str, Any]) -> dict[str, Any]:
+        options, missing = dict(options), list[str]()
+        corrections = options.pop("baseline", None), options.pop("highpass", None)
         while True:
             try:
-                identification, channels = formats.read_content(upload.stream(), _create_request(**options))
+                _, channels = formats.read_content(upload.stream(), _create_request(**options))
                 break
             except (RecordError, MotionError) as error:
                 name = error.argument
-                if name not in _PLACEHOLDERS or options[name] is not None:
+                if name not in _PLACEHOLDERS or name in options:
                     raise
                 missing.append(name)
                 options[name] = _PLACEHOLDERS[name]
-        return {
-            "key": key,
-            "name": upload.name,
-            "format": identification.format,
-            "reason": identification.reason,
-            "missing": missing,
-            "channels": [
-                {**_list_metadata(channel), **_describe_channel(_read_channel(upload, channel), missing)}
-                for channel in channels
-            ],
-        }
+        described = [
+            _describe_channel(channel, _read_channel(upload, channel, *corrections), is_complete=not missing)
+            for channel in channels
+        ]
+        return {"key": key, "name": upload.name, "missing": missing, "channels": described}
 
 
-def _list_metadata(channel: Channel) -> dict[str, Any]:
-    """Return the metadata of a channel."""
+def _describe_channel(channel: Channel, motion: Motion, *, is_complete: bool) -> dict[str, Any]:
+    """Return metadata of a channel, and its measures or raw ones, as if missing metadata were `_PLACEHOLDERS`."""
     metadata = {name: getattr(channel, name) for name in ("number", "name", "station", "event", "azimuth")}
-    return {**metadata, "samples": len(channel.acceleration), "step": channel.dt}
+    raw = {"pga": motion.pga, "duration": motion.duration}
+    measures = compute_measures(motion) if is_complete else None
+    return metadata | {"samples": len(channel.acceleration), "step": channel.dt, "raw": raw, "measures": measures}
 
 
-def _create_request(dt: float | None, units: str | None, channel: str | None = None) -> Request:
+def _create_request(dt: float | None = None, units: str | None = None, channel: str | None = None) -> Request:
     return replace(Request.create(dt, units, channel), max_samples=_MAX_FILE_SAMPLES)
 
 
-def _read_channel(upload: Upload, channel: Channel) -> Motion:
+def _read_channel(upload: Upload, channel: Channel, *corrections: Any) -> Motion:
     """Return a channel as a motion; reject motions longer than the limit of the page."""
     samples = len(channel.acceleration)
     if samples > MAX_SAMPLES:
         raise MotionError(f"{samples} samples; at most {MAX_SAMPLES} are shown here", path=upload.name)
-    return channel.motion()
+    return channel.motion(*corrections)
 
 
-def _describe_channel(motion: Motion, missing: list[str]) -> dict[str, Any]:
-    """Return likely mistakes in a channel and its measures, or the effect of each choice of missing metadata."""
-    if not missing:
-        return {"notes": list(list_motion_notes(motion)), "choices": {}, "measures": compute_measures(motion)}
-    choices: dict[str, list[tuple[str, dict[str, float]]]] = {}
-    if "units" in missing:
-        peaks = {name: motion.pga * unit.multiplier / unit.divisor for name, unit in list_units().items()}
-        choices["units"] = [(name, {"peak": peak}) for name, peak in peaks.items()]
-    if "dt" in missing:
-        steps = motion.duration / _PLACEHOLDERS["dt"]
-        choices["dt"] = [(f"{step:g}", {"lasts": steps * step}) for step in (0.002, 0.005, 0.01, 0.02)]
-    return {"notes": [], "choices": choices, "measures": None}
-
-
-def list_units() -> dict[str, Unit]:
-    """Return the units of accelerations by name, each unit once."""
+def list_units() -> dict[str, float]:
+    """Return the sizes of units of accelerations by name, m/s^2, each unit once."""
     units = {unit: name for name in reversed(UNIT_NAMES) if (unit := find_unit(name)) is not None}
-    return {name: unit for unit, name in reversed(units.items())}
+    return {name: unit.multiplier / unit.divisor for unit, name in reversed(units.items())}
 
 
 def compute_measures(motion: Motion) -> dict[str, float]:

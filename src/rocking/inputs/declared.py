@@ -202,10 +202,10 @@ INPUTS: Final = index_by_name(
         "Vertical motion, scaled alike: a channel of the same file, or another file or shipped record."),
     Input("dt", "motion", "duration", "Sampling step, 0.01 (s) or 10ms, of files that do not say theirs.", "s", "0.01"),
     Input("units", "motion", "text", "Units of files that do not say theirs: g, m/s2, cm/s2, gal, mm/s2, mg."),
-    Input("baseline", "", "text",
+    Input("baseline", "motion", "text",
         "Degree of the polynomial that is subtracted from records (0: the mean), or none. By default 0 for counts of "
         "instruments (K-NET), none for others."),
-    Input("highpass", "", "frequency", "Corner frequency of a high-pass filter of records, 0.1 (Hz)."),
+    Input("highpass", "motion", "frequency", "Corner frequency of a high-pass filter of records, 0.1 (Hz)."),
     Input("scale", "motion", "number", "Factor on the motion; negative: reversed.", "", "1", 0.1, 10.0, True),
     Input("pga", "motion", "acceleration", "Scale to this peak ground acceleration: 0.5g, 4.9m/s2 or 4.9 (m/s^2).",
         "g", "0.4g", 0.05, 2.0, True),

@@ -1,22 +1,21 @@
-// The list of records, and what they say of the block: fragility, friction, rules of thumb, and the margin of the case.
+// The list of records, and the assessment of the block under them.
 
-import {Latest, json, parts} from "./api.js";
+import {Latest, file, json, payload} from "./api.js";
 import {Chart} from "./chart.js";
 import {make, one} from "./standalone/dom.js";
 import {writeAddress} from "./state.js";
-import {NONE, fixed, short, shown, typed} from "./numbers.js";
-import {counted, phrase, say} from "./texts.js";
+import {short, typed} from "./numbers.js";
+import {counted} from "./texts.js";
 import {acceleration, axisUnit, velocity, withUnit} from "./units.js";
-import {isTyped} from "./forms.js";
 import {idOf, questions} from "./records.js";
-import {csv, figures, offer, table} from "./save.js";
+import {csv, offer} from "./save.js";
 
 /** @typedef {import("./records.js").Row} Row */
 
 const FIELDS = ["measure", "measure_period", "level_from", "level_to", "levels"];
 /** What a heading sorts by. @type {[string, (row: Row) => number | string][]} */
 const COLUMNS = [["Record", (row) => row.title], ...["pga", "pgv", "significant", "duration"].map((name) => /** @type {[string, (row: Row) => number]} */ ([{pga: "PGA", pgv: "PGV", significant: "5–95 %", duration: "Length"}[name] ?? "", (row) => row.measures?.[name] ?? -1]))];
-const RESULTS = ["Peak rotation", "Friction needed", "Levels that overturn"];
+const RESULTS = ["As it is", "Overturned first at"];
 
 export class View {
   /** @param {any} page */
@@ -24,12 +23,8 @@ export class View {
     this.page = page;
     this.list = page.list;
     this.latest = new Latest(() => this.run(), (error) => page.problem(error, "view-assess"));
-    /** @type {AbortController | null} */
-    this.running = null;
-    /** @type {any} */
-    this.about = null;
-    /** @type {any} */
-    this.last = null;
+    /** @type {import("./api.js").Payload | null} */
+    this.found = null;
     /** Results by the id of the record. @type {Map<string, any>} */
     this.results = new Map();
     /** Sorted column, and whether upwards. @type {[number, boolean] | null} */
@@ -40,7 +35,7 @@ export class View {
       if (text) assessment[name] = name.startsWith("level_") ? withUnit(text) : text; else delete assessment[name];
       if (name === "measure") for (const end of ["level_from", "level_to"]) delete assessment[end];
       this.fields();
-      if (this.about) this.update();
+      if (this.found) this.update();
     });
     one("assess").addEventListener("click", () => this.update());
     one("search").addEventListener("input", () => this.render());
@@ -55,23 +50,17 @@ export class View {
     if (this.page.state.assessment.records) this.update(); else offer([], "", null, this.page);
   }
 
-  leave() { this.running?.abort(); }
+  leave() {}
 
   /** The case has changed: results of another case are no longer shown. */
-  restart() {
-    this.running?.abort();
-    if (this.about) this.update();
-  }
+  restart() { if (this.found) this.update(); }
 
-  update() {
-    this.running?.abort();
-    void this.latest.ask();
-  }
+  update() { void this.latest.ask(); }
 
   fields() {
-    const {measure = "pga"} = this.page.state.assessment;
-    one("measure").value = measure;
-    one("measure_period").parentElement.hidden = measure !== "sa";
+    const given = /** @type {import("./api.js").Texts} */ ({measure: "pga", measure_period: "1", ...this.page.state.assessment});
+    for (const name of FIELDS) one(name).value = given[name] ?? "";
+    one("measure_period").parentElement.hidden = given.measure !== "sa";
   }
 
   remember() {
@@ -80,74 +69,29 @@ export class View {
   }
 
   async run() {
-    this.running = new AbortController();
-    const {signal} = this.running, {texts, assessment} = this.page.state;
-    document.body.dataset.assessment = "running";
     this.remember();
-    for await (const part of parts("/api/assessment", {...texts, ...assessment, records: assessment.records || ";"}, signal)) {
-      const {header} = part;
-      if (header.records) {
-        this.about = header;
-        this.last = null;
-        this.results = new Map();
-        one("assessed").hidden = false;
-        this.fill();
-        continue;
-      }
-      this.last = part;
-      if (header.row) this.results.set(this.about.ids[header.row.number], header.row);
-      one("assess-progress").value = header.share;
-      this.paint();
-    }
-    this.files();
+    const {texts, assessment} = this.page.state, given = {...texts, ...assessment, records: assessment.records || ";"}, ids = this.list.rows().filter((/** @type {Row} */ row) => this.list.has(row)).map((/** @type {Row} */ row) => idOf(row.texts));
+    document.body.dataset.assessment = "running";
+    one("assess-progress").hidden = false;
+    try {
+      const found = this.found = await payload("/api/assessment", given);
+      this.results = new Map(found.header.records.map((/** @type {any} */ row) => [ids[row.number], row]));
+    } finally { one("assess-progress").hidden = true; }
+    this.paint();
+    this.files(given);
     document.body.dataset.assessment = "complete";
   }
 
-  /** Show what the fields stand for. */
-  fill() {
-    const {measure, period, levels, python} = this.about, [scale] = axisUnit("m/s^2");
-    this.about.ids = this.list.rows().filter((/** @type {Row} */ row) => this.list.has(row)).map((/** @type {Row} */ {texts}) => idOf(texts));
-    const found = {measure, measure_period: String(period ?? 1), level_from: shown(levels[0] * scale), level_to: shown(levels[levels.length - 1] * scale), levels: String(levels.length)};
-    for (const [name, value] of Object.entries(found)) { const input = one(name); if (!isTyped(input)) input.value = value; }
-    offer([], python, null, this.page);
-  }
-
   paint() {
-    const {header: {fit, why, outcomes, margin, share}, arrays} = this.last, {levels, records, notes, label} = this.about, [scale, unit] = axisUnit("m/s^2"), rows = [...this.results.values()];
-    const by = (/** @type {ArrayLike<number>} */ values) => Array.from(values, (each) => each * scale), at = fit ? by(arrays.at) : [], all = rows.length === records.length;
+    if (!this.found) return;
+    const {header: {label, statements, failures}, arrays: {levels, share, at, probability, lower, upper}} = this.found, [scale, unit] = axisUnit("m/s^2");
+    const by = (/** @type {ArrayLike<number>} */ values) => Array.from(values, (each) => each * scale), across = at && by(at);
+    one("assessed").hidden = false;
     this.chart.show({x: {low: 0, high: 1.02 * levels[levels.length - 1] * scale, label: `${label} (${unit})`}, y: {low: -0.03, high: 1.03, label: "probability of overturning"}, layers: [
-      ...(fit?.bounded ? [{class: "band", area: [at, arrays.lower, arrays.upper]}] : []), ...(fit ? [{class: "line accent", line: [at, arrays.probability]}] : []), {class: "dot ink", dots: [by(levels), arrays.seen]},
+      ...(lower ? [{class: "band", area: [across, lower, upper]}] : []), ...(at ? [{class: "line accent", line: [across, probability]}] : []), {class: "dot ink", dots: [by(levels), share]},
     ], legend: [["line accent", "line", "fitted lognormal"], ["band", "area", "confidence band, 90 %"], ["dot ink", "dot", "share of simulations"]]});
-    const range = (/** @type {(number | null)[]} */ [low, high], /** @type {(value: number | null) => string} */ words) => `${words(low)} to ${high === null ? "∞" : words(high)}`;
-    one("fit").textContent = fit ? `Half of the records overturn the block at ${acceleration(fit.median)}${fit.bounded ? ` (${short(100 * fit.confidence)} % confidence: ${range(fit.median_interval, acceleration)})` : ""}; the dispersion is ${short(fit.dispersion)}${fit.bounded ? ` (${range(fit.dispersion_interval, (value) => fixed(value, 2))})` : ""}.`
-      : all ? say(why) : `No curve can be fitted yet: ${rows.length} of ${counted(records.length, "record")} computed.`;
-    const sentences = fit ? fit.notes.map((/** @type {string} */ note) => `${note[0].toUpperCase()}${note.slice(1)}.`) : [];
-    one("fit-notes").textContent = [fit ? `${fit.exceeded} of ${counted(outcomes, "simulation")} overturn the block, of ${counted(rows.length, "record")}${all ? "" : " so far"}.` : "", ...sentences, ...notes.map(say)].join(" ");
-    this.margins(margin, share, rows);
-    this.rules(rows);
+    one("statements").replaceChildren(...[...statements, ...failures.map((/** @type {string} */ each) => `Not assessed: ${each}`)].map((text) => make("li", {}, [text])));
     this.render();
-  }
-
-  /** Uplift, friction and margin of the case. @param {any} margin @param {number} share @param {any[]} rows */
-  margins(margin, share, rows) {
-    const {thresholds: [plus, minus], friction_to_rock: needed} = this.about, largest = rows.reduce((most, {friction_needed: each}) => Math.max(most, each ?? Infinity), 0);
-    const found = margin?.factor ? `lowest level found: ${acceleration(margin.pga)}` : margin ? `no level up to ${acceleration(margin.pga)} overturns it` : share === 1 ? "no ground motion" : "computed last";
-    figures(one("margins"), [
-      ["Uplift at the base", plus === minus ? acceleration(plus) : `${acceleration(plus)} and ${acceleration(minus)}`, "g tan α"],
-      ["Friction to rock", short(needed), "below it the block slides instead"],
-      ["Friction over the list", rows.length ? (Number.isFinite(largest) ? fixed(largest, 3) : "∞") : "…", "for sticking, records as they are"],
-      ["Margin of this case", margin?.factor ? `× ${short(margin.factor, 4)}` : NONE, found],
-    ]);
-  }
-
-  /** @param {any[]} rows */
-  rules(rows) {
-    const {rules, thresholds, overturning_velocity: sudden, case: own} = this.about, overturned = rows.filter(({overturns}) => overturns).length, first = acceleration(Math.min(...thresholds));
-    table(one("rules"), ["Rule", "This block", "This case", "The list", "Source"], rules.map((/** @type {any} */ {name, source}) => {
-      const under = rows.filter(({ratios}) => ratios[name] >= 1).length, verb = name === "uplift" ? "rocks" : "may overturn", ratio = own?.ratios[name];
-      return [make("span", {}, [make("b", {}, [phrase(`rule.${name}`)]), ` ${phrase(`rule.${name}_says`)}`]), name === "ishiyama" ? `${first} and ${velocity(0.4 * sudden)}` : first,
-        own ? `${short(ratio, 2)} ×: ${ratio >= 1 ? verb : "stands"}` : NONE, rows.length ? `${verb} under ${under} of ${rows.length}; computed: ${overturned} overturn` : "…", source];
-    }));
   }
 
   /** The list, with the results of each record. */
@@ -187,7 +131,7 @@ export class View {
     box.checked = this.list.has(row);
     const open = make("button", {type: "button", class: "link", id: `open-${id}`, disabled: !measures, "aria-current": isOwn ? "true" : null, title: "Shake the block with it", on: {click: () => this.page.restate(this.list.put(this.page.state.texts, row), "shake")}}, [title]);
     const values = measures ? [acceleration(measures.pga), velocity(measures.pgv), `${short(measures.significant)} s`, `${short(measures.duration)} s`] : ["?", "?", "?", "?"];
-    const results = !withResults ? [] : !found ? ["", "", ""] : [found.undecided ? "undecided" : found.overturns ? "overturns" : `${short(found.peak_over_slenderness)} α`, found.friction_needed === null ? "leaves the ground" : fixed(found.friction_needed, 3), `${fixed(100 * mean(found.overturned_levels), 0)} %`];
+    const results = !withResults ? [] : !found ? ["", ""] : [found.undecided ? "undecided" : found.overturned ? "overturns" : `peak ${short(found.peak_over_alpha)} α`, found.overturns_at === null ? `above ${acceleration(found.stands_up_to)}` : `${acceleration(found.stands_up_to)} to ${acceleration(found.overturns_at)}`];
     return make("tr", {}, [box, open, ...values, ...results, ""].map((cell) => make("td", {}, [cell])));
   }
 
@@ -199,14 +143,13 @@ export class View {
     this.render();
   }
 
-  files() {
-    const {python, levels, measure} = this.about, {arrays} = this.last, name = `rocking-fragility-${measure}`, plain = (/** @type {number | null} */ each) => each ?? NaN;
-    const curve = () => csv([[`${measure}_m_s2`, "probability", "lower", "upper"], ...Array.from(arrays.at ?? [], (each, k) => [Number(each), arrays.probability[k], arrays.lower[k], arrays.upper[k]])]);
-    const records = () => csv([["record", "pga_m_s2", "pgv_m_s", measure, "overturns", "peak_over_slenderness", "required_friction", ...levels.map((/** @type {number} */ each) => `overturned_at_${Number(each.toPrecision(6))}`)],
-      ...[...this.results.values()].map((row) => [this.about.records[row.number], row.pga, row.pgv, row.measure, row.undecided ? "undecided" : String(row.overturns), plain(row.peak_over_slenderness), row.friction_needed ?? Infinity, ...row.overturned_levels.map(plain)])]);
-    offer([[`${name}.svg`, "Figure, SVG", () => this.chart.file("svg")], [`${name}.png`, "Figure, PNG", () => this.chart.file("png")], [`${name}.csv`, "Curve, CSV", async () => curve()], [`${name}-records.csv`, "Records, CSV", async () => records()]], python, null, this.page);
+  /** @param {import("./api.js").Texts} given of the assessment */
+  files(given) {
+    if (!this.found) return;
+    const {header: {python, records, measure}, arrays} = this.found, name = `rocking-assessment-${measure}`, plain = (/** @type {number | null} */ each) => each ?? Infinity;
+    const curve = () => csv([[`${measure}_m_s2`, "probability", "lower", "upper"], ...Array.from(arrays.at ?? [], (each, k) => [Number(each), arrays.probability[k], arrays.lower?.[k] ?? NaN, arrays.upper?.[k] ?? NaN])]);
+    const rows = () => csv([["record", "overturns", "peak_over_slenderness", "stands_up_to_m_s2", "overturns_at_m_s2"], ...records.map((/** @type {any} */ row) => [row.name, row.undecided ? "undecided" : String(row.overturned), plain(row.peak_over_alpha), row.stands_up_to, plain(row.overturns_at)])]);
+    const whole = (/** @type {string} */ form) => () => file("/api/export", {...given, form});
+    offer([[`${name}.html`, "Report, HTML", whole("report.html")], [`${name}.nc`, "All, NetCDF", whole("assessment.nc")], [`${name}.svg`, "Figure, SVG", () => this.chart.file("svg")], [`${name}.png`, "Figure, PNG", () => this.chart.file("png")], [`${name}.csv`, "Curve, CSV", async () => curve()], [`${name}-records.csv`, "Records, CSV", async () => rows()]], python, null, this.page, "rocking assess reads the objects from a table: rocking assess --help");
   }
 }
-
-/** @param {number[]} all */
-const mean = (all) => all.reduce((sum, each) => sum + each, 0) / all.length;

@@ -216,3 +216,9 @@ export function around(all, margin = 0.06) {
   const wide = high - low || Math.abs(high) || 1;
   return {low: low - margin * wide, high: high + margin * wide};
 }
+
+/** A line with a gap after each of these points. @param {Float64Array} x @param {Float64Array} y @param {number[]} after */
+export function gaps(x, y, after) {
+  const cut = new Set(after);
+  return [x, y].map((all) => Array.from(all).flatMap((each, k) => (cut.has(k) ? [each, NaN] : [each])));
+}

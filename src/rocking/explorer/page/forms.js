@@ -174,6 +174,10 @@ export class MotionForm {
     this.motion = choice("motion", "Shaken by", [], (value) => this.another(value));
     this.vertical = choice("vertical", parameter("vertical").label, [], () => this.tell());
     this.missing = make("div");
+    this.corrections = make("details", {}, [make("summary", {}, ["Corrections"]), ...["baseline", "highpass"].map((name) => {
+      const input = make("input", {type: "text", id: name, size: 9, "data-argument": name, placeholder: name === "baseline" ? "as the format needs" : "none", on: {change: () => this.correct(name, typed(input.value))}});
+      return make("label", {class: "choice"}, [make("span", {}, [parameter(name).label]), input]);
+    })]);
     this.pulse = make("div");
     const tell = () => this.tell();
     this.starts = namesOf("start").map((name) => new Field(parameter(name), tell));
@@ -188,7 +192,7 @@ export class MotionForm {
     this.numbers = [];
     /** @type {{name: string, select: any, element: any}[]} */
     this.choices = [];
-    element.replaceChildren(this.motion.element, this.missing, this.pulse, this.vertical.element, ...this.starts.map((each) => each.element), this.scaled.element, ...this.scales.map((each) => each.element), this.period.element);
+    element.replaceChildren(this.motion.element, this.missing, this.pulse, this.vertical.element, this.corrections, ...this.starts.map((each) => each.element), this.scaled.element, ...this.scales.map((each) => each.element), this.period.element);
   }
 
   /** Fields of a pulse. @param {string} family @param {Texts} parts */
@@ -230,9 +234,11 @@ export class MotionForm {
     const row = this.list.rows().find(({texts}) => idOf(texts) === value);
     this.pulse.hidden = !isPulse;
     this.vertical.element.hidden = !row;
-    const assumed = row?.key ? this.list.answers[row.key] : undefined;
+    this.corrections.hidden = !row?.key;
+    const assumed = row?.key ? this.list.answers[row.key] : undefined, told = ["dt", "units"].map((name) => assumed?.[name]).filter(Boolean);
+    for (const name of ["baseline", "highpass"]) if (!isTyped(one(name))) one(name).value = assumed?.[name] ?? "";
     this.missing.replaceChildren(...(row ? questions([row], (rows, name, answer) => this.answer(rows, name, answer)) : []),
-      ...(row && assumed && !row.missing.length ? [make("p", {class: "soft"}, [`Read with ${Object.values(assumed).join(" and ")}. `, make("button", {type: "button", class: "link", on: {click: () => this.forget(row)}}, ["change"])])] : []));
+      ...(row && told.length && !row.missing.length ? [make("p", {class: "soft"}, [`Read with ${told.join(" and ")}. `, make("button", {type: "button", class: "link", on: {click: () => this.forget(row)}}, ["change"])])] : []));
     for (const each of this.starts) each.element.hidden = each.value() === 0 && (!isNone || each !== this.starts[0]);
     this.scaled.element.hidden = isPulse || isNone;
     for (const each of this.scales) each.element.hidden = isPulse || isNone || scaled !== each.spec.name;
@@ -263,6 +269,12 @@ export class MotionForm {
     this.wait(row);
   }
 
+  /** Correct the chosen record. @param {string} name @param {string} value */
+  correct(name, value) {
+    const row = this.list.rows().find(({texts}) => idOf(texts) === this.motion.select.value);
+    if (row) void this.answer([row], name, value);
+  }
+
   /** An answer about files. @param {import("./records.js").Row[]} rows @param {string} name @param {string} value */
   async answer(rows, name, value) {
     for (const {key} of rows) this.list.answers[key] = {...this.list.answers[key], [name]: value};
@@ -280,6 +292,7 @@ export class MotionForm {
     const texts = {...(row ? row.texts : value.startsWith("pulse:") ? {} : {motion: value.replace(/#[^#]*$/, ""), ...(this.texts.channel && idOf(this.texts) === value ? {channel: this.texts.channel} : {})})};
     if (value.startsWith("pulse:")) texts.motion = `${this.family}:${[...this.numbers.map((each) => `${each.spec.argument}=${each.text}`), ...this.choices.map((each) => `${each.name}=${each.select.value}`)].join(",")}`;
     if (this.vertical.select.value && row) texts.vertical = this.vertical.select.value;
+    if (row?.key) for (const name of ["baseline", "highpass"]) { const told = this.list.answers[row.key]?.[name]; if (told) texts[name] = told; }
     for (const each of this.starts) if (each.value() !== 0) texts[each.spec.name] = each.text;
     const control = this.scales.find(({spec}) => spec.name === scaled);
     if (control && !control.element.hidden) texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;

@@ -10,7 +10,6 @@ import {View as MapView} from "./map.js";
 import {View as Periodic} from "./periodic.js";
 import {copyButtons, figures} from "./save.js";
 import {readAddress, specification, writeAddress} from "./state.js";
-import {say} from "./texts.js";
 import {angle, caseName, ofG, unitFields} from "./units.js";
 import {short} from "./numbers.js";
 
@@ -102,7 +101,7 @@ class Page {
 
   /** @param {any} header of the case */
   summary(header) {
-    one("verdict").textContent = say(header.verdict);
+    one("verdict").textContent = header.verdict;
     figures(one("figures"), figuresOf(header));
     const sides = header.block.sides.map((/** @type {any} */ {p, alpha, restitution}, /** @type {number} */ k) => `p = ${short(p)} rad/s, α = ${angle(alpha)}, η = ${short(restitution)}; lifts above ${ofG(header.block.thresholds_g[k])}`);
     one("derived").textContent = sides[0] === sides[1] ? `${sides[0]}.` : `Right: ${sides[0]}. Left: ${sides[1]}.`;

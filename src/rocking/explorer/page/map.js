@@ -60,12 +60,11 @@ export class View {
 
   /** Fields that fix what a slice of a study does not vary. */
   studyFields() {
-    const {motions, polarities, scales, fixed} = this.study, all = {motion_index: motions, polarity_index: polarities, scale_index: scales, ...Object.fromEntries(Object.entries(fixed).map(([name, values]) => [`fix_${name}`, values]))};
-    for (const [name, values] of Object.entries(all)) {
+    for (const [axis, values] of /** @type {[string, any[]][]} */ (Object.entries(this.study.choices))) {
       if (values.length < 2) continue;
-      const select = make("select", {"data-argument": name, on: {change: () => { this.page.state.map[name] = select.value; this.update(); }}}, optionsOf(values.map((/** @type {any} */ value, /** @type {number} */ k) => [name.startsWith("fix_") ? String(value) : String(k), typeof value === "number" ? short(value, 6) : value])));
+      const name = `${axis}_index`, select = make("select", {"data-argument": name, on: {change: () => { this.page.state.map[name] = select.value; this.update(); }}}, optionsOf(values.map((/** @type {any} */ value, /** @type {number} */ k) => [String(k), typeof value === "number" ? short(value, 6) : value])));
       this.slices[name] = select;
-      one("map-tools").append(make("label", {}, [`${name.replace(/^fix_|_index$/g, "")} `, select]));
+      one("map-tools").append(make("label", {}, [`${axis} `, select]));
     }
     for (const name of [...ENDS, "points"]) one(name).parentElement.hidden = true;
     one("map-tools").prepend(make("strong", {}, [`Study ${this.study.name} `]), make("span", {class: "soft"}, [this.study.status]));
@@ -128,7 +127,6 @@ export class View {
         const at = header.case.map((/** @type {number} */ each, /** @type {number} */ k) => each * this.about[k ? "y" : "x"].scale);
         this.case = at;
         this.mark = at;
-        one("map-notes").textContent = header.notes.map(say).join(" ");
         writeAddress(this.page.state);
         this.fill(header.axes, specification.axes);
         this.files();
@@ -166,11 +164,11 @@ export class View {
     if (!names.includes(map.x)) map.x = names[0];
     if (!names.includes(map.y) || map.y === map.x) map.y = names.find((/** @type {string} */ each) => each !== map.x);
     const {header, arrays} = await payload("/api/study", {...map, quantity: this.quantity});
-    this.about = {...header, x: this.shown(header.x), y: this.shown(header.y), curves: {}};
+    this.about = {...header, x: this.shown(header.x), y: this.shown(header.y)};
     this.values = {[header.quantity]: arrays.values};
     for (const [name, select] of Object.entries(this.slices)) {
       select.value = map[name] ?? select.options[0].value;
-      select.parentElement.hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
+      select.parentElement.hidden = [map.x, map.y].some((axis) => name === `${axis}_index`);
     }
     this.fill(names, this.study.axes);
     writeAddress(this.page.state);
@@ -206,7 +204,7 @@ export class View {
 
   paint() {
     if (!this.about || !this.values[this.quantity]) return;
-    const {x, y, curves} = this.about, {colours, legend} = this.colours(), [left, right] = this.ends(x.values), [low, high] = this.ends(y.values);
+    const {x, y, curve} = this.about, {colours, legend} = this.colours(), [left, right] = this.ends(x.values), [low, high] = this.ends(y.values);
     const [across, up] = [x, y].map(({values}) => cells(values)), canvas = make("canvas", {width: across.length, height: up.length}), pen = canvas.getContext("2d"), image = pen.createImageData(across.length, up.length);
     up.forEach((row, r) => across.forEach((column, c) => {
       const ink = colours[row * x.values.length + column];
@@ -215,11 +213,11 @@ export class View {
     pen.putImageData(image, 0, 0);
     const box = this.part ?? [left, right, low, high], label = (/** @type {any} */ axis) => (axis.unit ? `${say(axis.label)} (${axis.unit})` : say(axis.label));
     const layers = [{class: "pixels", picture: canvas.toDataURL(), box: [left, right, low, high]}], mark = (/** @type {string} */ name, /** @type {number[]} */ [a, b]) => [{class: `dot ${name} around`, dots: [[a], [b]]}, {class: `dot ${name}`, dots: [[a], [b]]}];
-    const lines = Object.entries(curves ?? {}).flatMap(([name, values]) => ["curve around", `curve ${name}`].map((look) => ({class: look, line: [x.values, values.map((/** @type {number | null} */ each) => each ?? NaN)]})));
+    const lines = curve ? ["curve around", "curve exact"].map((look) => ({class: look, line: [x.values, curve]})) : [];
     this.chart.show({
       x: {low: box[0], high: box[1], label: label(x)}, y: {low: box[2], high: box[3], label: label(y)}, layers: [...layers, ...lines, ...mark("mark", this.mark), ...(this.case ? mark("case", this.case) : [])],
       legend: [...legend.map(([ink, words]) => ["swatch", "area", words, ink]), ...(this.case ? [["dot case", "dot", "this case"]] : []),
-        ...Object.keys(curves ?? {}).map((name) => ([`curve ${name}`, "line", name === "exact" ? "exact critical amplitude (slender block)" : "critical amplitude, Eq. 76"]))],
+        ...(curve ? [["curve exact", "line", "critical amplitude (slender block)"]] : [])],
     });
   }
 
@@ -305,7 +303,7 @@ export class View {
     const {python, command = null, x, y} = this.about, {quantity} = this, name = `rocking-map-${quantity}-${x.name}-${y.name}`;
     const table = () => csv([[x.name, y.name, ...Object.keys(this.values)], ...y.values.flatMap((/** @type {number} */ up, /** @type {number} */ row) => x.values.map((/** @type {number} */ right, /** @type {number} */ column) => [right / x.scale, up / y.scale, ...Object.values(this.values).map((all) => all[row * x.values.length + column])]))],
       Object.keys(this.values).flatMap((each) => { const kinds = this.kinds(each); return kinds ? [`${each}: ${kinds.map(([value, words]) => `${value} ${words}`).join("; ")}`] : []; }).concat([`units of ${x.name} and ${y.name}: ${x.own || "1"}, ${y.own || "1"}; peak is infinite where the block overturns; rest is empty where it never rests`]));
-    offer([[`${name}.svg`, "Figure, SVG", () => this.chart.file("svg")], [`${name}.png`, "Figure, PNG", () => this.chart.file("png")], [`${name}.csv`, "Numbers, CSV", async () => table()]], this.study ? python : python[quantity], command, this.page);
+    offer([[`${name}.svg`, "Figure, SVG", () => this.chart.file("svg")], [`${name}.png`, "Figure, PNG", () => this.chart.file("png")], [`${name}.csv`, "Numbers, CSV", async () => table()]], python, command, this.page);
   }
 }
 

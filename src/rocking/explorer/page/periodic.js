@@ -1,9 +1,9 @@
 // The case under a sine that never ends: its steady state in the phase plane, and a bifurcation diagram.
 
 import {Latest, json, parts, payload} from "./api.js";
-import {Chart, around} from "./chart.js";
+import {Chart, around, gaps} from "./chart.js";
 import {one} from "./standalone/dom.js";
-import {writeAddress} from "./state.js";
+import {namesOf, writeAddress} from "./state.js";
 import {amongst, short, typed} from "./numbers.js";
 import {say} from "./texts.js";
 import {acceleration} from "./units.js";
@@ -42,7 +42,7 @@ export class View {
     one("diagram").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => this.press(event));
     one("sweep-open").addEventListener("click", () => this.open());
     one("orbit-sine").addEventListener("click", () => {
-      const kept = Object.entries(page.state.texts).filter(([name]) => !["motion", "vertical", "channel", "dt", "units", "scale", "pga", "pgv", "sa"].includes(name));
+      const kept = Object.entries(page.state.texts).filter(([name]) => !namesOf("motion").includes(name));
       page.restate({...Object.fromEntries(kept), motion: this.orbit.header.offer.motion});
     });
   }
@@ -58,13 +58,13 @@ export class View {
 
   async run() {
     this.running = new AbortController();
-    const {signal} = this.running, {texts, sweep} = this.page.state, found = await payload("/api/orbit", texts), {offer: offered, sentence, about} = found.header;
+    const {signal} = this.running, {texts, sweep} = this.page.state, found = await payload("/api/orbit", texts), {offer: offered, sentence, duration} = found.header;
     if (signal.aborted) return;
     this.orbit = found;
     one("orbit").hidden = Boolean(offered);
     one("orbit-sine").hidden = !offered;
     one("orbit-verdict").textContent = offered ? "Periodic motion requires a sine as the ground motion." : say(sentence);
-    one("orbit-about").textContent = offered ? "" : say(about);
+    one("orbit-about").textContent = offered ? "" : `One period of the sine lasts ${short(duration)} s, and repeats for ever.`;
     if (offered) { one("orbit-sine").textContent = `Use the nearest sine: ${acceleration(offered.amplitude)} at ${short(offered.frequency)} Hz`; return; }
     this.drawPlane(found);
     document.body.dataset.sweep = "running";
@@ -111,10 +111,10 @@ export class View {
   }
 
   /** @param {import("./api.js").Payload} found */
-  drawPlane({header: {period}, arrays: {rotation, velocity, before, after, x, y}}) {
-    const zero = Array.from(before, () => 0);
-    this.plane.show({x: {...around([rotation, x]), label: "rotation / slenderness"}, y: {...around([velocity, before, after, y]), label: "velocity / (p · slenderness)"}, layers: [
-      {class: "zero", along: "x", rules: [0]}, {class: "zero", along: "y", rules: [0]}, {class: "line ink", line: [rotation, velocity]}, {class: "jump", segments: [zero, before, zero, after]}, {class: period ? "dot accent large" : "dot accent", dots: [x, y]},
+  drawPlane({header: {period}, arrays: {rotation, velocity, jump, x, y}}) {
+    const [zero, before, after] = [() => 0, (/** @type {number} */ k) => velocity[k], (/** @type {number} */ k) => velocity[k + 1]].map((value) => Array.from(jump, value));
+    this.plane.show({x: {...around([rotation, x]), label: "rotation / slenderness"}, y: {...around([velocity, y]), label: "velocity / (p · slenderness)"}, layers: [
+      {class: "zero", along: "x", rules: [0]}, {class: "zero", along: "y", rules: [0]}, {class: "line ink", line: gaps(rotation, velocity, Array.from(jump))}, {class: "jump", segments: [zero, before, zero, after]}, {class: period ? "dot accent large" : "dot accent", dots: [x, y]},
     ], legend: [["line ink", "line", "trajectory"], ["jump", "line", "impact"], ["dot accent", "dot", "start of each period"]]});
   }
 

@@ -7,11 +7,13 @@ import {short} from "./numbers.js";
 import {acceleration} from "./units.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{texts: Texts, title: string, label: string, is_up: boolean, measures: Record<string, number> | null, key: string, file: string, missing: string[], choices: Record<string, [string, any][]>, vertical: string}} Row */
+/** @typedef {{texts: Texts, title: string, label: string, is_up: boolean, measures: Record<string, number> | null, key: string, file: string, missing: string[], raw: {pga: number, duration: number}, vertical: string}} Row */
 
 const LARGEST = 16 * 2 ** 20;
-/** Names of the texts of a motion that belong to its record. */
-const OWN = ["motion", "channel", "vertical", "dt", "units"];
+/** Names of the texts that tell how a file is read, and of all texts of a motion that belong to its record. */
+const ANSWERS = ["dt", "units", "baseline", "highpass"], OWN = ["motion", "channel", "vertical", ...ANSWERS];
+/** Sampling steps that are offered, s. */
+const STEPS = ["0.002", "0.005", "0.01", "0.02"];
 
 /** What tells a record from others. @param {Texts} texts */
 export const idOf = ({motion, channel}) => `${motion}#${channel ?? ""}`;
@@ -36,7 +38,10 @@ export class RecordList {
     const entries = (records ?? "").split(";").filter(Boolean).map((entry) => /** @type {Texts} */ (Object.fromEntries(new URLSearchParams(entry))));
     this.ticked = records ? new Set(entries.map(idOf)) : null;
     if (records) this.rising = entries.some(({vertical}) => vertical);
-    for (const {motion = "", dt, units} of [...entries, texts]) if (dt || units) this.answers[motion.replace("file:", "")] = {...(dt && {dt}), ...(units && {units})};
+    for (const {motion = "", ...given} of [...entries, texts]) {
+      const told = Object.entries(given).filter(([name]) => ANSWERS.includes(name));
+      if (told.length && motion.startsWith("file:")) this.answers[motion.replace("file:", "")] = Object.fromEntries(told);
+    }
   }
 
   async load() {
@@ -90,13 +95,14 @@ export function questions(rows, answer) {
   return ["units", "dt"].flatMap((name) => {
     const open = [...new Map(rows.filter(({missing}) => missing.includes(name)).map((row) => [row.key, row])).values()];
     if (!open.length) return [];
-    const result = (/** @type {any} */ {peak, lasts}) => (name === "units" ? `PGA ${acceleration(peak)}` : `lasts ${short(lasts, 4)} s`);
-    const values = open[0].choices[name].map(([value]) => value), other = make("input", {type: "text", size: 6, "aria-label": "Another sampling step, s", on: {change: () => answer(open, name, other.value)}});
+    const choices = name === "units" ? Object.keys(specification.record_units) : STEPS;
+    const result = (/** @type {Row} */ {raw: {pga, duration}}, /** @type {string} */ value) => (name === "units" ? `PGA ${acceleration(pga * specification.record_units[value])}` : `lasts ${short(duration * Number(value), 4)} s`);
+    const other = make("input", {type: "text", size: 6, "aria-label": "Another sampling step, s", on: {change: () => answer(open, name, other.value)}});
     return [make("div", {class: "missing", role: "group"}, [
       make("p", {}, [`${open.length === 1 ? open[0].file : `${open.length} files`} ${name === "units" ? "without units" : "without a sampling step"}. Choose the right one:`]),
       make("table", {class: "rows"}, [
-        make("tr", {}, [make("td"), ...values.map((value) => make("th", {scope: "col"}, [make("button", {type: "button", on: {click: () => answer(open, name, value)}}, [name === "dt" ? `${value} s` : value])]))]),
-        ...open.slice(0, 8).map((row) => make("tr", {}, [make("th", {scope: "row"}, [row.file]), ...row.choices[name].map(([, found]) => make("td", {}, [result(found)]))])),
+        make("tr", {}, [make("td"), ...choices.map((value) => make("th", {scope: "col"}, [make("button", {type: "button", on: {click: () => answer(open, name, value)}}, [name === "dt" ? `${value} s` : value])]))]),
+        ...open.slice(0, 8).map((row) => make("tr", {}, [make("th", {scope: "row"}, [row.file]), ...choices.map((value) => make("td", {}, [result(row, value)]))])),
       ]),
       ...(name === "dt" ? [make("label", {}, ["another (s) ", other])] : []),
     ])];

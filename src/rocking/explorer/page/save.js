@@ -5,13 +5,13 @@ import {make, one} from "./standalone/dom.js";
 /** Words of a name as parts of a file's name. @param {string} name */
 export const slug = (name) => name.replaceAll("α", "alpha").replaceAll("°", "deg").normalize("NFKD").replace(/[^A-Za-z0-9.-]+/g, "-").replace(/[-.]+$|^-+/g, "").slice(0, 90);
 
-/** Buttons that save files, and code. @param {any[][]} files names, labels, and functions that return the contents @param {string} python @param {string | null} command @param {any} page */
-export function offer(files, python, command, page) {
+/** Buttons that save files, and code. @param {any[][]} files names, labels, and functions that return the contents @param {string} python @param {string | null} command @param {any} page @param {string} [instead] of a command */
+export function offer(files, python, command, page, instead = "No single command computes this; use the Python code.") {
   one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => {
     try { save(name, await content()); page.problem(null, "exports"); } catch (error) { page.problem(error, "exports"); }
   }}}, [label])), make("button", {type: "button", on: {click: () => window.print()}}, ["Print"]));
   one("python").textContent = python;
-  one("command").textContent = command ?? "The command line does not offer this; Python does.";
+  one("command").textContent = command ?? instead;
   /** @type {any} */ (document.querySelector("[data-copy=command]")).disabled = !command;
 }
 

@@ -1,12 +1,12 @@
 // The response of a case: the block in motion, histories, phase plane and energy, chattering; and another case to compare with.
 
 import {Latest, file, json, payload} from "./api.js";
-import {Chart, around} from "./chart.js";
+import {Chart, around, gaps} from "./chart.js";
 import {Scene, drawPlan} from "./scene.js";
 import {make, one, put} from "./standalone/dom.js";
 import {ends, writeAddress} from "./state.js";
 import {NONE, decimals, fixed, short, span, typed} from "./numbers.js";
-import {counted, say} from "./texts.js";
+import {counted} from "./texts.js";
 import {angle, axisUnit, caseName, length, ofG, treatmentName} from "./units.js";
 import {isTyped} from "./forms.js";
 import {offer, slug, table} from "./save.js";
@@ -138,7 +138,7 @@ export class Shake {
     const verdict = one("other-verdict");
     verdict.hidden = !other;
     one("keep").textContent = state.other ? "Stop comparing" : "Compare other cases with this one";
-    if (other) verdict.textContent = `Compared case (${nameOf(other.header)}): ${say(other.header.verdict)}`;
+    if (other) verdict.textContent = `Compared case (${nameOf(other.header)}): ${other.header.verdict}`;
     this.follow(this.moment());
     if (state.at !== null) void this.read.ask(String(state.at)); else one("reading").textContent = "Click on a figure, or type a time, to read the response there.";
     this.drawChattering();
@@ -226,7 +226,7 @@ export class Shake {
       `rotation ${angle(found.rotation)} = ${short(found.over_slenderness)} α`, `angular velocity ${short(found.velocity)} rad/s`, ...(found.ground_g === null ? [] : [`ground ${ofG(found.ground_g)}`]),
       ...(found.vertical_g === null ? [] : [`upwards ${ofG(found.vertical_g)}`]), `energy ${short(found.energy)} of the overturning energy`, ...(found.slip === null ? [] : [`slip ${length(found.slip)}`]),
     ];
-    one("reading").textContent = `At ${fixed(found.time, decimals(to - from))} s the block ${say(found.state)}: ${parts.join(", ")}.`;
+    one("reading").textContent = `At ${fixed(found.time, decimals(to - from))} s the block ${found.rotation ? `leans to the ${found.rotation > 0 ? "right" : "left"}` : "stands on both corners"}: ${parts.join(", ")}.`;
     one("reading").dataset.time = String(found.time);
   }
 
@@ -329,12 +329,13 @@ export class Shake {
       const proven = Number.isFinite(upper), button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; const margin = 0.06 * (end - uplift); this.go([Math.max(0, uplift - margin), end + margin]); }}}, [`Show ${k + 1}`]);
       return [button, fixed(uplift, 3), proven ? fixed(start, 4) : "not proven", fixed(end, 9), off === Infinity ? "undetermined" : Number.isFinite(off) ? `± ${span(off)}` : NONE, proven ? `± ${span(0.5 * (upper - lower))}` : NONE, fixed(count, 0)];
     }));
-    const {uplift, count} = found[this.chosen], first = arrays.impact_time.findIndex((each) => each >= uplift), number = Array.from({length: count}, (_, k) => k + 1);
-    const [interval, ratio] = [arrays.interval, arrays.ratio].map((all) => all.subarray(first, first + count)), x = {low: 0, high: count + 1, label: "impact since uplift"}, known = interval.filter((each) => each > 0);
+    const {uplift, count} = found[this.chosen], first = arrays.impact_time.findIndex((each) => each >= uplift), impacts_ = Array.from(arrays.impact_time.subarray(first, first + count));
+    const interval = impacts_.slice(1).map((each, k) => each - impacts_[k]), ratio = interval.slice(2).map((each, k) => each / interval[k]), number = interval.map((_, k) => k + 1);
+    const x = {low: 0, high: count + 1, label: "impact since uplift"}, known = interval.filter((each) => each > 0);
     if (!known.length) return;
     this.intervals.show({x, y: {low: 0.5 * Math.min(...known), high: 2 * Math.max(...known), log: true, label: "interval (s)"}, layers: [{class: "dot ink", dots: [number, interval.map((each) => (each > 0 ? each : NaN))]}]});
-    const {eta_squared: eta} = header, sorted = ratio.filter(Number.isFinite).sort(), middle = [sorted[Math.floor(0.05 * sorted.length)] ?? eta, sorted[Math.floor(0.95 * sorted.length)] ?? eta, eta];
-    this.ratios.show({x, y: {...around([middle], 0.35), label: "ratio of intervals"}, layers: [{class: "limit accent", along: "x", rules: [eta]}, {class: "dot ink", dots: [number, ratio]}], legend: [["limit accent", "line", `η² = ${short(eta, 4)}`]]});
+    const [right, left] = header.block.sides, eta = right.restitution * left.restitution, sorted = ratio.filter(Number.isFinite).sort(), middle = [sorted[Math.floor(0.05 * sorted.length)] ?? eta, sorted[Math.floor(0.95 * sorted.length)] ?? eta, eta];
+    this.ratios.show({x, y: {...around([middle], 0.35), label: "ratio of intervals"}, layers: [{class: "limit accent", along: "x", rules: [eta]}, {class: "dot ink", dots: [number.slice(0, ratio.length), ratio]}], legend: [["limit accent", "line", `η² = ${short(eta, 4)}`]]});
   }
 
   /** Ten times closer to the accumulation point. */
@@ -348,12 +349,6 @@ export class Shake {
 
 /** @param {Float64Array} all @param {number} width @returns {number[][]} */
 const rows = (all, width) => Array.from({length: all.length / width}, (_, k) => Array.from(all.subarray(k * width, (k + 1) * width)));
-
-/** A line with a gap after each of these points. @param {Float64Array} x @param {Float64Array} y @param {number[]} after */
-function gaps(x, y, after) {
-  const cut = new Set(after);
-  return [x, y].map((all) => Array.from(all).flatMap((each, k) => (cut.has(k) ? [each, NaN] : [each])));
-}
 
 /** What tells a compared case. @param {any} header */
 const nameOf = (header) => `${caseName(header)}, ${treatmentName(header.treatment).toLowerCase()}`;

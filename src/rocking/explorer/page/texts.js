@@ -6,9 +6,8 @@ import {fixed, short} from "./numbers.js";
 
 /** How quantities are written in the units of the page, by kind; units.js sets them. @type {Record<string, (value: number, digits?: number) => string>} */
 export const measures = {};
-/** @type {Record<string, string | Record<string, string>>} */
+/** @type {Record<string, string>} */
 const texts = JSON.parse(document.getElementById("texts")?.textContent ?? "{}");
-const plural = new Intl.PluralRules("en");
 
 /** Whether there is such a text. @param {string} key */
 export const known = (key) => Object.hasOwn(texts, key);
@@ -21,12 +20,8 @@ function written(value, digits, kind) {
   return kind === "g" ? short(value, Number(digits || 6)) : fixed(value, Number(digits || 0));
 }
 
-/** A text with its values; of several forms the one for the count. @param {string} key @param {Record<string, any>} [values] @returns {string} */
-export function phrase(key, values = {}) {
-  const found = texts[key] ?? key, count = Number(values.count);
-  const form = typeof found === "string" ? found : found[String(count)] ?? found[plural.select(count)] ?? found.other;
-  return form.replace(/\{(\w+)(?::\.?(\d*)([a-z]+))?\}/g, (_, name, digits, kind) => written(values[name], digits, kind));
-}
+/** A text with its values. @param {string} key @param {Record<string, any>} [values] @returns {string} */
+export const phrase = (key, values = {}) => (texts[key] ?? key).replace(/\{(\w+)(?::\.?(\d*)([a-z]+))?\}/g, (_, name, digits, kind) => written(values[name], digits, kind));
 
 /** What the server says; a sentence of the package stays as it is. @param {string | Message | null} said */
 export const say = (said) => (said === null ? "–" : typeof said === "string" ? said : phrase(said.phrase, said.values));
