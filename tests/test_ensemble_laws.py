@@ -9,9 +9,9 @@ from oracles.problem import Problem
 import rocking
 from rocking import Blocks, Motion, simulate, simulate_many
 from rocking.engine.problem import prepare_ground
-from rocking.kernels.ground import bound_stretch, component_coefficients, ground_error
+from rocking.kernels.ground import bound_stretch, ground_error, scale_coefficients
 from rocking.simulation import ensemble
-from rocking.simulation.ensemble import Scales
+from rocking.simulation.ensemble import ScalingLevels
 
 GRAVITY = 9.80665
 MODELS = pytest.mark.parametrize("model", ["linear", "nonlinear"])
@@ -76,14 +76,14 @@ def test_a_motion_times_a_factor_is_laid_out_as_the_scaled_motion(
     assert ground_error(found) == pytest.approx(ground_error(expected), rel=1e-15)
     assert (found.columns, found.first) == (expected.columns, expected.first)
     pieces = np.arange(len(found.pieces))
-    for k, scaled in enumerate(component_coefficients(found, pieces)):
-        assert_allclose(scaled, component_coefficients(expected, pieces)[k], rtol=1e-14, atol=1e-15)
+    for k, scaled in enumerate(scale_coefficients(found, pieces)):
+        assert_allclose(scaled, scale_coefficients(expected, pieces)[k], rtol=1e-14, atol=1e-15)
     assert_allclose(found.pieces[:, :2], expected.pieces[:, :2])
     for stretch in range(len(found.stretches)):
         assert_allclose(bound_stretch(found, stretch), bound_stretch(expected, stretch), rtol=1e-13, atol=1e-14)
     if errors is not None:
         (_, lifts), (_, as_it_is) = (
-            component_coefficients(each, np.arange(30)) for each in (found, prepare_ground(motion, GRAVITY))
+            scale_coefficients(each, np.arange(30)) for each in (found, prepare_ground(motion, GRAVITY))
         )
         assert np.abs(as_it_is).max() > 0.1
         assert_allclose(lifts, abs(factor) * as_it_is, rtol=1e-14)
@@ -127,7 +127,7 @@ def test_a_scale_that_makes_a_motion_too_strong_is_refused_before_anything_is_si
         with pytest.raises(rocking.errors.MotionError, match=r"must stay below 1e\+30 m/s\^2: check units and scale"):
             simulate_many(block, motion, levels=levels, measure=measure)
     assert not begun
-    assert Scales.from_levels([1.0, 4e29], "factor").factors(motion).tolist() == [1.0, 4e29]
+    assert ScalingLevels.from_levels([1.0, 4e29], "factor").factors(motion).tolist() == [1.0, 4e29]
 
 
 # --- motions that are not samples -----------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from kernel_records import in_units_of_g, numbers, one_sided, rocking_block, rul
 from oracles.taylor import System, after, coefficients, mp
 
 from rocking.kernels import arc
-from rocking.kernels.arc import converged_order, evaluate_series, expand_arc, linear_order, step_length
+from rocking.kernels.arc import evaluate_series, expand_arc, find_converged_order, find_linear_order, find_step_length
 from rocking.kernels.series import write_linear_coefficients
 from rocking.kernels.state import ORDER, Record, create_scratch
 
@@ -66,11 +66,11 @@ def linear_series(
     scratch, start = create_scratch(), state_of(0, u, v)
     scratch["ground"][: len(A)] = A
     degree = len(A) - 1
-    order = linear_order(lam, h) if degree <= 1 else ORDER
+    order = find_linear_order(lam, h) if degree <= 1 else ORDER
     body = one_sided(lam, gain, threshold, 0.5)
     write_linear_coefficients(body, start, scratch, degree, order)
     if degree > 1:
-        order = converged_order(scratch["rotation"], degree, h)
+        order = find_converged_order(scratch["rotation"], degree, h)
         if order > ORDER:
             scratch["weight"][0] = 1.0
             order, h = ORDER, arc.shorten_step(body, rules_for(), 0, scratch, (degree, 0), h)
@@ -193,9 +193,9 @@ def test_an_arc_takes_the_motion_about_its_start_and_in_the_frame_of_its_side(
 def test_a_step_from_an_impact_is_no_longer_than_its_arc_and_some_margin() -> None:
     ground = in_units_of_g([0.0, 9.0], [[0.1, 0.0]])
     block = rocking_block((2.0, 2.0), (0.2, 0.2))
-    assert step_length(ground, block, state_of(0, 0.0, 1e-3), 9.0) == pytest.approx(1.3 * 2e-3 / (4.0 * 0.3))
-    assert step_length(ground, block, state_of(0, 0.0, 1e-3), 1e-4) == 1e-4
-    assert step_length(ground, block, state_of(0, 0.0, 9.0), 9.0) == 0.5
-    assert step_length(ground, block, state_of(0, 1e-9, 1e-3), 9.0) == 0.5
+    assert find_step_length(ground, block, state_of(0, 0.0, 1e-3), 9.0) == pytest.approx(1.3 * 2e-3 / (4.0 * 0.3))
+    assert find_step_length(ground, block, state_of(0, 0.0, 1e-3), 1e-4) == 1e-4
+    assert find_step_length(ground, block, state_of(0, 0.0, 9.0), 9.0) == 0.5
+    assert find_step_length(ground, block, state_of(0, 1e-9, 1e-3), 9.0) == 0.5
     pushed = in_units_of_g([0.0, 9.0], [[-0.3, 0.0]])
-    assert step_length(pushed, block, state_of(0, 0.0, 1e-3), 9.0) == 0.5
+    assert find_step_length(pushed, block, state_of(0, 0.0, 1e-3), 9.0) == 0.5

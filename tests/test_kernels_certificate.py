@@ -21,7 +21,7 @@ from oracles import multiprecision
 from oracles.cases import between
 from oracles.problem import Problem
 
-from rocking.kernels.arc import restoring_acceleration, write_weight_series
+from rocking.kernels.arc import compute_restoring, write_weight_series
 from rocking.kernels.certificate import (
     Horizon,
     MotionBounds,
@@ -36,7 +36,7 @@ from rocking.kernels.certificate import (
     widen_for_drag,
     widen_for_error,
 )
-from rocking.kernels.ground import AccelerationBounds, bound_window, vertical_component, write_local_series
+from rocking.kernels.ground import AccelerationBounds, bound_window, select_vertical, write_local_series
 from rocking.kernels.state import create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -272,7 +272,7 @@ def test_the_restoring_acceleration_is_that_of_the_equation_of_motion(problem: P
     here = problem.acceleration(0.0) / GRAVITY
     expected = problem.restoring(0.0, 1 - 2 * side)
     size = problem.p[side] ** 2 * (problem.alpha[side] + abs(here))
-    assert restoring_acceleration(ground_of(problem), block_of(problem), side, 0, 0.0) == pytest.approx(
+    assert compute_restoring(ground_of(problem), block_of(problem), side, 0, 0.0) == pytest.approx(
         expected, abs=1e-15 * size
     )
 
@@ -311,7 +311,7 @@ def test_the_restoring_acceleration_stays_within_its_parabola_s_error(
     motion = MotionBounds(
         *(
             widen_for_error(bound_window(component, 0, 0.0, window, ANYTHING, create_scratch()["ground"]), error)
-            for component in (ground, vertical_component(ground))
+            for component in (ground, select_vertical(ground))
         )
     )
     write_local_series(ground, 0, 0.0, 1.0, scratch["ground"])

@@ -11,18 +11,18 @@ from kernel_records import ULP, in_units_of_g, long_uncompiled, numbers
 from oracles.exact import exact, polynomial
 
 from rocking.kernels.adjoint import add_moments
-from rocking.kernels.arc import significant_degree
+from rocking.kernels.arc import find_significant_degree
 from rocking.kernels.ground import (
     PIECES_PER_STRETCH,
     Ground,
-    acceleration,
-    acceleration_rate,
     bound_piece,
     bound_window,
     build_ground,
     coefficient,
+    compute_acceleration,
+    compute_acceleration_rate,
+    find_piece_beyond,
     ground_error,
-    next_piece_beyond,
     shift_polynomial,
     write_local_series,
 )
@@ -91,8 +91,8 @@ def test_the_local_series_is_the_same_polynomial_about_a_later_time(
 
 def test_what_does_not_count_within_a_step_is_dropped() -> None:
     A = np.array([1.0, 0.0, 1.0, 1e-3, 1e-30])
-    assert [significant_degree(A, 4, h) for h in (1.0, 1e-6, 1e-12)] == [3, 2, 1]
-    assert significant_degree(A, 0, 1.0) == 0
+    assert [find_significant_degree(A, 4, h) for h in (1.0, 1e-6, 1e-12)] == [3, 2, 1]
+    assert find_significant_degree(A, 0, 1.0) == 0
 
 
 @quick
@@ -102,8 +102,8 @@ def test_value_and_slope_are_those_of_the_polynomial(coefficients: list[float], 
     size = sum(abs(c) * offset**k for k, c in enumerate(coefficients))
     steepness = sum(k * abs(c) * offset ** (k - 1) for k, c in enumerate(coefficients) if k > 0)
     at = exact(offset)
-    assert abs(exact(acceleration(ground, 0, offset)) - f(at)) <= exact(2.0 * len(coefficients) * ULP * size)
-    assert abs(exact(acceleration_rate(ground, 0, offset)) - f.derivative()(at)) <= exact(
+    assert abs(exact(compute_acceleration(ground, 0, offset)) - f(at)) <= exact(2.0 * len(coefficients) * ULP * size)
+    assert abs(exact(compute_acceleration_rate(ground, 0, offset)) - f.derivative()(at)) <= exact(
         2.0 * len(coefficients) * ULP * steepness
     )
 
@@ -196,7 +196,7 @@ def piece_by_piece(ground: Ground, piece: int, offset: float, window: float) -> 
         low, high, steepest = min(low, here.low), max(high, here.high), max(steepest, here.slope)
         if window <= left:
             return np.array([low, high, steepest, jumps])
-        end = acceleration(ground, piece, float(ground.pieces[piece, 1]))
+        end = compute_acceleration(ground, piece, float(ground.pieces[piece, 1]))
         jumps += abs(float(ground.pieces[piece + 1, 2]) - end) + here.jumps
         window, piece, offset = window - left, piece + 1, 0.0
 
@@ -242,7 +242,7 @@ def test_no_piece_that_passes_the_threshold_is_passed_over(
     samples = np.array([dense(ground, k, 0.0, float(ground.pieces[k, 1]), 30)[1] for k in range(count)])
     beyond = np.append(np.max(samples, axis=1) > above, True) | np.append(np.min(samples, axis=1) < -below, True)
     for piece in random.integers(0, count + 1, size=20):
-        found = next_piece_beyond(ground, int(piece), (-below, above), (0.0, 0.0))
+        found = find_piece_beyond(ground, int(piece), (-below, above), (0.0, 0.0))
         assert piece <= found <= piece + np.argmax(beyond[piece:])
 
 
@@ -251,11 +251,11 @@ def test_stretches_without_anything_are_passed_over() -> None:
     coefficients = np.full((count, 2), [0.1, 0.0])
     coefficients[7 * PIECES_PER_STRETCH + 5, 0] = -0.5
     ground = in_units_of_g(np.arange(count + 1.0), coefficients)
-    assert next_piece_beyond(ground, 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * PIECES_PER_STRETCH
-    assert next_piece_beyond(ground, 7 * PIECES_PER_STRETCH + 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * PIECES_PER_STRETCH + 3
-    assert next_piece_beyond(ground, 8 * PIECES_PER_STRETCH, (-0.2, 0.2), (0.0, 0.0)) == count
-    assert next_piece_beyond(ground, 3, (-0.6, 0.2), (0.0, 0.0)) == count
-    assert next_piece_beyond(ground, 3, (-0.6, 0.05), (0.0, 0.0)) == 3
+    assert find_piece_beyond(ground, 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * PIECES_PER_STRETCH
+    assert find_piece_beyond(ground, 7 * PIECES_PER_STRETCH + 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * PIECES_PER_STRETCH + 3
+    assert find_piece_beyond(ground, 8 * PIECES_PER_STRETCH, (-0.2, 0.2), (0.0, 0.0)) == count
+    assert find_piece_beyond(ground, 3, (-0.6, 0.2), (0.0, 0.0)) == count
+    assert find_piece_beyond(ground, 3, (-0.6, 0.05), (0.0, 0.0)) == 3
 
 
 @pytest.mark.parametrize(("offset", "count"), [(0.0, 1), (0.0, 2), (0.7, 2), (0.7, 4), (-0.3, 6)])

@@ -18,12 +18,12 @@ from rocking.kernels.lane_steps import LANE_COUNT, step_linear, step_nonlinear, 
 from rocking.kernels.lanes import (
     MAX_SUBSTEP,
     MAX_WEIGHTED_SUBSTEP,
-    Pool,
+    SimulationPool,
     build_pool,
     clear_lane,
+    compute_stumpff,
     fill_lane,
     load_samples,
-    stumpff,
     write_lane,
 )
 from rocking.kernels.series import ValueAndSlope
@@ -45,7 +45,7 @@ def test_stumpffs_functions_are_exact_to_two_units_in_the_last_place(exponent: f
     q = sign * 10.0**exponent
     with mpmath.workdps(60):
         exact = sum(mp.mpf(q) ** j / mp.factorial(k + 2 * j) for j in range(20))
-        found = float(stumpff(k, q))
+        found = float(compute_stumpff(k, q))
         assert abs(found - exact) <= 2.0 * ULP * exact
         if exponent > -8.0:
             z = mp.sqrt(mp.mpf(q))
@@ -97,7 +97,7 @@ def stepped(
     grounds.pieces[1, LENGTH] = h + late  # beyond the rounding of the breakpoints
     blocks["overturn_angle"] = fallen
     substeps = way.substeps if way.nonlinear else 0
-    pool: Pool = build_pool(
+    pool: SimulationPool = build_pool(
         grounds, np.zeros(count, dtype=np.int64), np.ones(count), blocks, states, math.inf, substeps
     )
     before = states.copy()

@@ -11,13 +11,13 @@ from oracles.taylor import Line, Number, System, coefficients, mp
 from rocking.core.arrays import Floats
 from rocking.kernels import state
 from rocking.kernels.series import (
+    compute_nonlinear_coefficient,
+    compute_nonlinear_terms,
+    compute_weighted_coefficient,
+    compute_weighted_terms,
     expand_linear,
     expand_nonlinear,
     expand_weighted,
-    nonlinear_coefficient,
-    nonlinear_velocity_terms,
-    weighted_coefficient,
-    weighted_velocity_terms,
     write_angle_coefficients,
     write_linear_coefficients,
 )
@@ -54,7 +54,7 @@ def weighted_any_order(system: System, start: Start, push: Line, weight: Line) -
     scratch = scratch_with(push, weight)
     scratch["rotation"][:2] = start
     for k in range(ORDER - 1):
-        scratch["rotation"][k + 2] = weighted_coefficient(body(system), 0, scratch, 1, k)
+        scratch["rotation"][k + 2] = compute_weighted_coefficient(body(system), 0, scratch, 1, k)
     return list(scratch["rotation"][: ORDER + 1])
 
 
@@ -63,7 +63,7 @@ def nonlinear_any_order(system: System, start: Start, push: Line, weight: Line) 
     scratch["rotation"][:2] = start
     scratch["sine"][0], scratch["cosine"][0] = angle(system, start)
     for k in range(ORDER - 1):
-        scratch["rotation"][k + 2] = nonlinear_coefficient(system.lam, scratch, (1, 1), k)
+        scratch["rotation"][k + 2] = compute_nonlinear_coefficient(system.lam, scratch, (1, 1), k)
         write_angle_coefficients(scratch, k)
     return list(scratch["rotation"][: ORDER + 1])
 
@@ -100,19 +100,19 @@ def integrated(u: float, rates: tuple[float, ...]) -> Series:
 
 def weighted_lanes(system: System, start: Start, push: Line, weight: Line) -> Series:
     z = system.lam * start[0] - float(system.gained) * system.alpha
-    nine, *others = weighted_velocity_terms(start[1], z, system.lam, pushed(system, push), weight)
+    nine, *others = compute_weighted_terms(start[1], z, system.lam, pushed(system, push), weight)
     return integrated(start[0], (*nine, *others))
 
 
 def nonlinear_lanes(system: System, start: Start, push: Line, weight: Line) -> Series:
     return integrated(
-        start[0], nonlinear_velocity_terms(start[1], angle(system, start), -0.5 * system.lam, push, weight)[0]
+        start[0], compute_nonlinear_terms(start[1], angle(system, start), -0.5 * system.lam, push, weight)[0]
     )
 
 
 def nonlinear_lanes_at_rest(system: System, start: Start, push: Line, weight: Line) -> Series:
     return integrated(
-        start[0], nonlinear_velocity_terms(start[1], angle(system, start), -0.5 * system.lam, push, None)[0]
+        start[0], compute_nonlinear_terms(start[1], angle(system, start), -0.5 * system.lam, push, None)[0]
     )
 
 

@@ -16,7 +16,7 @@ from oracles.taylor import System, after
 from rocking.kernels.arc import evaluate_series, expand_arc
 from rocking.kernels.events import StepEnd, advance_to_event
 from rocking.kernels.series import ValueAndSlope
-from rocking.kernels.short_arc import short_step
+from rocking.kernels.short_arc import take_short_step
 from rocking.kernels.state import Record, StepOutcome, create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -48,7 +48,7 @@ class Case:
         self.scratch = create_scratch()
 
     def short(self, start: Record, left: float) -> StepEnd:
-        return short_step(self.ground, self.block, self.rules, start, left)
+        return take_short_step(self.ground, self.block, self.rules, start, left)
 
     def long(self, start: Record, left: float) -> tuple[StepEnd, float]:
         """StepEnd, and how far the series reaches."""

@@ -13,9 +13,9 @@ from oracles.problem import Problem
 import rocking
 from rocking.core.constants import Model
 from rocking.kernels import state
-from rocking.kernels.arc import restoring_acceleration
+from rocking.kernels.arc import compute_restoring
 from rocking.kernels.state import Record
-from rocking.kernels.trace import Quantity, Trail, rest_shift
+from rocking.kernels.trace import Quantity, Trail, compute_rest_shift
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -49,13 +49,13 @@ def test_the_shift_of_the_rest_is_its_derivative_by_what_is_changed(model: str, 
         return multiprecision.rest_time(changed, start + strength * shift, 1 - 2 * side, v + strength * faster)
 
     block = block_of(problem)
-    dv = faster + restoring_acceleration(ground_of(problem), block, side, 0, start) * shift
+    dv = faster + compute_restoring(ground_of(problem), block, side, 0, start) * shift
     trail = Trail(
         ground_of(problem), block, rules_for(nonlinear=model == "nonlinear"), state.create_records(0, state.NODE_ROW)
     )
     # What happens to the speed at the impact itself is in dv.
     node, later = node_of(side, 0.0, v, start), node_of(state.AT_REST, 0.0, 0.0, start + 1e-4)
-    found = rest_shift(trail, node, what, (dv, shift, 0.0, 0.0), later)
+    found = compute_rest_shift(trail, node, what, (dv, shift, 0.0, 0.0), later)
     slope = float((rest(step) - rest(-step)) / (2.0 * step))
     assert found - shift == pytest.approx(slope - shift, rel=1e-3)
 

@@ -99,7 +99,7 @@ def test_a_motion_is_scaled_to_a_level_of_every_measure(name: Any, component: An
     assert scaled.orthogonal is not None and motion.orthogonal is not None
     factor = scaled.pga / motion.pga
     assert scaled.orthogonal.pga == pytest.approx(factor * motion.orthogonal.pga, rel=1e-12)
-    again = rocking.simulation.ensemble.Scales.from_levels([1.7], measure).factors(motion)
+    again = rocking.simulation.ensemble.ScalingLevels.from_levels([1.7], measure).factors(motion)
     assert again == pytest.approx([factor], rel=1e-9)
 
 

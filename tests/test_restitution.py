@@ -11,7 +11,7 @@ import rocking
 from rocking import Block, Restitution, RestrainedBlock, dynamics, impact_restitution, one_sided_restitution
 from rocking.block.sides import housner_restitution
 from rocking.errors import BlockError, OptionError
-from rocking.kernels.events import draw_uniform, restitution_factor
+from rocking.kernels.events import compute_restitution_factor, draw_uniform
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -116,7 +116,7 @@ def test_draws_are_those_of_philox():
 def test_draws_are_even_between_their_bounds():
     block = rocking_block(e=(0.9, 0.8))
     block["variable_restitution"], block["seed"], block["min_restitution"] = True, 7, (0.5, 0.6)
-    draws = np.array([restitution_factor(block, 0, 1.0, n) for n in range(2_000)])
+    draws = np.array([compute_restitution_factor(block, 0, 1.0, n) for n in range(2_000)])
     assert draws.min() >= 0.5
     assert draws.max() <= 0.9
     assert np.histogram(draws, 8, (0.5, 0.9))[0] == pytest.approx([250.0] * 8, abs=60)

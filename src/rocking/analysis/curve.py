@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rocking.analysis import probit
 from rocking.analysis.levels import compute_block_units
-from rocking.analysis.probit import Outcomes, Probit, compute_normal_scores, compute_probabilities
+from rocking.analysis.probit import ExceedanceCounts, Probit, compute_normal_scores, compute_probabilities
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, unwrap_scalar
@@ -209,7 +209,7 @@ def fit_curve(
     # Both are sums of the same weights, but perhaps in a different order.
     exceeded = np.where(np.abs(trials - exceeded) <= 1e-12 * trials, trials, exceeded)
     z = np.log(intensity)
-    outcomes = Outcomes(z, exceeded, trials)
+    outcomes = ExceedanceCounts(z, exceeded, trials)
     if message := probit.explain_missing_fit(outcomes, measure.format_value):
         raise FitError(f"no lognormal can be fitted to {name!r}: {message}")
     fitted = probit.fit(outcomes.as_batch())

@@ -21,7 +21,7 @@ from rocking.errors import BlockError, OptionError
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.named import list_motions
-from rocking.simulation.ensemble import Scales, simulate_many
+from rocking.simulation.ensemble import ScalingLevels, simulate_many
 from rocking.solid.rose import check_azimuths
 from rocking.solid.solid import Solid
 
@@ -106,7 +106,7 @@ def response_rose(
         raise BlockError(f"a Solid is required, not a {kind}; create one with rocking.Solid.from_mesh")
     named_pairs = _name_pairs(pairs)
     angles = np.arange(0.0, 180.0, 15.0) if azimuths is None else check_azimuths(azimuths)
-    scales = Scales.from_levels(levels, measure)
+    scales = ScalingLevels.from_levels(levels, measure)
     blocks = [solid.block(azimuth, restitution=restitution) for azimuth in angles]
     factors = np.array([_compute_pair_factors(scales, pair) for pair in named_pairs.values()])
     shape = (len(named_pairs), scales.count, len(angles))
@@ -245,7 +245,7 @@ def _name_pairs(pairs: Pairs) -> dict[str, Pair]:
     return {key: (first, second) for key, (first, second) in zip(keys, lists, strict=True)}
 
 
-def _compute_pair_factors(scales: Scales, pair: Pair) -> Any:
+def _compute_pair_factors(scales: ScalingLevels, pair: Pair) -> Any:
     """Compute factors that scale the geometric mean of the measures of both components to the levels."""
     if scales.measure is None:
         return scales.values

@@ -22,7 +22,7 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, create_variable, format_some_rows
 from rocking.core.tables import add_unit, columns_to_records, escape_dollars, format_cell, format_table
 from rocking.engine.schemes import Certified
-from rocking.engine.tasks import OUTCOME, Setup, simulate_each
+from rocking.engine.tasks import OUTCOME_DTYPE, Setup, simulate_each
 from rocking.errors import MotionError, OptionError
 from rocking.inputs.pulses import find_family
 from rocking.motion.motion import Motion
@@ -196,7 +196,7 @@ def overturning_map(
         column: Integers, level: Floats, advance: Callable[[int], None] = lambda count: None
     ) -> tuple[Integers, Floats]:
         """Simulate the block of each column at its level, and return modes and peak rotations."""
-        results = np.empty(column.size, dtype=OUTCOME)
+        results = np.empty(column.size, dtype=OUTCOME_DTYPE)
         for k, outcomes in simulate_each(setup, [unit], column, np.zeros_like(column), threshold * level):
             results[k] = outcomes
             advance(len(outcomes))

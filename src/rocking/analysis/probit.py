@@ -36,20 +36,20 @@ _RAY_TOLERANCE: Final = 1e-9
 MIN_CLUSTERS: Final = 3
 
 
-class Outcomes(NamedTuple):
+class ExceedanceCounts(NamedTuple):
     """Numbers of exceedances and trials at n logarithms of the intensity, for one or several data sets."""
 
     z: Floats
     exceeded: Floats
     trials: Floats
 
-    def as_batch(self) -> Outcomes:
+    def as_batch(self) -> ExceedanceCounts:
         """Return one data set with an additional dimension of length 1."""
-        return Outcomes(self.z, self.exceeded[None, :], self.trials[None, :])
+        return ExceedanceCounts(self.z, self.exceeded[None, :], self.trials[None, :])
 
-    def select(self, is_selected: Flags) -> Outcomes:
+    def select(self, is_selected: Flags) -> ExceedanceCounts:
         """Return selected data sets."""
-        return Outcomes(self.z, self.exceeded[is_selected], self.trials[is_selected])
+        return ExceedanceCounts(self.z, self.exceeded[is_selected], self.trials[is_selected])
 
 
 class Probit(NamedTuple):
@@ -147,7 +147,7 @@ def merge_equal_intensities(intensity: Floats) -> Floats:
     return merged
 
 
-def explain_missing_fit(data: Outcomes, format_intensity: Callable[[float], str]) -> str | None:
+def explain_missing_fit(data: ExceedanceCounts, format_intensity: Callable[[float], str]) -> str | None:
     """Explain why no rising lognormal fits a data set, or return None if one does."""
     z, exceeded, trials = data
     exceeded_z, other_z, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
@@ -173,7 +173,7 @@ def explain_missing_fit(data: Outcomes, format_intensity: Callable[[float], str]
     return None
 
 
-def fit(data: Outcomes) -> Probit:
+def fit(data: ExceedanceCounts) -> Probit:
     """Fit several data sets that have one (`explain_missing_fit`) by maximum likelihood (Fisher's scoring)."""
     centre, spread = data.z.mean(), data.z.std()
     scaled = data._replace(z=(data.z - centre) / spread)
@@ -197,7 +197,7 @@ def fit(data: Outcomes) -> Probit:
     return Probit(beta[:, 0] - slope * centre, slope)
 
 
-def fit_or_limits(data: Outcomes) -> Probit:
+def fit_or_limits(data: ExceedanceCounts) -> Probit:
     """Fit several data sets, with the limit of rising curves if their likelihood has no maximum."""
     from scipy.special import ndtri
 
@@ -213,7 +213,7 @@ def fit_or_limits(data: Outcomes) -> Probit:
     return fits
 
 
-def compute_log_likelihood(data: Outcomes, beta: Floats) -> Floats:
+def compute_log_likelihood(data: ExceedanceCounts, beta: Floats) -> Floats:
     """Compute the log-likelihood of parameters (fits, 2), without binomial coefficients."""
     from scipy.special import log_ndtr
 
@@ -225,7 +225,7 @@ def compute_log_likelihood(data: Outcomes, beta: Floats) -> Floats:
     return total
 
 
-def compute_covariance(data: Outcomes, fitted: Probit) -> Floats:
+def compute_covariance(data: ExceedanceCounts, fitted: Probit) -> Floats:
     """Compute the inverse of Fisher's expected information of intercept and slope for one fit, shape (2, 2)."""
     scaled, scaled_fit, centre, spread = _standardise(data, fitted)
     information = _differentiate(scaled.as_batch(), np.column_stack(scaled_fit))[1][0]
@@ -233,7 +233,7 @@ def compute_covariance(data: Outcomes, fitted: Probit) -> Floats:
     return np.asarray(transform @ np.linalg.inv(information) @ transform.T, dtype=np.float64)
 
 
-def _standardise(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
+def _standardise(data: ExceedanceCounts, fitted: Probit) -> tuple[ExceedanceCounts, Probit, float, float]:
     """Standardise z in data and fits for accuracy, and return mean and deviation of z as well."""
     centre, spread = float(data.z.mean()), float(data.z.std())
     scaled = data._replace(z=(data.z - centre) / spread)
@@ -252,7 +252,7 @@ def group_outcomes(z: Floats, trials: Floats) -> Integers:
     return np.asarray(group[intensity_index], dtype=np.int64)
 
 
-def compute_goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
+def compute_goodness(data: ExceedanceCounts, fitted: Probit, *, independent: bool) -> Goodness:
     """Test the fit by Pearson's statistic of groups of outcomes."""
     from scipy.special import gammaincc
 
@@ -276,7 +276,7 @@ def _compute_overlap(z: Floats) -> float:
     return 1e-6 * float(z.max() - z.min())
 
 
-def _is_rising(data: Outcomes) -> Flags:
+def _is_rising(data: ExceedanceCounts) -> Flags:
     """Whether the likelihood of each data set increases with the slope of a level curve."""
     z, exceeded, trials = data
     centred = z - z.mean()
@@ -293,7 +293,7 @@ def _solve_pairs(matrix: Floats, right_side: Floats) -> Floats:
     return np.stack([right_side[:, 0] / a - ratio * second, second], axis=1)
 
 
-def _differentiate(data: Outcomes, beta: Floats) -> tuple[Floats, Floats]:
+def _differentiate(data: ExceedanceCounts, beta: Floats) -> tuple[Floats, Floats]:
     """Compute score and Fisher's expected information, shapes (fits, 2) and (fits, 2, 2)."""
     z, exceeded, trials = data
     density, log_below, log_above = _compute_log_normals(beta[:, :1] + beta[:, 1:] * z)
@@ -310,7 +310,7 @@ def _compute_log_normals(scores: Floats) -> tuple[Floats, Floats, Floats]:
     return -0.5 * scores * scores - 0.5 * math.log(2.0 * math.pi), log_ndtr(scores), log_ndtr(-scores)
 
 
-def _shorten_steps(data: Outcomes, beta: Floats, step: Floats, current: Floats) -> tuple[Floats, Floats]:
+def _shorten_steps(data: ExceedanceCounts, beta: Floats, step: Floats, current: Floats) -> tuple[Floats, Floats]:
     """Halve steps until the likelihood does not decrease, and return steps and likelihoods."""
     following = compute_log_likelihood(data, beta + step)
     for _ in range(_MAX_ITERATIONS):
@@ -322,7 +322,9 @@ def _shorten_steps(data: Outcomes, beta: Floats, step: Floats, current: Floats) 
     return step, following
 
 
-def compute_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
+def compute_confidence_region(
+    data: ExceedanceCounts, fitted: Probit, clusters: Integers | None, confidence: float
+) -> Probit:
     """Find fits on the boundary of the confidence region, without curves that fall.
 
     Intervals are extremes in this region, as for the profile likelihood. For clusters of several outcomes the region is
@@ -345,11 +347,11 @@ def compute_confidence_region(data: Outcomes, fitted: Probit, clusters: Integers
     return Probit(intercepts - slopes * centre, slopes)
 
 
-def _trace_region(data: Outcomes, best: Probit, drop: float) -> Floats:
+def _trace_region(data: ExceedanceCounts, best: Probit, drop: float) -> Floats:
     """Trace the points around the maximum at which the log-likelihood is lower by `drop`, shape (rays, 2)."""
     z, index = np.unique(data.z, return_inverse=True)
-    merged = Outcomes(z, *(np.bincount(index, counts).astype(np.float64) for counts in data[1:]))
-    rays = Outcomes(z, *(np.broadcast_to(counts, (_RAY_COUNT, z.size)) for counts in merged[1:]))
+    merged = ExceedanceCounts(z, *(np.bincount(index, counts).astype(np.float64) for counts in data[1:]))
+    rays = ExceedanceCounts(z, *(np.broadcast_to(counts, (_RAY_COUNT, z.size)) for counts in merged[1:]))
     maximum = np.column_stack(best)
     floor = compute_log_likelihood(merged.as_batch(), maximum)[0] - drop
     angle = np.linspace(0.0, 2.0 * math.pi, _RAY_COUNT, endpoint=False)
@@ -385,7 +387,7 @@ def _cut_at_zero_slope(boundary: Floats) -> Floats:
     return np.vstack([boundary[is_rising], np.column_stack([corners, np.zeros(share.size)])])
 
 
-def _compute_stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats:
+def _compute_stretch(data: ExceedanceCounts, clusters: Integers, best: Probit) -> Floats:
     """Compute the linear map from the covariance of the likelihood to the covariance of the clusters."""
     scores, informations = _sum_by_cluster(data, clusters, best)
     count = len(scores)
@@ -399,7 +401,7 @@ def _compute_stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats
     return np.asarray(root @ deviation @ np.linalg.inv(root))
 
 
-def _sum_by_cluster(data: Outcomes, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
+def _sum_by_cluster(data: ExceedanceCounts, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
     """Sum score and observed information of each cluster, shapes (clusters, 2) and (clusters, 2, 2)."""
     z, exceeded, trials = data
     z_scores = fitted.intercept + fitted.slope * z

@@ -19,7 +19,7 @@ from rocking.analysis.hazard import (
     compute_shares_beyond,
     create_hazard_line,
 )
-from rocking.analysis.probit import Outcomes, fit_or_limits
+from rocking.analysis.probit import ExceedanceCounts, fit_or_limits
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import Result
@@ -390,7 +390,7 @@ class Survival(Result):
             ]
         lines = [
             f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
-            f"most likely never {self._never_text}: one such motion would have exceeded the limit with {percent}",
+            f"most likely never {self._describe_never}: one such motion would have exceeded the limit with {percent}",
             f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
             f"exceeded with {percent}" + (", if each met another of the blocks" if self.has_several_blocks else ""),
             "",
@@ -407,7 +407,7 @@ class Survival(Result):
         return float(intensities.min()), float(intensities.max())
 
     @property
-    def _never_text(self) -> str:
+    def _describe_never(self) -> str:
         intensity, highest = self.never_reached_intensity, self._known_range[1]
         text = format_intensity(min(intensity, highest), self.measure)
         return f"some intensity above {text}, beyond the data" if intensity > highest else f"{text} or more"
@@ -487,7 +487,7 @@ class Survival(Result):
 
     def _headline(self) -> str:
         state, years = self.curve.limit_state, format_count(self.years, "year")
-        return f"{state}: not in {years}; most likely never {self._never_text}"
+        return f"{state}: not in {years}; most likely never {self._describe_never}"
 
 
 def compute_mean_survival(
@@ -498,7 +498,7 @@ def compute_mean_survival(
     blocks = table.drop_duplicates("block")
     values = table[[column, f"exceeded_{limit_state}", "unfinished"]].to_numpy(np.float64)
     intensity, exceeded, missing = values.T.reshape(3, len(blocks), -1)
-    fits = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, 1.0 - missing))
+    fits = fit_or_limits(ExceedanceCounts(np.log(intensity[0]), exceeded, 1.0 - missing))
     # For a curve that does not rise, the rate below the hazard curve is unbounded and therefore omitted.
     rising, level = compute_log_rate(fits, hazard), compute_log_rate_within(fits, hazard)
     rates = np.exp(np.where(fits.slope > 0.0, rising[:, 0], level[:, 0]))

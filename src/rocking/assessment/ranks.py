@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from rocking.analysis.hazard import HazardCurve, compute_log_rate, compute_log_rate_within
-from rocking.analysis.probit import MIN_CLUSTERS, Outcomes, fit_or_limits
+from rocking.analysis.probit import MIN_CLUSTERS, ExceedanceCounts, fit_or_limits
 from rocking.assessment.results import ObjectAssessment
 from rocking.core.arrays import Floats, Integers
 
@@ -46,7 +46,7 @@ def compute_scores(item: ObjectAssessment, weights: Floats, hazard: HazardCurve 
     """Compute minus the logarithm of the rate, or the logarithm of the median, for each set of weights of motions."""
     is_known = np.isfinite(item.share)
     exceeded, trials = weights @ np.where(is_known, item.share, 0.0).T, weights @ is_known.T.astype(float)
-    fits = fit_or_limits(Outcomes(np.log(item.levels), exceeded, trials))
+    fits = fit_or_limits(ExceedanceCounts(np.log(item.levels), exceeded, trials))
     if hazard is not None:
         rising, level = compute_log_rate(fits, hazard), compute_log_rate_within(fits, hazard)
         return -np.where(fits.slope > 0.0, rising[:, 0], level[:, 0])

@@ -21,7 +21,7 @@ from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, Result
 from rocking.core.tables import array_to_rows, escape_dollars, format_table
 from rocking.core.threads import map_in_threads
-from rocking.engine.tasks import OUTCOME, detect_complete_chattering
+from rocking.engine.tasks import OUTCOME_DTYPE, detect_complete_chattering
 from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.ground import join_grounds
@@ -320,7 +320,7 @@ def _simulate_point(point: SimulationInput) -> _MapPoint:
     last_exceedance = find_last_exceedance(motion, block.uplift_thresholds(model), block.gravity)
     if not len(response.events) or last_exceedance is None:
         return _MapPoint()
-    results = np.zeros(1, OUTCOME)
+    results = np.zeros(1, OUTCOME_DTYPE)
     uplift, rests = float(response.events["time"][0]), len(response.sequences)
     results["uplifts"], results["rests"], results["unfinished"] = 1, rests, response.unfinished
     rest = lower = upper = math.nan

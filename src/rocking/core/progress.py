@@ -93,13 +93,13 @@ class Progress:
         self._bar: rich.progress.Progress | None = None
 
     def __enter__(self) -> Progress:
-        self._nested = set_options(progress=False)
+        self._nested_options = set_options(progress=False)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._nested.__exit__()
+        self._nested_options.__exit__()
         if self._bar is not None:
             self._bar.stop()
 

@@ -1,6 +1,14 @@
 from .basin_maps import Basins, basins
 from .bifurcation import BifurcationDiagram, LyapunovExponents, bifurcation_diagram, lyapunov_exponents
-from .bodies import BouncingBall, EquationOfMotion, ImpactOscillator, InvertedPendulum, LinearBodies, Response, simulate
+from .bodies import (
+    BouncingBall,
+    EquationOfMotion,
+    ImpactOscillator,
+    InvertedPendulum,
+    LinearBodies,
+    PositionResponse,
+    simulate,
+)
 from .branches import Bifurcation, Branch
 from .continuation import continue_orbit
 from .maps import PeriodOutcome, StroboscopicMap, stroboscopic_map
@@ -19,7 +27,7 @@ __all__ = [
     "LyapunovExponents",
     "PeriodOutcome",
     "PeriodicOrbit",
-    "Response",
+    "PositionResponse",
     "StroboscopicMap",
     "basins",
     "bifurcation_diagram",

@@ -23,7 +23,7 @@ from rocking.dynamics.bodies import LinearBody
 from rocking.dynamics.maps import (
     STATES_PER_CALL,
     PeriodOutcome,
-    Scale,
+    StateScale,
     StroboscopicMap,
     compute_scale,
     describe_input,
@@ -324,7 +324,7 @@ def record_states(
     return states, outcomes
 
 
-def find_period(states: Floats, scale: Scale | None = None) -> int:
+def find_period(states: Floats, scale: StateScale | None = None) -> int:
     """Find the period of an orbit from its recorded states.
 
     The period is 0 if the orbit does not repeat within half of the states, or is still settling.

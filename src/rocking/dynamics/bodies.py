@@ -403,7 +403,7 @@ BODIES_TYPES.update({cls.kind: _BodyFactory(cls) for cls in (BouncingBall, Impac
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(rocking.response.Response):
+class PositionResponse(rocking.response.Response):
     """Response of a body between stops, created by `rocking.dynamics.simulate`.
 
     A `rocking.Response` in positions relative to the table or the support. In events and impacts, ``side`` is +1 at the
@@ -441,9 +441,9 @@ class Response(rocking.response.Response):
         return unwrap_scalar(self.states(time)[..., 1])
 
 
-def convert_to_positions(response: rocking.response.Response) -> Response:
+def convert_to_positions(response: rocking.response.Response) -> PositionResponse:
     """Convert the response of a body between stops to positions."""
-    return Response(**{entry.name: getattr(response, entry.name) for entry in fields(response)})
+    return PositionResponse(**{entry.name: getattr(response, entry.name) for entry in fields(response)})
 
 
 def simulate(
@@ -454,7 +454,7 @@ def simulate(
     duration: float | None = None,
     initial_position: float | None = None,
     initial_velocity: float = 0.0,
-) -> Response:
+) -> PositionResponse:
     """Simulate the response of a body between stops to a motion of its table or support.
 
     Parameters

@@ -168,26 +168,26 @@ class PeriodicallyForcedBody:
         return bool(np.prod(self._body_records[0]["restitution"]) >= 1.0)
 
 
-class Scale(NamedTuple):
+class StateScale(NamedTuple):
     """Scales of coordinate and velocity for the comparison of states."""
 
     coordinate: float
     velocity: float
 
 
-def compute_scale(forced_body: PeriodicallyForcedBody) -> Scale:
+def compute_scale(forced_body: PeriodicallyForcedBody) -> StateScale:
     """Compute the natural scales of coordinate and velocity of a body under a motion."""
     record, period = forced_body._body_records[0], forced_body.forcing_period
     if not isinstance(forced_body.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
-        return Scale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
+        return StateScale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
     pull = float(np.max(np.abs(record["threshold_slope"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
     speed = period * max(estimate_mean_acceleration(forced_body.motion), pull, 1e-300)
     rate = math.sqrt(abs(float(record["stiffness"][0])))
     if record["two_stops"]:
         width = float(record["overturn_angle"])
-        return Scale(width, max(width * rate, width / period))
-    return Scale(speed / max(rate, 1.0 / period), speed)
+        return StateScale(width, max(width * rate, width / period))
+    return StateScale(speed / max(rate, 1.0 / period), speed)
 
 
 def estimate_mean_acceleration(motion: Motion) -> float:

@@ -29,7 +29,7 @@ from rocking.engine.problem import (
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import MotionError, UnfinishedError
 from rocking.kernels import lanes, state
-from rocking.kernels.ground import Ground, Grounds, max_absolute_weights, select_ground
+from rocking.kernels.ground import Ground, Grounds, compute_max_weights, select_ground
 from rocking.kernels.lane_steps import LANE_COUNT
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
@@ -43,7 +43,7 @@ from rocking.motion.motion import Motion
 #: ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
 #: rested after its first uplift before the motion exceeded a threshold again. ``rests_by_rounding``: number of rests
 #: because time no longer advanced. Times of events that did not occur are 0.
-OUTCOME = np.dtype(
+OUTCOME_DTYPE = np.dtype(
     [
         ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("lost_contact", "?"),
         ("peak_rotation", "f8"), ("residual_rotation", "f8"), ("peak_time", "f8"),
@@ -130,7 +130,7 @@ class Task:
 
 
 def simulate_tasks(setup: Setup, tasks: Iterable[Task]) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Simulate tasks, and yield their outcomes in order: structured arrays (`OUTCOME`), one row per simulation.
+    """Simulate tasks, and yield their outcomes in order: structured arrays (`OUTCOME_DTYPE`), one row per simulation.
 
     Tasks are consumed as needed, slightly ahead of the results. An outcome depends only on the body, the motion and the
     factor, bit for bit, not on the task. An interrupt cancels the remaining tasks.
@@ -285,7 +285,7 @@ def _split_group(
     """
     members = np.flatnonzero(np.isin(motion_indices, group.indices))
     index = np.searchsorted(group.indices, motion_indices[members])
-    weight = max_absolute_weights(group.grounds, index, factors[members])
+    weight = compute_max_weights(group.grounds, index, factors[members])
     step, with_vertical = group.steps[index], group.grounds.stretches.shape[1] > 1
     width = step * np.sqrt(np.abs(records["stiffness"][members]).max(axis=1) * weight)
     is_excluded = records["restrained"] | records["two_stops"] | (records["has_friction"] & with_vertical)
@@ -347,7 +347,7 @@ def detect_complete_chattering(
 
 
 def _collect_outcomes(states: Records, motion_end: Floats) -> NDArray[np.void]:
-    outcomes = np.empty(len(states), dtype=OUTCOME)
+    outcomes = np.empty(len(states), dtype=OUTCOME_DTYPE)
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     outcomes["leans"] = states["ending"] == state.Ending.LEANS

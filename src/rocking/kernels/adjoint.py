@@ -11,25 +11,25 @@ import math
 from enum import IntEnum
 
 from rocking.core.arrays import Floats
-from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign
+from rocking.kernels.arc import compute_restoring, evaluate_series, expand_arc, side_sign
 from rocking.kernels.compiled import inlined, kernel, not_inlined
-from rocking.kernels.events import mean_factor
-from rocking.kernels.ground import ground_error, has_vertical, sum_absolute_terms, vertical_component
+from rocking.kernels.events import compute_mean_factor
+from rocking.kernels.ground import ground_error, has_vertical, select_vertical, sum_absolute_terms
 from rocking.kernels.restraints import apply_tendon_law, update_plastic_elongation
 from rocking.kernels.series import write_variation_coefficients
 from rocking.kernels.state import Record, Records, TendonLaw
 from rocking.kernels.trace import (
     Quantity,
     Trail,
-    elongation_rate,
+    compute_elongation_rate,
+    compute_push_rate,
+    compute_saltation,
+    compute_step_duration,
+    differentiate_start_plasticity,
     expand_unforced,
     is_impact,
     is_jump,
-    plastic_by_start,
-    push_rate,
-    restoring_by_tendon,
-    saltation,
-    step_duration,
+    vary_tendon_restoring,
 )
 
 #: Number of derivatives: by u, v and a plastic elongation.
@@ -75,10 +75,10 @@ def adjoint(
             if end != AdjointEnd.CONTINUES:
                 return end
             continue
-        t = step_duration(trail, node, nodes[k + 1]) if k < row or time == math.inf else time
+        t = compute_step_duration(trail, node, nodes[k + 1]) if k < row or time == math.inf else time
         if block.yielding:
-            if k < row and turns_back(nodes, k + 1):
-                change[0] += elongation_rate(trail, node.side, nodes[k + 1].u) * change[2]
+            if k < row and is_plastic_end(nodes, k + 1):
+                change[0] += compute_elongation_rate(trail, node.side, nodes[k + 1].u) * change[2]
                 change[2] = 0.0
                 plastic_elongation = find_plastic_elongation(trail, k)
             apply_tendon_law(block, node.tendon_law, plastic_elongation)
@@ -92,7 +92,7 @@ def adjoint(
             if change.shape[0] > _STATE_DERIVATIVES:
                 add_rounding(trail, scratch, k, order, t, change)
             propagate_through_arc(trail, scratch, variation, node, (order, degree), t, change, out)
-    change[0] += plastic_by_start(trail) * change[2]
+    change[0] += differentiate_start_plasticity(trail) * change[2]
     return AdjointEnd.START
 
 
@@ -112,7 +112,7 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
     push = 0.5 * ground.columns * sum_absolute_terms(ground, node.piece, end)[0] + abs(block.added_push[side])
     weight = 1.0 + abs(block.added_weight[side])
     if has_vertical(ground):
-        weight += 0.5 * ground.columns * sum_absolute_terms(vertical_component(ground), node.piece, end)[0]
+        weight += 0.5 * ground.columns * sum_absolute_terms(select_vertical(ground), node.piece, end)[0]
     force = abs(block.threshold[side]) * weight + abs(block.restraint_threshold[side]) + push
     force *= block.threshold_slope[side]
     force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
@@ -153,8 +153,8 @@ def propagate_through_impact(trail: Trail, k: int, v: float, number: int, change
     sign = -1.0 if trail.block.two_stops and next_node.side != node.side else 1.0  # the other stop
     if not (is_impact(trail.nodes, k) and sign * v < 0.0):
         return False
-    by_u = saltation(trail, node, next_node, Quantity.ROTATION, -1.0 / v, (0.0, -sign * v), number)
-    by_v = saltation(trail, node, next_node, Quantity.ROTATION, 0.0, (sign, -sign * v), number)
+    by_u = compute_saltation(trail, node, next_node, Quantity.ROTATION, -1.0 / v, (0.0, -sign * v), number)
+    by_v = compute_saltation(trail, node, next_node, Quantity.ROTATION, 0.0, (sign, -sign * v), number)
     change[0], change[1] = change[0] * by_u[0] + change[1] * by_u[1], change[0] * by_v[0] + change[1] * by_v[1]
     return True
 
@@ -172,19 +172,22 @@ def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floa
     if block.yielding:
         apply_tendon_law(block, node.tendon_law, plastic_elongation)
     if node.side < 0:
-        side, rate = next_node.side, -push_rate(trail.ground, block, next_node.side, next_node.piece, next_node.offset)
+        side, rate = (
+            next_node.side,
+            -compute_push_rate(trail.ground, block, next_node.side, next_node.piece, next_node.offset),
+        )
         if row > 0 and next_node.time == node.time:
             return AdjointEnd.LEAVES_AT_ONCE
         if is_jump(trail, next_node):
             return AdjointEnd.START
         if not rate > 0.0:
             return AdjointEnd.TOUCHES_THRESHOLD
-        change[2] = restoring_by_tendon(block, side, plastic_elongation, 1.0) / (block.threshold_slope[side] * rate)
+        change[2] = vary_tendon_restoring(block, side, plastic_elongation, 1.0) / (block.threshold_slope[side] * rate)
         add_instant(trail, next_node, (side_sign(side) / rate, block.threshold[side] / rate), out)
     elif next_node.side < 0:
         differentiate_rest_time(trail, node, plastic_elongation, change, out)
     else:
-        t = step_duration(trail, node, next_node)
+        t = compute_step_duration(trail, node, next_node)
         order, _, _ = expand_arc(trail.ground, block, trail.settings, scratch, node, t)
         _, v, _ = evaluate_series(scratch.rotation, order, t)
         if v == 0.0:
@@ -195,21 +198,21 @@ def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floa
 
 @inlined
 def differentiate_rest_time(trail: Trail, node: Record, plastic_elongation: float, change: Floats, out: Floats) -> None:
-    """Write the derivatives of the time of rest after the impact of a node (see `trace.rest_shift`)."""
+    """Write the derivatives of the time of rest after the impact of a node (see `trace.compute_rest_shift`)."""
     block, i = trail.block, node.side
     j = block.next_side[i]
-    g_i = restoring_acceleration(trail.ground, block, i, node.piece, node.offset)
-    g_j = restoring_acceleration(trail.ground, block, j, node.piece, node.offset)
-    e_i, e_j = mean_factor(block, i, node.v), mean_factor(block, j, node.v)
+    g_i = compute_restoring(trail.ground, block, i, node.piece, node.offset)
+    g_j = compute_restoring(trail.ground, block, j, node.piece, node.offset)
+    e_i, e_j = compute_mean_factor(block, i, node.v), compute_mean_factor(block, j, node.v)
     scale = 2.0 / (1.0 - e_i * e_j)
     by_speed = scale * (1.0 / g_i + e_i / g_j)
     by_g_i, by_g_j = -scale * node.v / (g_i * g_i), -scale * node.v * e_i / (g_j * g_j)
     by_time = 1.0 - by_speed * g_i  # by the shift of the impact
-    by_time += by_g_i * block.threshold_slope[i] * push_rate(trail.ground, block, i, node.piece, node.offset)
-    by_time += by_g_j * block.threshold_slope[j] * push_rate(trail.ground, block, j, node.piece, node.offset)
+    by_time += by_g_i * block.threshold_slope[i] * compute_push_rate(trail.ground, block, i, node.piece, node.offset)
+    by_time += by_g_j * block.threshold_slope[j] * compute_push_rate(trail.ground, block, j, node.piece, node.offset)
     change[0], change[1] = -by_time / node.v, by_speed
-    change[2] = by_g_i * restoring_by_tendon(block, i, plastic_elongation, 1.0)
-    change[2] += by_g_j * restoring_by_tendon(block, j, plastic_elongation, 1.0)
+    change[2] = by_g_i * vary_tendon_restoring(block, i, plastic_elongation, 1.0)
+    change[2] += by_g_j * vary_tendon_restoring(block, j, plastic_elongation, 1.0)
     by_i, by_j = by_g_i * block.threshold_slope[i], by_g_j * block.threshold_slope[j]
     push = by_i * side_sign(i) + by_j * side_sign(j)
     add_instant(trail, node, (push, by_i * block.threshold[i] + by_j * block.threshold[j]), out)
@@ -229,7 +232,7 @@ def add_instant(trail: Trail, node: Record, derivatives: tuple[float, float], ou
 
 
 @inlined
-def turns_back(nodes: Records, row: int) -> bool:
+def is_plastic_end(nodes: Records, row: int) -> bool:
     """Return whether the body turns back at a node, where the plastic elongation is written."""
     return bool(nodes[row - 1].tendon_law == TendonLaw.PLASTIC and nodes[row].tendon_law == TendonLaw.ELASTIC)
 
@@ -239,7 +242,7 @@ def find_plastic_elongation(trail: Trail, row: int) -> float:
     """Return the plastic elongation at a node; 0 if no tendon yields."""
     if not trail.block.yielding:
         return 0.0
-    while row > 0 and not turns_back(trail.nodes, row):
+    while row > 0 and not is_plastic_end(trail.nodes, row):
         row -= 1
     return update_plastic_elongation(trail.block, trail.settings, trail.nodes, row, 0.0)
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, not_inlined
-from rocking.kernels.ground import Ground, acceleration, has_vertical, vertical_component, write_local_series
+from rocking.kernels.ground import Ground, compute_acceleration, has_vertical, select_vertical, write_local_series
 from rocking.kernels.series import (
     INTEGRATED_TWICE,
-    next_coefficient,
+    compute_next_coefficient,
     write_angle_coefficients,
     write_half_angle_coefficients,
     write_linear_coefficients,
@@ -30,23 +30,23 @@ def side_sign(side: int) -> float:
 
 
 @inlined
-def restoring_acceleration(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+def compute_restoring(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
     """Compute the restoring acceleration of a side at zero rotation."""
-    threshold = block.threshold[side] * weight_at(ground, piece, offset) + block.restraint_threshold[side]
-    return block.threshold_slope[side] * (threshold + side_sign(side) * acceleration(ground, piece, offset))
+    threshold = block.threshold[side] * compute_weight(ground, piece, offset) + block.restraint_threshold[side]
+    return block.threshold_slope[side] * (threshold + side_sign(side) * compute_acceleration(ground, piece, offset))
 
 
 @inlined
-def weight_at(ground: Ground, piece: int, offset: float) -> float:
+def compute_weight(ground: Ground, piece: int, offset: float) -> float:
     """Compute the weight in the ground's frame, divided by the weight at rest."""
-    return 1.0 + acceleration(vertical_component(ground), piece, offset) if has_vertical(ground) else 1.0
+    return 1.0 + compute_acceleration(select_vertical(ground), piece, offset) if has_vertical(ground) else 1.0
 
 
 @inlined
 def write_weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
     """Write the polynomial of the weight about ``offset`` into W and return its degree."""
     W[0] = 0.0
-    degree = write_local_series(vertical_component(ground), piece, offset, 1.0, W) if has_vertical(ground) else 0
+    degree = write_local_series(select_vertical(ground), piece, offset, 1.0, W) if has_vertical(ground) else 0
     W[0] += 1.0
     return degree
 
@@ -59,9 +59,9 @@ def expand_arc(
 
     The step is at most ``h_max``.
     """
-    h = step_length(ground, block, state, h_max)
+    h = find_step_length(ground, block, state, h_max)
     degree = write_local_series(ground, state.piece, state.offset, side_sign(state.side), scratch.ground)
-    degree = significant_degree(scratch.ground, degree, h)
+    degree = find_significant_degree(scratch.ground, degree, h)
     weight_degree = write_weight_series(ground, state.piece, state.offset, scratch.weight)
     if has_vertical(ground):
         degree = pad_to_same_degree(scratch.ground, degree, scratch.weight, weight_degree)
@@ -69,11 +69,11 @@ def expand_arc(
         order, h = expand_with_bound(block, settings, state, scratch, (degree, weight_degree), h)
         return order, h, degree
     if degree <= 1:
-        order = linear_order(block.stiffness[state.side], h)
+        order = find_linear_order(block.stiffness[state.side], h)
         write_linear_coefficients(block, state, scratch, degree, order)
         return order, h, degree
     write_linear_coefficients(block, state, scratch, degree, ORDER)
-    order = converged_order(scratch.rotation, degree, h)
+    order = find_converged_order(scratch.rotation, degree, h)
     if order > ORDER:
         return ORDER, shorten_step(block, settings, state.side, scratch, (degree, 0), h), degree
     return order, h, degree
@@ -91,20 +91,20 @@ def pad_to_same_degree(A: Floats, degree: int, W: Floats, weight_degree: int) ->
 
 
 @inlined
-def step_length(ground: Ground, block: Record, state: Record, h_max: float) -> float:
+def find_step_length(ground: Ground, block: Record, state: Record, h_max: float) -> float:
     """Compute the length of the next Taylor step."""
     h = min(h_max, 1.0 / np.sqrt(abs(block.stiffness[state.side])))
     if block.restrained:
-        h = min(h, restrained_step_length(block, state.side))
+        h = min(h, limit_restrained_step(block, state.side))
     if state.u == 0.0 and state.v > 0.0:
-        g = restoring_acceleration(ground, block, state.side, state.piece, state.offset)
+        g = compute_restoring(ground, block, state.side, state.piece, state.offset)
         if g > 0.0:
             h = min(h, _FIRST_STEP * 2.0 * state.v / g)
     return h
 
 
 @inlined
-def restrained_step_length(block: Record, side: int) -> float:
+def limit_restrained_step(block: Record, side: int) -> float:
     """Return the longest step: the inverse of the largest rate of motion or damping under restraints."""
     stiffness = abs(block.stiffness[side]) * (1.0 + abs(block.added_weight[side])) + abs(block.spring[side])
     max_rate = max(math.sqrt(stiffness), block.damping[side])
@@ -112,7 +112,7 @@ def restrained_step_length(block: Record, side: int) -> float:
 
 
 @inlined
-def significant_degree(A: Floats, degree: int, h: float) -> int:
+def find_significant_degree(A: Floats, degree: int, h: float) -> int:
     """Return the degree of a polynomial without negligible highest powers within h."""
     while degree > 1 and abs(A[degree]) * h**degree < NEGLIGIBLE * abs(A[0]):
         degree -= 1
@@ -120,7 +120,7 @@ def significant_degree(A: Floats, degree: int, h: float) -> int:
 
 
 @inlined
-def linear_order(lam: float, h: float) -> int:
+def find_linear_order(lam: float, h: float) -> int:
     """Return the order at which the series of a linear arc has converged within h (motion of degree 0 or 1).
 
     The ratio of c[k] h^k to c[2] h^2, which decreases most slowly, is known in advance, because each later coefficient
@@ -136,7 +136,7 @@ def linear_order(lam: float, h: float) -> int:
 
 
 @inlined
-def converged_order(c: Floats, degree: int, h: float) -> int:
+def find_converged_order(c: Floats, degree: int, h: float) -> int:
     """Return the order at which a full series under constant weight has converged within h, or more than `ORDER`.
 
     Beyond the motion's degree, each coefficient follows from the one two before: two negligible ones end the series.
@@ -175,7 +175,7 @@ def expand_with_bound(
     power = h * h
     largest = term = abs(state.v) * h
     for k in range(ORDER - 1):
-        c[k + 2] = next_coefficient(block, settings, side, scratch, degrees, k)
+        c[k + 2] = compute_next_coefficient(block, settings, side, scratch, degrees, k)
         previous = term
         term = (k + 2) * abs(c[k + 2]) * power
         largest = max(largest, term)

@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.kernels.arc import restoring_acceleration, side_sign, weight_at, write_weight_series
+from rocking.kernels.arc import compute_restoring, compute_weight, side_sign, write_weight_series
 from rocking.kernels.compiled import inlined, not_inlined
-from rocking.kernels.events import mean_factor, min_factor
+from rocking.kernels.events import bound_factor, compute_mean_factor
 from rocking.kernels.ground import (
     ROUNDING,
     AccelerationBounds,
@@ -28,12 +28,17 @@ from rocking.kernels.ground import (
     has_vertical,
     piece_length,
     piece_start,
-    vertical_component,
+    select_vertical,
     write_local_series,
 )
 from rocking.kernels.remaining import ImpactSide, Pair, bound_restoring_error, estimate_remaining_time, refine_bracket
 from rocking.kernels.restraints import may_tendon_law_change_below
-from rocking.kernels.sliding import min_sticking_friction, slip_factor, slip_restoring, slip_stiffness
+from rocking.kernels.sliding import (
+    compute_slip_factor,
+    compute_slip_restoring,
+    compute_slip_stiffness,
+    find_sticking_friction,
+)
 from rocking.kernels.state import Record
 
 #: Window of the proof divided by the first estimate of the remaining time.
@@ -88,7 +93,7 @@ def bound_impact_speed(v: float, first: RestoringBounds, second: RestoringBounds
 
 
 @inlined
-def with_restitution(side: ImpactSide, e: float) -> ImpactSide:
+def replace_restitution(side: ImpactSide, e: float) -> ImpactSide:
     """Return one side with another restitution."""
     return ImpactSide(side.g, side.rate, side.curvature, side.stiffness, e, side.error)
 
@@ -120,7 +125,7 @@ class Proof(NamedTuple):
 
 
 @inlined
-def no_proof() -> Proof:
+def create_failed_proof() -> Proof:
     """Return an all-NaN proof."""
     return Proof(np.nan, np.nan, np.nan, np.nan)
 
@@ -131,10 +136,10 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
     v, i = state.v, state.side
     j = block.next_side[i]
     e_i, e_j = block.restitution[i], block.restitution[j]
-    g_i = restoring_acceleration(ground, block, i, state.piece, state.offset)
-    g_j = restoring_acceleration(ground, block, j, state.piece, state.offset)
+    g_i = compute_restoring(ground, block, i, state.piece, state.offset)
+    g_j = compute_restoring(ground, block, j, state.piece, state.offset)
     if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0 and abs(block.stiffness[i]) * v * v < g_i * g_i):
-        return no_proof()
+        return create_failed_proof()
     window = _WINDOW_RATIO * 2.0 * v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
     # Rounding decides on which side of a jump of the motion the window ends.
     rounding = ROUNDING * (piece_start(ground, state.piece) + state.offset)
@@ -148,33 +153,33 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
         max_speed = e_i * math.sqrt(energy_ratio) * v
         next_ratio = e_i * e_i * energy_ratio * (1.0 + bound_arc(max_speed, second)[0])
         if not (energy_ratio <= _MAX_ENERGY_RATIO and next_ratio <= _MAX_ENERGY_RATIO):
-            return no_proof()
+            return create_failed_proof()
     max_speed = bound_impact_speed(v, first, second, e_i) if block.variable_restitution else v
-    min_e = min_factor(block, i, max_speed), min_factor(block, j, max_speed)
+    min_e = bound_factor(block, i, max_speed), bound_factor(block, j, max_speed)
     lower, upper = bracket_geometrically(v, first, second, (e_i, e_j), min_e)
     if not upper <= window:
-        return no_proof()
+        return create_failed_proof()
     min_restoring, change = min(first.min_restoring, second.min_restoring), max(first.change, second.change)
     height = v * v * (1.0 + 2.0 * change / min_restoring) / min_restoring
     # Up to twice the slenderness, the contribution of the weight to the restoring acceleration is largest at zero
     # rotation.
     if has_vertical(ground) and not height <= 2.0 * min(block.slenderness[0], block.slenderness[1]):
-        return no_proof()
+        return create_failed_proof()
     max_square = v * v * (1.0 + 2.0 * change / min_restoring) * (1.0 + 2.0 * change / min_restoring)
     if (
         (block.two_stops and height >= block.overturn_angle)
         or (block.yielding and may_tendon_law_change_below(block, settings, state.plastic_elongation, height))
         or (block.has_friction and not sticks_until_rest(block, settings, motion_bounds, height, max_square))
     ):
-        return no_proof()
+        return create_failed_proof()
     write_local_series(ground, state.piece, state.offset, 1.0, clear_lowest_coefficients(scratch.ground))
     write_weight_series(ground, state.piece, state.offset, clear_lowest_coefficients(scratch.weight))
     horizon = Horizon(motion_bounds, ground_error(ground), ground.columns, upper, height, drag)
     side_i = fit_restoring_parabola(block, settings, i, scratch, horizon)
     side_j = fit_restoring_parabola(block, settings, j, scratch, horizon)
     if block.variable_restitution:
-        side_i = with_restitution(side_i, mean_factor(block, i, max_speed))
-        side_j = with_restitution(side_j, mean_factor(block, j, max_speed))
+        side_i = replace_restitution(side_i, compute_mean_factor(block, i, max_speed))
+        side_j = replace_restitution(side_j, compute_mean_factor(block, j, max_speed))
     elif upper - lower > settings.tolerance and upper + rounding <= piece_length(ground, state.piece) - state.offset:
         narrower = refine_bracket(v, side_i, side_j, upper)
         if narrower[1] >= narrower[0]:
@@ -191,19 +196,21 @@ class MotionBounds(NamedTuple):
 
 
 @inlined
-def sticks_until_rest(block: Record, settings: Record, motion: MotionBounds, height: float, square: float) -> bool:
+def sticks_until_rest(
+    block: Record, settings: Record, motion: MotionBounds, height: float, max_squared_speed: float
+) -> bool:
     """Return whether no arc and no impact of a proven sequence slips (Eqs 7 and 10 of "Sliding"); False for NaN.
 
-    ``height`` and ``square`` bound all rotations and all squared speeds.
+    ``height`` and ``max_squared_speed`` bound all rotations and all squared speeds.
     """
     horizontal, vertical = motion
-    strength = euclidean_norm(max_weight_magnitude(vertical), max_magnitude(horizontal)) * (1.0 + ROUNDING)
+    strength = compute_norm(bound_weight_magnitude(vertical), bound_magnitude(horizontal)) * (1.0 + ROUNDING)
     mu = block.static_friction * (1.0 - ROUNDING)
     for side in range(2):
         ratio = block.arm[side] * block.stiffness[side]
         # Change of the forces by a finite size of the arcs.
-        change = block.arm[side] * (2.0 * block.stiffness[side] * strength * height + square)
-        if not min_sticking_friction(block, side) <= mu:
+        change = block.arm[side] * (2.0 * block.stiffness[side] * strength * height + max_squared_speed)
+        if not find_sticking_friction(block, side) <= mu:
             return False
         s, c = block.slenderness[side], 1.0
         if settings.nonlinear:
@@ -233,12 +240,13 @@ def prove_slide(ground: Ground, block: Record, settings: Record, scratch: Record
     v, i = state.v, state.side
     j = 1 - i
     mu, direction = block.kinetic_friction, side_sign(i) * state.direction
-    g_i, g_j = slip_restoring(block, settings, i, direction), slip_restoring(block, settings, j, -direction)
-    e_i = max(0.0, slip_factor(block, i, block.restitution[i], state.direction))
-    e_j = max(0.0, slip_factor(block, j, block.restitution[j], state.direction))
-    weight = weight_at(ground, state.piece, state.offset)
+    g_i = compute_slip_restoring(block, settings, i, direction)
+    g_j = compute_slip_restoring(block, settings, j, -direction)
+    e_i = max(0.0, compute_slip_factor(block, i, block.restitution[i], state.direction))
+    e_j = max(0.0, compute_slip_factor(block, j, block.restitution[j], state.direction))
+    weight = compute_weight(ground, state.piece, state.offset)
     if not (g_i > 0.0 and g_j > 0.0 and weight > 0.0 and e_i * e_j < 1.0):
-        return no_proof()
+        return create_failed_proof()
     time = 2.0 * v * (1.0 / g_i + e_i / g_j) / (weight * (1.0 - e_i * e_j))
     window = _WINDOW_RATIO * time
     rounding = ROUNDING * (piece_start(ground, state.piece) + state.offset)
@@ -257,27 +265,27 @@ def prove_slide(ground: Ground, block: Record, settings: Record, scratch: Record
         and bound_impact_speed(v, first, second, e_i) <= max_speed
         and max_speed * max_speed * max(first.stiffness, second.stiffness) <= max_restoring * max_restoring
     ):
-        return no_proof()
+        return create_failed_proof()
     # Change of the slip velocity by arcs and impacts. The sum of all speeds at the starts of arcs is at most
     # max_restoring upper/(2 (1 - 1/3)), the sum of those before and after impacts at most 2.25 times as large.
     divisor = 1.0
     if settings.nonlinear:
-        divisor = sliding_divisor(block, i, direction, max_height)
-        divisor = min(divisor, sliding_divisor(block, j, -direction, max_height))
+        divisor = compute_sliding_divisor(block, i, direction, max_height)
+        divisor = min(divisor, compute_sliding_divisor(block, j, -direction, max_height))
     arm, base = max(block.arm[0], block.arm[1]), max(block.pivot_distance[0], block.pivot_distance[1])
     normal = (1.0 + motion.vertical.high) / min(1.0, divisor)
-    along_arcs = mu * normal + max_magnitude(motion.horizontal) + arm * (3.0 * max_restoring + max_speed * max_speed)
+    along_arcs = mu * normal + bound_magnitude(motion.horizontal) + arm * (3.0 * max_restoring + max_speed * max_speed)
     at_impacts = 2.0 * (mu * base + block.height) * max_restoring
     if not upper * (along_arcs + at_impacts) < abs(state.slip_rate):
-        return no_proof()
+        return create_failed_proof()
     return Proof(lower, upper, min(max(time, lower), upper), height)
 
 
 @inlined
-def sliding_divisor(block: Record, side: int, direction: float, height: float) -> float:
+def compute_sliding_divisor(block: Record, side: int, direction: float, height: float) -> float:
     """Return a lower bound on the divisor of the normal force on a side up to a height."""
     lever = block.sine[side] - direction * block.kinetic_friction * block.cosine[side]
-    slope = block.inertia_ratio[side] * euclidean_norm(1.0, block.kinetic_friction)
+    slope = block.inertia_ratio[side] * compute_norm(1.0, block.kinetic_friction)
     return 1.0 + block.inertia_ratio[side] * block.sine[side] * lever - slope * height
 
 
@@ -298,10 +306,10 @@ def bound_sliding_side(
     """
     (direction, g), (height, speed) = slip, limits
     low, high = 1.0 + vertical.low, 1.0 + vertical.high
-    stiffness, inertia = slip_stiffness(block, side), 0.0
+    stiffness, inertia = compute_slip_stiffness(block, side), 0.0
     if settings.nonlinear:
-        norm = euclidean_norm(1.0, block.kinetic_friction)
-        divisor = sliding_divisor(block, side, direction, height)
+        norm = compute_norm(1.0, block.kinetic_friction)
+        divisor = compute_sliding_divisor(block, side, direction, height)
         stiffness *= norm * (divisor + block.inertia_ratio[side] * norm) / (divisor * divisor)
         inertia = block.arm[side] * speed * speed
         if not (divisor > 0.0 and 2.0 * (g + stiffness * height) * block.arm[side] * height <= 0.1):
@@ -323,7 +331,7 @@ def bound_motion(ground: Ground, block: Record, state: Record, window: float, sc
     vertical = AccelerationBounds(0.0, 0.0, 0.0, 0.0)
     if has_vertical(ground):
         limits = (-1.0, np.inf)
-        bounds = bound_window(vertical_component(ground), state.piece, state.offset, window, limits, scratch.ground)
+        bounds = bound_window(select_vertical(ground), state.piece, state.offset, window, limits, scratch.ground)
         vertical = widen_for_error(bounds, ground_error(ground))
     weight = 1.0 + vertical.high
     limits = (
@@ -371,8 +379,8 @@ def fit_restoring_parabola(block: Record, settings: Record, j: int, scratch: Rec
     horizontal, vertical = horizon.motion
     error = horizon.error + bound_higher_terms(A, horizon)
     # If almost no weight presses the block down, the rounding of weight and push remains.
-    from_weight = abs(threshold) * (1.0 + max_magnitude(vertical))
-    error += ROUNDING * (from_weight + abs(block.restraint_threshold[j]) + max_magnitude(horizontal))
+    from_weight = abs(threshold) * (1.0 + bound_magnitude(vertical))
+    error += ROUNDING * (from_weight + abs(block.restraint_threshold[j]) + bound_magnitude(horizontal))
     weight_changes = vertical.high > vertical.low
     weight_error = horizon.error + bound_higher_terms(W, horizon) if weight_changes else 0.0
     weight_change = vertical.slope * horizon.window + 2.0 * horizon.error if weight_changes else 0.0
@@ -386,7 +394,7 @@ def fit_restoring_parabola(block: Record, settings: Record, j: int, scratch: Rec
         stiffness = lam * (cosine * weight - push * sine) - block.spring[j]
         push_change = horizontal.slope * horizon.window + 2.0 * horizon.error
         change = lam * (sine * push_change + cosine * weight_change)
-        curvature = lam * euclidean_norm(max_weight(block, j, vertical), max_push(block, j, horizontal))
+        curvature = lam * compute_norm(bound_weight(block, j, vertical), bound_push(block, j, horizontal))
         curvature += 0.25 * block.prestress[j]
         error = bound_restoring_error(lam * (error + weight_error) + horizon.drag, change, curvature, horizon.height)
     g = gain * (threshold * W[0] + block.restraint_threshold[j] + sign * A[0])
@@ -420,31 +428,31 @@ def widen_for_error(motion: AccelerationBounds, error: float) -> AccelerationBou
 
 
 @inlined
-def max_magnitude(motion: AccelerationBounds) -> float:
+def bound_magnitude(motion: AccelerationBounds) -> float:
     """Return the largest absolute value of an acceleration."""
     return max(abs(motion.low), abs(motion.high))
 
 
 @inlined
-def max_weight_magnitude(vertical: AccelerationBounds) -> float:
+def bound_weight_magnitude(vertical: AccelerationBounds) -> float:
     """Return the largest absolute weight divided by the weight at rest."""
     return max(1.0 + vertical.high, -(1.0 + vertical.low))
 
 
 @inlined
-def max_weight(block: Record, j: int, vertical: AccelerationBounds) -> float:
+def bound_weight(block: Record, j: int, vertical: AccelerationBounds) -> float:
     """Return the largest absolute weight on side j, including restraints."""
-    return max_weight_magnitude(vertical) + abs(block.added_weight[j])
+    return bound_weight_magnitude(vertical) + abs(block.added_weight[j])
 
 
 @inlined
-def max_push(block: Record, j: int, horizontal: AccelerationBounds) -> float:
+def bound_push(block: Record, j: int, horizontal: AccelerationBounds) -> float:
     """Return the largest absolute push on side j, including restraints."""
-    return max_magnitude(horizontal) + abs(block.added_push[j])
+    return bound_magnitude(horizontal) + abs(block.added_push[j])
 
 
 @inlined
-def euclidean_norm(a: float, b: float) -> float:
+def compute_norm(a: float, b: float) -> float:
     """Compute the length of a vector; hypot rounds differently across C libraries and in Python."""
     return math.sqrt(a * a + b * b)
 
@@ -456,13 +464,13 @@ def bound_side(block: Record, settings: Record, j: int, motion: MotionBounds) ->
     sign, threshold = side_sign(j), block.threshold[j]
     from_weight = (threshold * (1.0 + vertical.low), threshold * (1.0 + vertical.high))
     from_push = (sign * horizontal.low, sign * horizontal.high)
-    push, weight = max_magnitude(horizontal), max_weight_magnitude(vertical)
+    push, weight = bound_magnitude(horizontal), bound_weight_magnitude(vertical)
     rounding = ROUNDING * (abs(threshold) * weight + abs(block.restraint_threshold[j]) + push)
     # A rotation changes the stiffness and, in the nonlinear model, the effect of the motion (by at most p^2 a/g).
-    max_stiffness_factor = max_weight(block, j, vertical)
+    max_stiffness_factor = bound_weight(block, j, vertical)
     spring = abs(block.spring[j])
     if settings.nonlinear:
-        max_stiffness_factor = euclidean_norm(max_stiffness_factor, max_push(block, j, horizontal))
+        max_stiffness_factor = compute_norm(max_stiffness_factor, bound_push(block, j, horizontal))
         spring += 0.5 * abs(block.prestress[j])
     stiffness = (abs(block.stiffness[j]) * max_stiffness_factor + spring) * (1.0 + ROUNDING)
     per_push = (block.stiffness[j] if settings.nonlinear else block.threshold_slope[j]) * (1.0 + ROUNDING)

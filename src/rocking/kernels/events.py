@@ -100,7 +100,7 @@ def find_first_negative_beyond_rounding(d: Floats, degree: int, h: float) -> flo
     rounding = bound_rounding(d, degree, h)
     start = 0.0
     for _ in range(degree + 1):
-        lead = leading_power(d, degree, h - start, rounding)
+        lead = find_leading_power(d, degree, h - start, rounding)
         if lead > degree:
             return np.inf
         if d[lead] < 0.0:
@@ -128,7 +128,7 @@ def bound_rounding(d: Floats, degree: int, h: float) -> float:
 
 
 @inlined
-def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
+def find_leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
     """Return the lowest power of a polynomial that is not negligible within h; above ``degree`` if there is none."""
     lead = 0
     power = 1.0
@@ -258,7 +258,7 @@ def apply_impact(block: Record, state: Record) -> float:
         speed = max(0.0, state.v)
         state.certificate_speed = np.inf
     state.u = 0.0
-    state.v = restitution_factor(block, departed_side, speed, state.impacts) * speed
+    state.v = compute_restitution_factor(block, departed_side, speed, state.impacts) * speed
     state.impacts += 1
     return speed
 
@@ -275,16 +275,16 @@ _WORD = 0xFFFFFFFF
 
 
 @inlined
-def restitution_factor(block: Record, side: int, speed: float, number: int) -> float:
+def compute_restitution_factor(block: Record, side: int, speed: float, number: int) -> float:
     """Return the factor on the speed of an impact that leaves a side, after ``number`` others."""
     if block.variable_restitution:
-        return variable_factor(block, side, speed, number)
+        return compute_variable_factor(block, side, speed, number)
     return float(block.restitution[side])
 
 
 @not_inlined
-def variable_factor(block: Record, side: int, speed: float, number: int) -> float:
-    """Compute a variable factor; see `restitution_factor`."""
+def compute_variable_factor(block: Record, side: int, speed: float, number: int) -> float:
+    """Compute a variable factor; see `compute_restitution_factor`."""
     lowest, highest = block.min_restitution[side], block.restitution[side]
     if is_factor_random(block):
         return min(highest, lowest + (highest - lowest) * draw_uniform(int(block.seed), int(number)))
@@ -298,7 +298,7 @@ def is_factor_random(block: Record) -> bool:
 
 
 @inlined
-def relative_speed_slope(block: Record, side: int, speed: float, e: float) -> float:
+def compute_speed_slope(block: Record, side: int, speed: float, e: float) -> float:
     """Compute d(speed after)/d(speed before) of an impact, divided by the factor e (1 if the factor is constant)."""
     if block.variable_restitution and block.seed < 0 and e > block.min_restitution[side]:
         return 1.0 - block.restitution_slope[side] * speed / e
@@ -306,7 +306,7 @@ def relative_speed_slope(block: Record, side: int, speed: float, e: float) -> fl
 
 
 @inlined
-def min_factor(block: Record, side: int, max_speed: float) -> float:
+def bound_factor(block: Record, side: int, max_speed: float) -> float:
     """Return the smallest factor up to a speed; the largest is ``block.restitution``."""
     if not block.variable_restitution:
         return float(block.restitution[side])
@@ -316,9 +316,9 @@ def min_factor(block: Record, side: int, max_speed: float) -> float:
 
 
 @inlined
-def mean_factor(block: Record, side: int, max_speed: float) -> float:
+def compute_mean_factor(block: Record, side: int, max_speed: float) -> float:
     """Return the midpoint of all factors up to a speed."""
-    return 0.5 * (min_factor(block, side, max_speed) + block.restitution[side])
+    return 0.5 * (bound_factor(block, side, max_speed) + block.restitution[side])
 
 
 @not_inlined

@@ -17,7 +17,7 @@ from rocking.kernels.compiled import inlined, kernel, not_inlined
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48
 
-#: Pieces per stretch: `next_piece_beyond` and `bound_window` skip whole stretches.
+#: Pieces per stretch: `find_piece_beyond` and `bound_window` skip whole stretches.
 PIECES_PER_STRETCH = 16
 
 #: Largest number of pieces and whole stretches in a window.
@@ -29,7 +29,7 @@ _MIN, _MAX, _STEEPEST, _JUMPS = 0, 1, 2, 3
 
 
 class Ground(NamedTuple):
-    """One component of a motion: the horizontal one, or that of `vertical_component`."""
+    """One component of a motion: the horizontal one, or that of `select_vertical`."""
 
     pieces: Floats  # pieces of the motion, one per row
     stretches: Floats  # bounds on stretches of unscaled pieces, shape (stretches, components, 4)
@@ -99,7 +99,7 @@ def select_ground(grounds: Grounds, motion: int, factor: float) -> Ground:
     return Ground(pieces, stretches, grounds.errors[motion], grounds.columns, FIRST, factor, grounds.unit)
 
 
-def component_coefficients(ground: Ground, pieces: Integers) -> list[Floats]:
+def scale_coefficients(ground: Ground, pieces: Integers) -> list[Floats]:
     """Return the coefficients (g, g/s, ...) of a motion on some pieces: horizontal and, if present, vertical."""
     columns, factors = ground.columns, (ground.factor, abs(ground.factor))
     return [
@@ -108,7 +108,7 @@ def component_coefficients(ground: Ground, pieces: Integers) -> list[Floats]:
     ]
 
 
-def max_absolute_weights(grounds: Grounds, motions: Integers, factors: Floats) -> Floats:
+def compute_max_weights(grounds: Grounds, motions: Integers, factors: Floats) -> Floats:
     """Return the largest absolute weight in the ground's frame under each multiple, divided by the weight at rest."""
     if grounds.stretches.shape[1] == 1:
         return np.ones(len(factors))
@@ -138,7 +138,7 @@ def write_pieces(breakpoints: Floats, coefficients: Floats, ground: Ground, A: F
             piece = bound_piece(ground, k, 0.0, pieces[k, LENGTH], A)
             low, high, steepest = min(low, piece.low), max(high, piece.high), max(steepest, piece.slope)
             # A factor changes jumps by its rounding, which has the same bound as the rounding of the piece.
-            jumps += 2.0 * piece.jumps + (jump_at_end(ground, k) if k < count else 0.0)
+            jumps += 2.0 * piece.jumps + (compute_end_jump(ground, k) if k < count else 0.0)
         row = ground.stretches[stretch, component_index(ground)]
         row[_MIN], row[_MAX], row[_STEEPEST], row[_JUMPS] = low, high, steepest, jumps
 
@@ -168,7 +168,7 @@ def has_vertical(ground: Ground) -> bool:
 
 
 @inlined
-def vertical_component(ground: Ground) -> Ground:
+def select_vertical(ground: Ground) -> Ground:
     """Return the vertical component of the motion."""
     return Ground(
         ground.pieces, ground.stretches, ground.error, ground.columns, ground.first + ground.columns,
@@ -213,7 +213,7 @@ def coefficient(ground: Ground, piece: int, power: int) -> float:
 
 
 @inlined
-def acceleration(ground: Ground, piece: int, offset: float) -> float:
+def compute_acceleration(ground: Ground, piece: int, offset: float) -> float:
     """Compute the ground acceleration within a piece, g."""
     value = 0.0
     for k in range(ground.columns - 1, -1, -1):
@@ -222,7 +222,7 @@ def acceleration(ground: Ground, piece: int, offset: float) -> float:
 
 
 @inlined
-def acceleration_rate(ground: Ground, piece: int, offset: float) -> float:
+def compute_acceleration_rate(ground: Ground, piece: int, offset: float) -> float:
     """Compute the rate of the ground acceleration within a piece, g/s."""
     value = 0.0
     for k in range(ground.columns - 1, 0, -1):
@@ -324,7 +324,7 @@ def bound_window(
             return AccelerationBounds(low, high, steepest, jumps)
         jumps += bounds.jumps
         if next_piece == piece + 1:
-            jumps += jump_at_end(ground, piece)
+            jumps += compute_end_jump(ground, piece)
         duration -= remaining
         piece, offset = next_piece, 0.0
     return AccelerationBounds(np.nan, np.nan, np.nan, np.nan)
@@ -339,13 +339,13 @@ def spans_stretch(ground: Ground, piece: int, offset: float, duration: float) ->
 
 
 @inlined
-def jump_at_end(ground: Ground, piece: int) -> float:
+def compute_end_jump(ground: Ground, piece: int) -> float:
     """Return the size of the jump at the end of a piece."""
-    return abs(coefficient(ground, piece + 1, 0) - acceleration(ground, piece, piece_length(ground, piece)))
+    return abs(coefficient(ground, piece + 1, 0) - compute_acceleration(ground, piece, piece_length(ground, piece)))
 
 
 @inlined
-def next_piece_beyond(ground: Ground, piece: int, limits: tuple[float, float], restraint: tuple[float, float]) -> int:
+def find_piece_beyond(ground: Ground, piece: int, limits: tuple[float, float], restraint: tuple[float, float]) -> int:
     """Return the first piece from ``piece`` on whose stretch is not within limits, or the last piece.
 
     ``limits`` are multiplied by the weight before ``restraint`` is added.
@@ -353,7 +353,7 @@ def next_piece_beyond(ground: Ground, piece: int, limits: tuple[float, float], r
     below, above = limits
     while piece < last_piece(ground):
         stretch = piece // PIECES_PER_STRETCH
-        weight = 1.0 + (bound_stretch(vertical_component(ground), stretch).low if has_vertical(ground) else 0.0)
+        weight = 1.0 + (bound_stretch(select_vertical(ground), stretch).low if has_vertical(ground) else 0.0)
         bounds = bound_stretch(ground, stretch)
         if bounds.low < below * weight + restraint[0] or bounds.high > above * weight + restraint[1]:
             return piece

@@ -7,10 +7,10 @@ the others that have a block. Weights are in the ground's frame, divided by the 
 from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.series import (
     ValueAndSlope,
+    compute_nonlinear_terms,
+    compute_weighted_terms,
     has_negligible_truncation,
-    nonlinear_velocity_terms,
     sum_forcing,
-    weighted_velocity_terms,
 )
 from rocking.kernels.state import Record, define_record
 
@@ -58,14 +58,14 @@ _NEXT_TERMS = 2.0**-46
 
 
 @inlined
-def push_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
+def compute_push_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
     """Return the ground acceleration at the start of a sample and its slope, g, rounded as `ground.coefficient`."""
     factor = group.factor[lane]
     return (group.push_start[lane] * factor) * unit, (group.push_slope[lane] * factor) * unit
 
 
 @inlined
-def weight_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
+def compute_weight_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
     """Return the weight at the start of a sample, divided by the weight at rest, and its slope."""
     factor = abs(group.factor[lane])
     return 1.0 + (group.vertical_start[lane] * factor) * unit, (group.vertical_slope[lane] * factor) * unit
@@ -102,7 +102,7 @@ def step_linear(group: Record, unit: float) -> int:
     events = 0
     for lane in range(LANE_COUNT):
         h = group.h[lane]
-        start, slope = push_line(group, lane, unit)
+        start, slope = compute_push_line(group, lane, unit)
         end = start + slope * h
         u, v = group.u[lane], group.v[lane]
         lam, push_gain = group.stiffness[lane], group.push_gain[lane]
@@ -188,13 +188,13 @@ def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> 
     for lane in range(LANE_COUNT):
         h = group.length[lane] / substeps
         square, rate = h * h, 1.0 / h
-        side_push = line_during(push_line(group, lane, unit), k, h)
-        weight = line_during(weight_line(group, lane, unit), k, h)
+        side_push = shift_line(compute_push_line(group, lane, unit), k, h)
+        weight = shift_line(compute_weight_line(group, lane, unit), k, h)
         w, d = weight
         u, v = group.next_u[lane], group.next_v[lane]
         q, gain = group.stiffness[lane] * square, group.push_gain[lane] * square
         z0 = q * u - group.pull[lane] * square
-        terms, r10, r11 = weighted_velocity_terms(v * h, z0, q, (gain * side_push[0], gain * side_push[1]), weight)
+        terms, r10, r11 = compute_weighted_terms(v * h, z0, q, (gain * side_push[0], gain * side_push[1]), weight)
         r1, r2, r3, r4, r5, r6, r7, r8, r9 = terms
         last_terms = 0.125 * r8 + ((1.0 / 9.0) * r9 + (0.1 * r10 + (1.0 / 11.0) * r11))
         middle_terms = (1.0 / 3.0) * r3 + (
@@ -214,20 +214,20 @@ def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> 
 
 
 @inlined
-def line_during(line: ValueAndSlope, k: int, h: float) -> ValueAndSlope:
+def shift_line(line: ValueAndSlope, k: int, h: float) -> ValueAndSlope:
     """Return the value of a line at the start of the k-th substep of length h, and its change."""
     change = line[1] * h
     return line[0] + k * change, change
 
 
 @inlined
-def weight_during(
+def shift_weight(
     group: Record, lane: int, resting_weight: ValueAndSlope | None, unit: float, k: int, h: float
 ) -> ValueAndSlope | None:
     """Return the weight at the start of the k-th substep of length h, and its change; None if it is constant."""
     if resting_weight is None:
         return resting_weight
-    return line_during(weight_line(group, lane, unit), k, h)
+    return shift_line(compute_weight_line(group, lane, unit), k, h)
 
 
 @not_inlined
@@ -263,11 +263,11 @@ def take_nonlinear_substep(
         scale = (group.length[lane] / group.h[lane] * fraction) ** 2
         u, r1 = group.next_u[lane], group.next_v[lane]
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
-        weight = weight_during(group, lane, resting_weight, unit, k, span)
-        lane_push = line_during(push_line(group, lane, unit), k, span)
+        weight = shift_weight(group, lane, resting_weight, unit, k, span)
+        lane_push = shift_line(compute_push_line(group, lane, unit), k, span)
         side_push = (group.push_gain[lane] * lane_push[0], group.push_gain[lane] * lane_push[1])
         l2 = group.stiffness[lane] * scale
-        terms, angle_sums = nonlinear_velocity_terms(r1, (s0, c0), l2, side_push, weight)
+        terms, angle_sums = compute_nonlinear_terms(r1, (s0, c0), l2, side_push, weight)
         _, r2, r3, r4, r5, r6, r7, r8, r9 = terms
         last_terms = (1.0 / 7.0) * r7 + (0.125 * r8 + (1.0 / 9.0) * r9)
         change = r1 + (0.5 * r2 + ((1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + last_terms)))))

@@ -21,7 +21,7 @@ from rocking.kernels.lane_steps import (
     GROUP,
     LANE_COUNT,
     STEP_CONSTANTS,
-    push_line,
+    compute_push_line,
     step_linear,
     step_nonlinear,
     step_weighted,
@@ -52,7 +52,7 @@ EMPTY_ROTATION = 1e-300
 COUNTS = define_record(active="i8", started="i8")
 
 
-class Pool(NamedTuple):
+class SimulationPool(NamedTuple):
     """Simulations of blocks under motions, and the lanes in which they run."""
 
     grounds: Grounds  # motions
@@ -69,14 +69,14 @@ class Pool(NamedTuple):
 
 def build_pool(
     grounds: Grounds, motions: Integers, factors: Floats, blocks: Records, states: Records, stop: float, substeps: int
-) -> Pool:
+) -> SimulationPool:
     """Return a pool of simulations up to a stop; ``substeps`` is 0 in the linear model under constant weight."""
     first, last = grounds.first_pieces[:-1], grounds.first_pieces[1:] - 1
     breakpoints = (grounds.pieces[start + 1 : end + 1, START] for start, end in zip(first, last, strict=True))
     ends = np.array([np.searchsorted(times, stop, "right") for times in breakpoints], dtype=np.int64)
     steps = compute_step_constants(blocks, grounds.pieces[first, LENGTH][motions], substeps)
     groups, counts = _allocate_aligned(1, GROUP), create_record(COUNTS, active=LANE_COUNT)
-    return Pool(grounds, motions, factors, blocks, states, steps, ends, groups, counts, create_table(0))
+    return SimulationPool(grounds, motions, factors, blocks, states, steps, ends, groups, counts, create_table(0))
 
 
 def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Records:
@@ -100,15 +100,15 @@ def compute_step_constants(blocks: Records, lengths: Floats, substeps: int) -> R
     steps["stiffness"] = lam
     steps["pull"] = blocks["threshold_slope"] * blocks["threshold"]
     steps["push_gain"] = blocks["threshold_slope"] * sign
-    steps["stumpff_1"] = h * stumpff(1, q)
-    steps["stumpff_2"] = h * h * stumpff(2, q)
-    steps["stumpff_3"] = h * h * h * stumpff(3, q)
+    steps["stumpff_1"] = h * compute_stumpff(1, q)
+    steps["stumpff_2"] = h * h * compute_stumpff(2, q)
+    steps["stumpff_3"] = h * h * h * compute_stumpff(3, q)
     # For lam < 0, u'' inside a step may exceed both ends by |lam| h^2/8 of its largest value.
     steps["curvature_factor"] = h * h / 8.0 / (1.0 - np.maximum(-q, 0.0) / 8.0)
     return steps
 
 
-def stumpff(k: int, q: Any) -> Floats:
+def compute_stumpff(k: int, q: Any) -> Floats:
     """Compute Stumpff's function c_k(q), the sum of q^j/(k + 2j)!, for |q| <= 1 to the last one or two bits."""
     q = np.asarray(q, dtype=np.float64)
     total = np.ones_like(q)
@@ -118,7 +118,7 @@ def stumpff(k: int, q: Any) -> Floats:
 
 
 @inlined
-def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
+def fill_lane(pool: SimulationPool, settings: Record, lane: int, index: int) -> None:
     """Write the state and constants of a simulation into a lane."""
     group, state, steps, motion = pool.groups[0], pool.states[index], pool.steps[index], pool.motions[index]
     side, first, block = state.side, pool.grounds.first_pieces[motion], pool.blocks[index]
@@ -150,7 +150,7 @@ def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
 
 
 @inlined
-def write_lane(pool: Pool, lane: int) -> int:
+def write_lane(pool: SimulationPool, lane: int) -> int:
     """Write a lane into the state of its simulation at the start of a sample, and return the simulation's index.
 
     The state does not yet contain the largest rotation of a block that still rises.
@@ -168,7 +168,7 @@ def write_lane(pool: Pool, lane: int) -> int:
 
 
 @inlined
-def clear_lane(pool: Pool, lane: int) -> None:
+def clear_lane(pool: SimulationPool, lane: int) -> None:
     """Remove the simulation of a lane; no step then changes the lane or detects an event."""
     group = pool.groups[0]
     group.simulation[lane] = -1
@@ -186,7 +186,7 @@ def clear_lane(pool: Pool, lane: int) -> None:
 
 
 @kernel
-def run_lanes(settings: Record, scratch: Record, pool: Pool, substeps: int) -> None:
+def run_lanes(settings: Record, scratch: Record, pool: SimulationPool, substeps: int) -> None:
     """Run all simulations of a pool under evenly sampled records to their ends.
 
     ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``ending`` of every state is an
@@ -209,7 +209,7 @@ def run_lanes(settings: Record, scratch: Record, pool: Pool, substeps: int) -> N
 
 
 @kernel
-def march_blocks(settings: Record, scratch: Record, pool: Pool) -> None:
+def march_blocks(settings: Record, scratch: Record, pool: SimulationPool) -> None:
     """Run all simulations of a pool to their ends, one by one; ``ending`` of every state is then an `Ending`."""
     for index in range(pool.blocks.shape[0]):
         state = pool.states[index]
@@ -218,7 +218,7 @@ def march_blocks(settings: Record, scratch: Record, pool: Pool) -> None:
 
 
 @inlined
-def load_samples(pool: Pool) -> None:
+def load_samples(pool: SimulationPool) -> None:
     """Copy the sample of every lane from its motion; NaN beyond the last, which no step accepts."""
     group, pieces = pool.groups[0], pool.grounds.pieces
     for lane in range(LANE_COUNT):
@@ -242,11 +242,11 @@ def mark_slips(group: Record, unit: float, substeps: int) -> None:
     """
     if substeps == 0:
         for lane in range(LANE_COUNT):
-            sticks = largest_push(group, lane, unit) <= group.sticking_push[lane]
+            sticks = find_largest_push(group, lane, unit) <= group.sticking_push[lane]
             group.overturn_angle[lane] = group.overturn_angle[lane] if sticks else -np.inf
         return
     for lane in range(LANE_COUNT):
-        largest = largest_push(group, lane, unit)
+        largest = find_largest_push(group, lane, unit)
         max_change = -2.0 * group.stiffness[lane] * (substeps * substeps) / group.length[lane]
         speed = abs(group.v[lane]) + max_change * (1.0 + largest)
         sticks = largest <= group.sticking_push[lane] - group.sticking_slope[lane] * (speed * speed)
@@ -254,20 +254,20 @@ def mark_slips(group: Record, unit: float, substeps: int) -> None:
 
 
 @inlined
-def largest_push(group: Record, lane: int, unit: float) -> float:
+def find_largest_push(group: Record, lane: int, unit: float) -> float:
     """Return the largest absolute ground acceleration during a sample, g."""
-    start, slope = push_line(group, lane, unit)
+    start, slope = compute_push_line(group, lane, unit)
     return max(abs(start), abs(start + slope * group.length[lane]))
 
 
 @inlined
-def has_vertical_motion(pool: Pool) -> bool:
+def has_vertical_motion(pool: SimulationPool) -> bool:
     """Return whether the motions have a vertical component."""
     return pool.grounds.stretches.shape[1] > 1
 
 
 @inlined
-def step_group(settings: Record, pool: Pool, substeps: int) -> int:
+def step_group(settings: Record, pool: SimulationPool, substeps: int) -> int:
     """Step all lanes through their samples and return the number of those with possible events."""
     group, unit = pool.groups[0], pool.grounds.unit
     if settings.nonlinear:
@@ -278,7 +278,7 @@ def step_group(settings: Record, pool: Pool, substeps: int) -> int:
 
 
 @inlined
-def march_lane(settings: Record, scratch: Record, pool: Pool, lane: int) -> None:
+def march_lane(settings: Record, scratch: Record, pool: SimulationPool, lane: int) -> None:
     """March the block of a lane at least through one sample; if its simulation ends, start another one."""
     index = write_lane(pool, lane)
     if march_to_sample(settings, scratch, pool, index):
@@ -288,7 +288,7 @@ def march_lane(settings: Record, scratch: Record, pool: Pool, lane: int) -> None
 
 
 @not_inlined
-def start_simulation(settings: Record, scratch: Record, pool: Pool, lane: int) -> None:
+def start_simulation(settings: Record, scratch: Record, pool: SimulationPool, lane: int) -> None:
     """Start simulations until one rocks at the start of a sample, and put it into a lane; without one, clear it."""
     while pool.counts.started < pool.blocks.shape[0]:
         index = pool.counts.started
@@ -301,7 +301,7 @@ def start_simulation(settings: Record, scratch: Record, pool: Pool, lane: int) -
 
 
 @inlined
-def march_to_sample(settings: Record, scratch: Record, pool: Pool, index: int) -> bool:
+def march_to_sample(settings: Record, scratch: Record, pool: SimulationPool, index: int) -> bool:
     """March a block until it rocks at the start of a sample that lanes may step, or to its end; False at its end."""
     state, block, motion = pool.states[index], pool.blocks[index], pool.motions[index]
     ground = select_ground(pool.grounds, motion, pool.factors[index])

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign, weight_at
-from rocking.kernels.certificate import no_proof
+from rocking.kernels.arc import compute_restoring, compute_weight, evaluate_series, expand_arc, side_sign
+from rocking.kernels.certificate import create_failed_proof
 from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import StepEnd, advance_to_event, apply_impact, find_first_root, raise_peak
 from rocking.kernels.ground import Ground, has_vertical, is_piecewise_linear, last_piece, piece_length, piece_start
@@ -15,20 +15,20 @@ from rocking.kernels.rest import (
     Rest,
     apply_proven_impacts,
     bound_rest,
+    compute_present_restoring,
+    compute_state_time,
     count_impact,
     decide_rest,
-    present_restoring,
-    state_time,
     store_proof,
 )
 from rocking.kernels.restraints import (
     apply_tendon_law,
     change_tendon_law,
-    elongation_from_rotation,
+    compute_elongation,
     find_leaning_rotation,
     find_tendon_law_change,
 )
-from rocking.kernels.short_arc import short_step, undecided_step
+from rocking.kernels.short_arc import create_undecided_step, take_short_step
 from rocking.kernels.sliding import (
     expand_slide,
     expand_slip,
@@ -39,8 +39,8 @@ from rocking.kernels.sliding import (
     move_slip,
     settle_slip,
     slides_flat,
-    slip_after_sequence,
     strike_with_friction,
+    sum_slip_of_sequence,
 )
 from rocking.kernels.state import (
     AT_REST,
@@ -51,8 +51,8 @@ from rocking.kernels.state import (
     RestRule,
     StepOutcome,
     TendonLaw,
+    encode_resting_side,
     has_space,
-    resting_side,
     write_event,
     write_impact,
     write_node,
@@ -94,8 +94,8 @@ def march(ground: Ground, block: Record, settings: Record, table: Records, scrat
 @inlined
 def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Record) -> None:
     """Apply the law of the state to a tendon; one that starts too far from rest has already yielded."""
-    if state_time(ground, state) == 0.0 and state.side >= 0:
-        elongation = elongation_from_rotation(block, settings.nonlinear, state.side, state.u)
+    if compute_state_time(ground, state) == 0.0 and state.side >= 0:
+        elongation = compute_elongation(block, settings.nonlinear, state.side, state.u)
         state.plastic_elongation = max(state.plastic_elongation, elongation - block.yield_elongation)
     apply_tendon_law(block, state.tendon_law, state.plastic_elongation)
 
@@ -105,18 +105,18 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
     """Advance a block to its next uplift or, along an arc, to its first event."""
     write_node(ground, settings, table, state)
     if state.side < 0 and state.direction != 0:
-        return slide(ground, block, settings, table, scratch, state)
+        return slide_flat(ground, block, settings, table, scratch, state)
     if state.side < 0:
         return rest_until_uplift(ground, block, settings, table, scratch, state)
     simple = is_piecewise_linear(ground) and not (has_vertical(ground) or settings.nonlinear)
     is_proven = state.proven_impacts > 0 and state.u == 0.0 and state.direction == 0
     if is_proven and simple and not (block.restrained or block.variable_restitution):
-        apply_proven_impacts(ground, block, settings, table, state, time_to_boundary(ground, settings, state))
+        apply_proven_impacts(ground, block, settings, table, state, compute_time_to_boundary(ground, settings, state))
     outcome = step_along_arc(ground, block, settings, scratch, state)
     if outcome == StepOutcome.IMPACT or (outcome == StepOutcome.OVERTURN and block.two_stops):
         return process_impact(ground, block, settings, table, scratch, state)
     if outcome == StepOutcome.OVERTURN:
-        state.end_time = state.peak_time = state_time(ground, state)
+        state.end_time = state.peak_time = compute_state_time(ground, state)
         state.peak = block.overturn_angle
         write_node(ground, settings, table, state)
         write_event(settings, table, state, state.end_time, EventKind.OVERTURN)
@@ -127,7 +127,7 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
         write_node(ground, settings, table, state)
         return Ending.DONE
     if outcome == StepOutcome.LEANS:
-        state.end_time = state_time(ground, state)
+        state.end_time = compute_state_time(ground, state)
         return Ending.LEANS
     if outcome == StepOutcome.LOST:
         return lose_contact(ground, settings, table, state)
@@ -153,15 +153,15 @@ def rest_until_uplift(
     state.side = uplift.side
     state.u = state.v = 0.0
     if block.has_friction:
-        if weight_at(ground, state.piece, state.offset) <= 0.0:
+        if compute_weight(ground, state.piece, state.offset) <= 0.0:
             return lose_contact(ground, settings, table, state)
         if block.static_friction <= block.threshold[state.side]:
-            state.time_at_rest += state_time(ground, state) - state.last_rest_time
+            state.time_at_rest += compute_state_time(ground, state) - state.last_rest_time
             start_slip(block, state, 1 - 2 * state.side)
             write_slip_event(ground, settings, table, state)
             return Ending.RUNNING
     state.continuous_uplift = not uplift.is_jump
-    state.last_uplift_time = state.last_impact_time = state_time(ground, state)
+    state.last_uplift_time = state.last_impact_time = compute_state_time(ground, state)
     state.certificate_speed = np.inf
     state.time_at_rest += state.last_uplift_time - state.last_rest_time
     if state.uplifts == 0:
@@ -184,16 +184,16 @@ def rest_until_uplift(
 @inlined
 def step_along_arc(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> int:
     """Take one Taylor step along the arc, at most to its first event, and return its `StepOutcome`."""
-    h_max = time_to_boundary(ground, settings, state)
+    h_max = compute_time_to_boundary(ground, settings, state)
     if h_max <= 0.0:
         return StepOutcome.STOPPED
     if state.direction != 0:
         return slip_along_arc(ground, block, settings, scratch, state, h_max)
-    end = undecided_step()
+    end = create_undecided_step()
     if not state.continuous_uplift:
-        end = short_step(ground, block, settings, state, h_max)
+        end = take_short_step(ground, block, settings, state, h_max)
     if end.outcome == StepOutcome.UNDECIDED:
-        end = full_step(ground, block, settings, scratch, state, h_max)
+        end = take_full_step(ground, block, settings, scratch, state, h_max)
     if block.has_friction and may_slip(ground, block, settings, scratch, state, end):
         return step_to_slip(ground, block, settings, scratch, state, end, h_max)
     if state.v < 0.0 <= end.v and end.outcome == StepOutcome.STEP:
@@ -202,7 +202,9 @@ def step_along_arc(ground: Ground, block: Record, settings: Record, scratch: Rec
 
 
 @inlined
-def full_step(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float) -> StepEnd:
+def take_full_step(
+    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
+) -> StepEnd:
     """Step along the full series of the arc."""
     order, h, _ = expand_arc(ground, block, settings, scratch, state, h_max)
     if state.continuous_uplift:  # by rounding, an uplift may seem to be pushed back
@@ -213,7 +215,7 @@ def full_step(ground: Ground, block: Record, settings: Record, scratch: Record, 
             state.leaning_rotation = leaning_rotation
             return StepEnd(StepOutcome.LEANS, 0.0, state.u, state.v, 0.0, state.u)
     if block.yielding:
-        return yielding_step(block, settings, scratch, state, order, h)
+        return step_yielding(block, settings, scratch, state, order, h)
     is_balanced = state.v == 0.0 and scratch.rotation[2] == 0.0
     if is_balanced and state.piece == last_piece(ground) and settings.no_end_time:
         return StepEnd(StepOutcome.BALANCED, 0.0, state.u, 0.0, 0.0, 0.0)
@@ -278,11 +280,11 @@ def slip_along_arc(
 
 
 @inlined
-def slide(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
+def slide_flat(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
     """Take a step of a block that slides on both pivots."""
-    if weight_at(ground, state.piece, state.offset) <= 0.0:
+    if compute_weight(ground, state.piece, state.offset) <= 0.0:
         return lose_contact(ground, settings, table, state)
-    h_max = time_to_boundary(ground, settings, state)
+    h_max = compute_time_to_boundary(ground, settings, state)
     if h_max <= 0.0:
         state.end_time = settings.stop
         return Ending.DONE
@@ -298,14 +300,14 @@ def slide(ground: Ground, block: Record, settings: Record, table: Records, scrat
     if stick <= min(h, lost):
         state.direction = 0
         state.slip_rate = 0.0
-        count_rest(settings, table, state, state_time(ground, state))
+        count_rest(settings, table, state, compute_state_time(ground, state))
     return lose_contact(ground, settings, table, state) if lost < min(h, stick) else Ending.RUNNING
 
 
 @inlined
 def lose_contact(ground: Ground, settings: Record, table: Records, state: Record) -> int:
     """End a march because the ground no longer presses on the block."""
-    state.end_time = state_time(ground, state)
+    state.end_time = compute_state_time(ground, state)
     write_node(ground, settings, table, state)
     write_event(settings, table, state, state.end_time, EventKind.LOST)
     return Ending.LOST
@@ -315,7 +317,7 @@ def lose_contact(ground: Ground, settings: Record, table: Records, state: Record
 def write_slip_event(ground: Ground, settings: Record, table: Records, state: Record) -> None:
     """Write the start or end of a slip."""
     kind = EventKind.STICK if state.direction == 0 else (EventKind.SLIDE if state.side < 0 else EventKind.SLIDE_ROCK)
-    write_event(settings, table, state, state_time(ground, state), kind)
+    write_event(settings, table, state, compute_state_time(ground, state), kind)
 
 
 @inlined
@@ -329,7 +331,7 @@ def count_rest(settings: Record, table: Records, state: Record, time: float) -> 
 
 
 @not_inlined
-def yielding_step(block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
+def step_yielding(block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
     """Step along a series to its first event or the next change of the tendon's law."""
     change, law = find_tendon_law_change(block, settings, scratch, state, order, h)
     end = advance_to_event(state, scratch, order, min(h, change), block.overturn_angle)
@@ -344,7 +346,7 @@ def yielding_step(block: Record, settings: Record, scratch: Record, state: Recor
 def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, h_max: float) -> int:
     """Move the state to the end of a step and return its `StepOutcome`."""
     if end.peak > state.peak:
-        raise_peak(state, end.peak, state_time(ground, state) + end.peak_time)
+        raise_peak(state, end.peak, compute_state_time(ground, state) + end.peak_time)
     time_to_stop = settings.stop - piece_start(ground, state.piece) - state.offset
     is_last_step = time_to_stop <= piece_length(ground, state.piece) - state.offset
     reaches_stop = end.outcome == StepOutcome.STEP and end.time >= h_max and is_last_step
@@ -372,13 +374,13 @@ def process_impact(
     """Process an impact and the decision on rest; DONE if the march ends there."""
     normalise_offset(ground, state)
     if has_vertical(ground) and is_pushed_off_both_sides(ground, block, state, state.offset):
-        acceleration = abs(restoring_acceleration(ground, block, state.side, state.piece, state.offset))
+        acceleration = abs(compute_restoring(ground, block, state.side, state.piece, state.offset))
         depth = 0.5 * state.v * state.v / acceleration  # distance below zero rotation without ground
         state.rounding_decisions += depth <= _AMBIGUOUS_DISTANCE * state.peak
         if depth <= _CONTACT_ROUNDING * state.peak:  # no impact, because it would put the block on the other side
             state.v = 0.0
             return Ending.RUNNING
-    time = state_time(ground, state)
+    time = compute_state_time(ground, state)
     speed = apply_impact(block, state)
     if block.has_friction:
         slipped = state.direction
@@ -387,7 +389,7 @@ def process_impact(
             write_slip_event(ground, settings, table, state)
     write_impact(settings, table, state, time, speed)
     count_impact(state)
-    proof = no_proof()
+    proof = create_failed_proof()
     if settings.rest_rule == RestRule.CERTIFIED and state.v <= state.certificate_speed:
         proof = bound_rest(ground, block, settings, scratch, state)
         store_proof(ground, block, settings, state, proof)
@@ -401,8 +403,8 @@ def process_impact(
 @inlined
 def is_pushed_off_both_sides(ground: Ground, block: Record, state: Record, offset: float) -> bool:
     """Return whether a block at zero rotation is pushed off to both sides."""
-    side_acceleration = restoring_acceleration(ground, block, state.side, state.piece, offset)
-    other_acceleration = restoring_acceleration(ground, block, block.next_side[state.side], state.piece, offset)
+    side_acceleration = compute_restoring(ground, block, state.side, state.piece, offset)
+    other_acceleration = compute_restoring(ground, block, block.next_side[state.side], state.piece, offset)
     return bool(side_acceleration < 0.0 and other_acceleration < 0.0)
 
 
@@ -429,7 +431,7 @@ def finish_sequence(
     ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record, rest: Rest
 ) -> int:
     """Finish a sequence of impacts; DONE if the march stops before the block is at rest."""
-    time = state_time(ground, state)
+    time = compute_state_time(ground, state)
     state.rests_by_rounding += rest.by_rounding
     if state.proven_impacts == 0 or not rest.upper >= 0.0:
         state.proven_impacts = 1
@@ -443,7 +445,7 @@ def finish_sequence(
     if state.direction != 0:
         finish_while_sliding(ground, block, settings, table, scratch, state, rest.time)
         return Ending.RUNNING
-    state.side = resting_side(block, state.side)
+    state.side = encode_resting_side(block, state.side)
     state.u = state.v = 0.0
     count_rest(settings, table, state, time + rest.time)
     state.offset += rest.time
@@ -457,11 +459,9 @@ def finish_while_sliding(
 ) -> None:
     """Move a block to the end of a sequence of impacts after which it slides."""
     i = state.side
-    g, other_g = (
-        present_restoring(ground, block, settings, state, i),
-        present_restoring(ground, block, settings, state, 1 - i),
-    )
-    drift, shift = slip_after_sequence(block, settings, state, g, other_g)
+    g = compute_present_restoring(ground, block, settings, state, i)
+    other_g = compute_present_restoring(ground, block, settings, state, 1 - i)
+    drift, shift = sum_slip_of_sequence(block, settings, state, g, other_g)
     state.slip_rate += drift
     state.u = state.v = 0.0
     while duration > 0.0:
@@ -482,7 +482,7 @@ def finish_while_sliding(
 
 
 @inlined
-def time_to_boundary(ground: Ground, settings: Record, state: Record) -> float:
+def compute_time_to_boundary(ground: Ground, settings: Record, state: Record) -> float:
     """Return the time to the end of the piece or of the response, whichever is first."""
     time_to_stop = settings.stop - piece_start(ground, state.piece) - state.offset
     return min(piece_length(ground, state.piece) - state.offset, time_to_stop)

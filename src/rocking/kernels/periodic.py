@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats, Integers
-from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign
+from rocking.kernels.arc import compute_restoring, evaluate_series, expand_arc, side_sign
 from rocking.kernels.compiled import inlined, kernel, not_inlined
-from rocking.kernels.events import relative_speed_slope, restitution_factor
-from rocking.kernels.ground import ROUNDING, Ground, component_coefficients, piece_length, piece_start
+from rocking.kernels.events import compute_restitution_factor, compute_speed_slope
+from rocking.kernels.ground import ROUNDING, Ground, piece_length, piece_start, scale_coefficients
 from rocking.kernels.march import march
 from rocking.kernels.series import write_variation_coefficients
 from rocking.kernels.state import AT_REST, Ending, Record, Records
@@ -132,7 +132,7 @@ def advance_period(problem: PeriodicProblem, scratch: Record, state: Record) -> 
     """Advance a state by one period and return its `PeriodOutcome`."""
     ground, block, settings, table, steps = problem
     pieces = count_pieces(ground)
-    state.budget = iteration_budget(state)
+    state.budget = compute_iteration_budget(state)
     ending = Ending.RUNNING.value
     while ending == Ending.RUNNING and state.piece < pieces:
         state.stop_piece = pieces
@@ -145,7 +145,7 @@ def advance_period(problem: PeriodicProblem, scratch: Record, state: Record) -> 
 
 
 @inlined
-def iteration_budget(state: Record) -> int:
+def compute_iteration_budget(state: Record) -> int:
     """Return the number of march iterations allowed from a state."""
     return MAX_ITERATIONS if state.u < MAX_STATE and abs(state.v) < MAX_STATE else 0
 
@@ -187,7 +187,7 @@ def build_step_rows(ground: Ground, block: Record) -> Floats:
     """
     pieces = (len(ground.pieces) - 3) // 2
     rows = np.zeros((2, pieces, _COLUMNS))
-    length, coefficients = ground.pieces[:pieces, 1], component_coefficients(ground, np.arange(pieces))[0]
+    length, coefficients = ground.pieces[:pieces, 1], scale_coefficients(ground, np.arange(pieces))[0]
     if any(np.any(block[name]) for name in ("restraint_threshold", "added_weight", "spring")):
         return np.zeros((2, 0, _COLUMNS))
     for side in range(2):
@@ -287,7 +287,7 @@ def differentiate_period(
         initial = 0.0 if is_held else side_sign(uplift.side)
     M[0, 0], M[0, 1], M[1, 0], M[1, 1] = initial, 0.0, 0.0, initial
     state.stop_piece = count_pieces(ground)
-    state.budget = iteration_budget(state)
+    state.budget = compute_iteration_budget(state)
     ending = Ending.FULL.value
     impacts, area = 0, 0.0
     while ending == Ending.FULL:
@@ -375,9 +375,9 @@ def apply_rest_derivative(ground: Ground, block: Record, node: Record, next_node
     |determinant|.
     """
     side = node.side
-    acceleration = restoring_acceleration(ground, block, side, next_node.piece, next_node.offset)
+    acceleration = compute_restoring(ground, block, side, next_node.piece, next_node.offset)
     if acceleration >= 0.0 and not block.two_stops:
-        acceleration = restoring_acceleration(ground, block, block.next_side[side], next_node.piece, next_node.offset)
+        acceleration = compute_restoring(ground, block, block.next_side[side], next_node.piece, next_node.offset)
     if acceleration >= 0.0 or node.u > 0.0:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
     elif node.v > 0.0:
@@ -398,12 +398,10 @@ def apply_saltation(ground: Ground, block: Record, departed_side: int, next_node
     changes_stop = block.two_stops and next_node.side != departed_side
     hit, sign = (next_node.side, -1.0) if changes_stop else (departed_side, 1.0)
     speed = -sign * v
-    e = restitution_factor(block, hit, speed, 0)  # not drawn
-    rate = e * relative_speed_slope(block, hit, speed, e)
-    g_before = (
-        restoring_acceleration(ground, block, hit, next_node.piece, next_node.offset) - block.damping[hit] * speed
-    )
-    g_after = restoring_acceleration(ground, block, next_node.side, next_node.piece, next_node.offset) + block.damping[
+    e = compute_restitution_factor(block, hit, speed, 0)  # not drawn
+    rate = e * compute_speed_slope(block, hit, speed, e)
+    g_before = compute_restoring(ground, block, hit, next_node.piece, next_node.offset) - block.damping[hit] * speed
+    g_after = compute_restoring(ground, block, next_node.side, next_node.piece, next_node.offset) + block.damping[
         next_node.side
     ] * (e * speed)
     coupling = (rate * g_before + g_after) / speed

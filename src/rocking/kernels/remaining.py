@@ -84,7 +84,7 @@ def estimate_remaining_time(v: float, i: ImpactSide, j: ImpactSide) -> float:
 
 
 @inlined
-def side_at_candidate(side: ImpactSide, s: float) -> RestSide:
+def find_side_at_candidate(side: ImpactSide, s: float) -> RestSide:
     """Expand a side about a candidate s later, with s as the unit of time; g is NaN if not positive."""
     g = side.g + s * (side.rate + s * side.curvature)
     rate = s * (side.rate + 2.0 * s * side.curvature)
@@ -92,7 +92,7 @@ def side_at_candidate(side: ImpactSide, s: float) -> RestSide:
 
 
 @inlined
-def mean_restoring(a: RestSide, half: Series, sign: float) -> Triple:
+def average_restoring(a: RestSide, half: Series, sign: float) -> Triple:
     """Compute coefficients 1, 2, 3 of B, where Y B is the speed at the start (sign -1) or end (+1) of an arc.
 
     Y is half the duration, C = z - Y the remaining time and G = g - rate C + curvature C^2 the acceleration at its
@@ -125,9 +125,9 @@ def mean_restoring(a: RestSide, half: Series, sign: float) -> Triple:
 
 
 @inlined
-def known_speed_terms(a: RestSide, half: Series, sign: float) -> Triple:
+def compute_known_speed_terms(a: RestSide, half: Series, sign: float) -> Triple:
     """Compute coefficients 2, 3, 4 of Y B without g Y, which contains the unknown coefficient."""
-    b = mean_restoring(a, half, sign)
+    b = average_restoring(a, half, sign)
     y, y2, y3, _ = half
     return y * b[0], y2 * b[0] + y * b[1], y3 * b[0] + y2 * b[1] + y * b[2]
 
@@ -140,11 +140,11 @@ def solve_pair(first: float, second: float, p: float, q: float) -> Pair:
 
 
 @inlined
-def speed_difference(m: Series, ends: Triple, starts: Triple, speed: Series, e: float) -> Triple:
+def compute_speed_difference(m: Series, ends: Triple, starts: Triple, speed: Series, e: float) -> Triple:
     """Compute orders 2, 3, 4 of the difference of the speeds at an impact, with zero half durations of that order.
 
-    ``m`` is the remaining time at the next impact, ``ends`` and ``starts`` are the `known_speed_terms` of this arc's
-    end and the next one's start, and ``speed`` is the initial speed of the next arc.
+    ``m`` is the remaining time at the next impact, ``ends`` and ``starts`` are the `compute_known_speed_terms` of this
+    arc's end and the next one's start, and ``speed`` is the initial speed of the next arc.
     """
     square = m[0] * m[0]
     second = square * starts[0] - e * ends[0]
@@ -159,7 +159,7 @@ def speed_difference(m: Series, ends: Triple, starts: Triple, speed: Series, e: 
 
 
 @inlined
-def remaining_after(half: Series) -> Series:
+def subtract_arc(half: Series) -> Series:
     """Compute the remaining time at the next impact, z - 2 Y."""
     return 1.0 - 2.0 * half[0], -2.0 * half[1], -2.0 * half[2], -2.0 * half[3]
 
@@ -182,13 +182,13 @@ def extend_curves(
     a: RestSide, b: RestSide, e_a: float, e_b: float, A: Curve, B: Curve, order: int
 ) -> tuple[Curve, Curve]:
     """Return both curves with the coefficients of one more order: 2, 3 or 4."""
-    starts_a, starts_b = known_speed_terms(a, A.half, -1.0), known_speed_terms(b, B.half, -1.0)
-    ends_a, ends_b = known_speed_terms(a, A.half, 1.0), known_speed_terms(b, B.half, 1.0)
-    m_a, m_b = remaining_after(A.half), remaining_after(B.half)
+    starts_a, starts_b = compute_known_speed_terms(a, A.half, -1.0), compute_known_speed_terms(b, B.half, -1.0)
+    ends_a, ends_b = compute_known_speed_terms(a, A.half, 1.0), compute_known_speed_terms(b, B.half, 1.0)
+    m_a, m_b = subtract_arc(A.half), subtract_arc(B.half)
     k = order - 2
-    source_a = speed_difference(m_a, ends_a, starts_b, B.speed, e_a)[k] * (1.0 / B.speed[0])
-    source_b = speed_difference(m_b, ends_b, starts_a, A.speed, e_b)[k] * (1.0 / A.speed[0])
-    y_a, y_b = solve_pair(source_a, source_b, integer_power(m_a[0], order), integer_power(m_b[0], order))
+    source_a = compute_speed_difference(m_a, ends_a, starts_b, B.speed, e_a)[k] * (1.0 / B.speed[0])
+    source_b = compute_speed_difference(m_b, ends_b, starts_a, A.speed, e_b)[k] * (1.0 / A.speed[0])
+    y_a, y_b = solve_pair(source_a, source_b, raise_to_power(m_a[0], order), raise_to_power(m_b[0], order))
     y_a *= A.half[0]
     y_b *= B.half[0]
     A = set_coefficient(A, y_a, starts_a[k] + a.g * y_a, order)
@@ -196,7 +196,7 @@ def extend_curves(
 
 
 @inlined
-def integer_power(x: float, order: int) -> float:
+def raise_to_power(x: float, order: int) -> float:
     """Return x to the power of 2, 3 or 4."""
     square = x * x
     if order == 2:
@@ -216,7 +216,7 @@ def set_coefficient(A: Curve, y: float, speed: float, order: int) -> Curve:
 
 
 @inlined
-def initial_speed(a: RestSide, half: Series) -> float:
+def compute_initial_speed(a: RestSide, half: Series) -> float:
     """Compute the initial speed of the first arc (z = 1) divided by the remaining time."""
     y = half[0] + half[1] + half[2] + half[3]
     c = 1.0 - y
@@ -243,9 +243,9 @@ def solve_candidate(
     Returns the time, both sides at that time, their curves, and the residual of speed(time) = v, divided by the time.
     """
     e_i, e_j = i.restitution, j.restitution
-    a, b = side_at_candidate(i, s), side_at_candidate(j, s)
+    a, b = find_side_at_candidate(i, s), find_side_at_candidate(j, s)
     A, B = expand_curves(a, b, e_i, e_j)
-    residual = v / s - initial_speed(a, A.half)
+    residual = v / s - compute_initial_speed(a, A.half)
     for _ in range(_MAX_NEWTON_STEPS):
         if not abs(residual) > _SPEED_TOLERANCE * A.speed[0]:
             break
@@ -256,9 +256,9 @@ def solve_candidate(
         s += s * residual / slope
         if not s > 0.0:
             s = math.nan
-        a, b = side_at_candidate(i, s), side_at_candidate(j, s)
+        a, b = find_side_at_candidate(i, s), find_side_at_candidate(j, s)
         A, B = expand_curves(a, b, e_i, e_j)
-        residual = v / s - initial_speed(a, A.half)
+        residual = v / s - compute_initial_speed(a, A.half)
     return s, a, b, A, B, residual
 
 
@@ -281,7 +281,7 @@ def sum_magnitudes(series: Series) -> float:
 
 @inlined
 def bound_mean_restoring(a: RestSide, half: Series) -> Pair:
-    """Bound the terms of B (`mean_restoring`) beyond order 3, divided by z^4, and all of B."""
+    """Bound the terms of B (`average_restoring`) beyond order 3, divided by z^4, and all of B."""
     y, y2 = half[0], abs(half[1])
     c = abs(1.0 - y)
     Y = sum_magnitudes(half)
@@ -347,8 +347,8 @@ def bound_arcs(side: ImpactSide, a: RestSide, half: Series) -> ArcLimits:
     min_slope = min_restoring * (1.0 - stiffness) - (THIRD * curvature * Y * Y + 0.1 * rate * stiffness * Y) * _MARGIN
     growth = half[0] - (2.0 * abs(half[1]) + 3.0 * abs(half[2]) + 4.0 * abs(half[3])) * _MARGIN
     higher_terms, mean_bound = bound_mean_restoring(a, half)
-    end = bound_speed(half, mean_restoring(a, half, 1.0), higher_terms)
-    start = bound_speed(half, mean_restoring(a, half, -1.0), higher_terms)
+    end = bound_speed(half, average_restoring(a, half, 1.0), higher_terms)
+    start = bound_speed(half, average_restoring(a, half, -1.0), higher_terms)
     is_valid = min_restoring > 0.0 and min_slope > 0.0 and growth > 0.0 and stiffness <= _MAX_STIFFNESS
     inverse = 1.0 / (min_slope * growth) if is_valid else math.nan
     fourth = stiffness * ((a.g + change) / 7.0 + change * Y / 450.0)
@@ -419,7 +419,7 @@ def bound_remainder(
     """Bound the distance of the time of rest from a candidate (see `solve_candidate`), divided by it; NaN: no proof."""
     A, B = curves
     limits_i, limits_j = bound_arcs(i, sides[0], A.half), bound_arcs(j, sides[1], B.half)
-    m_i, m_j = remaining_after(A.half), remaining_after(B.half)
+    m_i, m_j = subtract_arc(A.half), subtract_arc(B.half)
     shift_i = bound_shifts(m_i, limits_i, limits_j, B.speed, i.restitution)
     shift_j = bound_shifts(m_j, limits_j, limits_i, A.speed, j.restitution)
     ratios = bound_ratio(m_i, shift_i, shift_j), bound_ratio(m_j, shift_j, shift_i)

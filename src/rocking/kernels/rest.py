@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.kernels.arc import restoring_acceleration, side_sign, weight_at
+from rocking.kernels.arc import compute_restoring, compute_weight, side_sign
 from rocking.kernels.certificate import Proof, prove_rest, prove_slide
 from rocking.kernels.compiled import inlined, not_inlined
-from rocking.kernels.events import is_factor_random, mean_factor
+from rocking.kernels.events import compute_mean_factor, is_factor_random
 from rocking.kernels.ground import Ground, coefficient, piece_length, piece_start
 from rocking.kernels.remaining import THIRD, Pair
-from rocking.kernels.sliding import slip_factor, slip_restoring
+from rocking.kernels.sliding import compute_slip_factor, compute_slip_restoring
 from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRule, write_impact, write_node
 
 ULP = 2.0**-52
@@ -38,7 +38,7 @@ class Rest(NamedTuple):
 
 
 @inlined
-def state_time(ground: Ground, state: Record) -> float:
+def compute_state_time(ground: Ground, state: Record) -> float:
     """Return the time of a state."""
     return piece_start(ground, state.piece) + state.offset
 
@@ -60,25 +60,25 @@ def store_proof(ground: Ground, block: Record, settings: Record, state: Record, 
         return
     if state.proven_impacts == 0:
         state.proven_impacts = 1
-        state.sequence_start = state_time(ground, state)
+        state.sequence_start = compute_state_time(ground, state)
     excess = (proof.upper - proof.lower) / settings.tolerance
     if block.variable_restitution or state.direction != 0:
         # The width is proportional to the square of the speed, or to the speed if the factor is drawn.
         ratio = 1.0 / excess if is_factor_random(block) else math.sqrt(1.0 / excess)
     else:
-        wait = time_to_last_piece(ground, state, proof.time)
+        wait = compute_time_to_last_piece(ground, state, proof.time)
         # The width of a fourth-order bracket is proportional to the fifth power of the speed, of the geometric one to
         # its square. The former requires a rest within the present piece.
         ratio = _RETRY_MARGIN * excess**-0.2 if wait == 0.0 else 1.0 - wait / proof.time
         ratio = max(ratio, math.sqrt(1.0 / excess))
     # Approximate length of the next arc. Arcs are proportional to the speed, and must exceed the rounding of times.
     arc = (1.0 - max(block.restitution[0], block.restitution[1])) * proof.time
-    min_ratio = _MIN_INTERVAL * ULP * state_time(ground, state) / arc if arc > 0.0 else 0.0
+    min_ratio = _MIN_INTERVAL * ULP * compute_state_time(ground, state) / arc if arc > 0.0 else 0.0
     state.certificate_speed = state.v * min(_MAX_RETRY_RATIO, max(ratio, min_ratio))
 
 
 @inlined
-def time_to_last_piece(ground: Ground, state: Record, time: float) -> float:
+def compute_time_to_last_piece(ground: Ground, state: Record, time: float) -> float:
     """Return the time from a state to the start of the piece that is reached ``time`` later."""
     piece = state.piece
     wait = 0.0
@@ -97,12 +97,12 @@ def bound_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
         lower, upper, time, height = prove_rest(ground, block, settings, scratch, state)
     else:
         lower, upper, time, height = prove_slide(ground, block, settings, scratch, state)
-    rounding = rounding_allowance(state_time(ground, state), upper, state)
+    rounding = bound_rounding_of_rest(compute_state_time(ground, state), upper, state)
     return Proof(lower - rounding, upper + rounding, time, height)
 
 
 @inlined
-def rounding_allowance(time: float, upper: float, state: Record) -> float:
+def bound_rounding_of_rest(time: float, upper: float, state: Record) -> float:
     """Compute an allowance for the rounding of times and of the arcs since the first proof."""
     since_proof = time - state.sequence_start if state.proven_impacts > 0 else 0.0
     return 4.0 * ULP * time + 8.0 * ULP * (max(state.proven_impacts, 1) + 4) * (since_proof + upper)
@@ -111,17 +111,17 @@ def rounding_allowance(time: float, upper: float, state: Record) -> float:
 @not_inlined
 def decide_rest(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> Rest:
     """Decide whether the block comes to rest at an impact, given the proven bounds (NaN: none)."""
-    time = state_time(ground, state)
+    time = compute_state_time(ground, state)
     if settings.rest_rule == RestRule.CERTIFIED:
         if state.v == 0.0:
-            rounding = rounding_allowance(time, 0.0, state)
+            rounding = bound_rounding_of_rest(time, 0.0, state)
             return Rest(-rounding, rounding, 0.0, False)
         # No unresolved rotation may exceed the resolved ones.
-        max_width = max(settings.tolerance, 4.0 * rounding_allowance(time, proof.upper, state))
+        max_width = max(settings.tolerance, 4.0 * bound_rounding_of_rest(time, proof.upper, state))
         if proof.upper - proof.lower <= max_width and proof.height <= state.peak:
             return Rest(proof.lower, proof.upper, proof.time, False)
     elif settings.rest_rule == RestRule.BYPASS:
-        remaining = geometric_rest_time(ground, block, settings, state)
+        remaining = sum_geometric_arcs(ground, block, settings, state)
         if state.v <= block.rest_limit[state.side] and remaining >= 0.0:
             return Rest(np.nan, np.nan, remaining, False)
     else:
@@ -136,38 +136,39 @@ def decide_rest(ground: Ground, block: Record, settings: Record, state: Record, 
 
 
 @inlined
-def geometric_rest_time(ground: Ground, block: Record, settings: Record, state: Record) -> float:
+def sum_geometric_arcs(ground: Ground, block: Record, settings: Record, state: Record) -> float:
     """Compute the time to rest after an impact under constant accelerations, or NaN if one does not press down.
 
     Sum of the paper's Eq. 75 without remainder: arcs of 2 v/g, with speeds reduced by a factor at each impact.
     """
     i, j = state.side, block.next_side[state.side]
-    g_i = present_restoring(ground, block, settings, state, i)
-    g_j = present_restoring(ground, block, settings, state, j)
-    e_i, e_j = mean_factor(block, i, state.v), mean_factor(block, j, state.v)
+    g_i = compute_present_restoring(ground, block, settings, state, i)
+    g_j = compute_present_restoring(ground, block, settings, state, j)
+    e_i, e_j = compute_mean_factor(block, i, state.v), compute_mean_factor(block, j, state.v)
     if state.direction != 0:
-        e_i, e_j = slip_factor(block, i, e_i, state.direction), slip_factor(block, j, e_j, state.direction)
+        e_i = compute_slip_factor(block, i, e_i, state.direction)
+        e_j = compute_slip_factor(block, j, e_j, state.direction)
     if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0):
         return np.nan
     return 2.0 * state.v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
 
 
 @inlined
-def present_restoring(ground: Ground, block: Record, settings: Record, state: Record, side: int) -> float:
+def compute_present_restoring(ground: Ground, block: Record, settings: Record, state: Record, side: int) -> float:
     """Compute the restoring acceleration of a side at zero rotation for the present slip, if any."""
     if state.direction == 0:
-        return restoring_acceleration(ground, block, side, state.piece, state.offset)
-    weight = weight_at(ground, state.piece, state.offset)
-    return weight * slip_restoring(block, settings, side, side_sign(side) * state.direction)
+        return compute_restoring(ground, block, side, state.piece, state.offset)
+    weight = compute_weight(ground, state.piece, state.offset)
+    return weight * compute_slip_restoring(block, settings, side, side_sign(side) * state.direction)
 
 
 @inlined
 def is_within_time_rounding(ground: Ground, block: Record, settings: Record, state: Record) -> bool:
     """Return whether time hardly advanced since the last impact and will not until the next."""
-    time = state_time(ground, state)
+    time = compute_state_time(ground, state)
     max_stiffness = max(abs(block.stiffness[0]), abs(block.stiffness[1]))
     resolution = ULP * (time + (1.0 / math.sqrt(max_stiffness) if max_stiffness > 0.0 else 0.0))
-    acceleration = present_restoring(ground, block, settings, state, state.side)
+    acceleration = compute_present_restoring(ground, block, settings, state, state.side)
     return bool(time - state.last_impact_time <= resolution and 2.0 * state.v <= resolution * acceleration)
 
 
@@ -188,7 +189,7 @@ def apply_proven_impacts(
     end = state.offset + duration
     for _ in range(PROVEN_PER_ITERATION):
         side, v = state.side, state.v
-        g = restoring_acceleration(ground, block, side, state.piece, state.offset)
+        g = compute_restoring(ground, block, side, state.piece, state.offset)
         t, speed = solve_proven_arc(v, g, block.threshold_slope[side] * side_sign(side) * rate, block.stiffness[side])
         next_speed = block.restitution[side] * speed
         # The arc is below its first tangent.
@@ -219,7 +220,7 @@ def solve_proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
     beta, gamma = rate * half * inverse, stiffness * half * half
     if not (abs(beta) <= MAX_BETA and abs(gamma) <= MAX_GAMMA):
         return math.nan, math.nan
-    x = half_duration(2.0 * THIRD * beta)
+    x = solve_half_duration(2.0 * THIRD * beta)
     y = beta * x
     q = gamma * x * x
     # Value, slope and half the second derivative of the equation at x.
@@ -237,7 +238,7 @@ def solve_proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
 
 
 @inlined
-def half_duration(b: float) -> float:
+def solve_half_duration(b: float) -> float:
     """Compute the root of x + b x^2 = 1 near 1 for |b| <= 1/96, to full precision, by Catalan's numbers."""
     square = b * b
     fourth = square * square

@@ -45,7 +45,7 @@ def apply_tendon_law(block: Record, law: int, plastic_elongation: float) -> None
 
 
 @inlined
-def rotation_from_elongation(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
+def find_rotation(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
     """Compute the rotation for an elongation of the tendon, or an infinity of the same sign if there is none."""
     x = block.lever_arm[side]
     if x <= 0.0 or (nonlinear and abs(elongation) >= 2.0 * x):
@@ -54,13 +54,13 @@ def rotation_from_elongation(block: Record, nonlinear: bool, side: int, elongati
 
 
 @inlined
-def elongation_from_rotation(block: Record, nonlinear: bool, side: int, u: float) -> float:
+def compute_elongation(block: Record, nonlinear: bool, side: int, u: float) -> float:
     """Compute the elongation of the tendon at a rotation."""
     return block.lever_arm[side] * (2.0 * math.sin(0.5 * u) if nonlinear else u)
 
 
 @inlined
-def tendon_law_at_rest(block: Record, plastic_elongation: float) -> int:
+def find_tendon_law_at_rest(block: Record, plastic_elongation: float) -> int:
     """Return the law while the block stands."""
     return TendonLaw.ELASTIC if plastic_elongation + block.slack_elongation <= 0.0 else TendonLaw.SLACK
 
@@ -68,10 +68,10 @@ def tendon_law_at_rest(block: Record, plastic_elongation: float) -> int:
 @inlined
 def may_tendon_law_change_below(block: Record, settings: Record, plastic_elongation: float, height: float) -> bool:
     """Return whether the law of a standing block changes below a height on one of its sides."""
-    is_slack = tendon_law_at_rest(block, plastic_elongation) == TendonLaw.SLACK
+    is_slack = find_tendon_law_at_rest(block, plastic_elongation) == TendonLaw.SLACK
     level = block.slack_elongation if is_slack else block.yield_elongation
-    plus = rotation_from_elongation(block, settings.nonlinear, 0, plastic_elongation + level)
-    minus = rotation_from_elongation(block, settings.nonlinear, 1, plastic_elongation + level)
+    plus = find_rotation(block, settings.nonlinear, 0, plastic_elongation + level)
+    minus = find_rotation(block, settings.nonlinear, 1, plastic_elongation + level)
     return bool(not height < min(plus, minus))
 
 
@@ -85,14 +85,10 @@ def find_tendon_law_change(
         for k in range(order):
             d[k] = (k + 1) * c[k + 1]
         return find_first_negative(d, order - 1, h), TendonLaw.ELASTIC
-    slack_rotation = rotation_from_elongation(
-        block, settings.nonlinear, side, state.plastic_elongation + block.slack_elongation
-    )
+    slack_rotation = find_rotation(block, settings.nonlinear, side, state.plastic_elongation + block.slack_elongation)
     if state.tendon_law == TendonLaw.SLACK:
         return find_level_passage(c, order, h, slack_rotation, 1.0, d), TendonLaw.ELASTIC
-    yield_rotation = rotation_from_elongation(
-        block, settings.nonlinear, side, state.plastic_elongation + block.yield_elongation
-    )
+    yield_rotation = find_rotation(block, settings.nonlinear, side, state.plastic_elongation + block.yield_elongation)
     yield_time = find_level_passage(c, order, h, yield_rotation, 1.0, d)
     slack_time = find_level_passage(c, order, h, slack_rotation, -1.0, d) if slack_rotation > 0.0 else np.inf
     if slack_time < yield_time:
@@ -131,7 +127,7 @@ def update_plastic_elongation(block: Record, settings: Record, nodes: Records, r
     node = nodes[row]
     turns_back = row > 0 and node.tendon_law == TendonLaw.ELASTIC and nodes[row - 1].tendon_law == TendonLaw.PLASTIC
     if turns_back or (row == 0 and node.side >= 0):
-        return max(0.0, elongation_from_rotation(block, settings.nonlinear, node.side, node.u) - block.yield_elongation)
+        return max(0.0, compute_elongation(block, settings.nonlinear, node.side, node.u) - block.yield_elongation)
     return previous
 
 
@@ -140,7 +136,7 @@ def change_tendon_law(block: Record, settings: Record, state: Record, law: int, 
     """Change the law of a block at a rotation."""
     if state.tendon_law == TendonLaw.PLASTIC:
         state.plastic_elongation = max(
-            0.0, elongation_from_rotation(block, settings.nonlinear, state.side, u) - block.yield_elongation
+            0.0, compute_elongation(block, settings.nonlinear, state.side, u) - block.yield_elongation
         )
     state.tendon_law = law
     apply_tendon_law(block, law, state.plastic_elongation)
@@ -188,11 +184,11 @@ def find_leaning_rotation(block: Record, settings: Record, state: Record, accele
         return np.nan
     plastic_elongation = state.plastic_elongation
     if block.yielding:
-        elongation = elongation_from_rotation(block, nonlinear, side, u)
+        elongation = compute_elongation(block, nonlinear, side, u)
         plastic_elongation = max(plastic_elongation, elongation - block.yield_elongation)
     tendon_state = (nonlinear, side, plastic_elongation)
     max_rotation = min(
-        state.peak, rotation_from_elongation(block, nonlinear, side, plastic_elongation + block.yield_elongation)
+        state.peak, find_rotation(block, nonlinear, side, plastic_elongation + block.yield_elongation)
     ) * (1.0 + PEAK_MARGIN)
     inner, inner_end = find_barrier(block, tendon_state, u, 0.0)
     outer, outer_end = find_barrier(block, tendon_state, u, max_rotation)
@@ -214,7 +210,7 @@ def find_barrier(block: Record, tendon_state: tuple[bool, int, float], start: fl
     first = last = np.nan
     for fraction in _SEARCH_FRACTIONS:
         rotation = start + (end - start) * fraction
-        if static_restoring(block, tendon_state, rotation) * (end - start) > 0.0:
+        if compute_static_restoring(block, tendon_state, rotation) * (end - start) > 0.0:
             first, last = (rotation if math.isnan(first) else first), rotation
         elif not math.isnan(first):
             return first, bisect_moment(block, tendon_state, last, rotation)
@@ -224,10 +220,10 @@ def find_barrier(block: Record, tendon_state: tuple[bool, int, float], start: fl
 @inlined
 def bisect_moment(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> float:
     """Find the rotation at which the moment changes its sign between two rotations, by bisection."""
-    sign = static_restoring(block, tendon_state, start)
+    sign = compute_static_restoring(block, tendon_state, start)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (start + end)
-        if static_restoring(block, tendon_state, middle) * sign > 0.0:
+        if compute_static_restoring(block, tendon_state, middle) * sign > 0.0:
             start = middle
         else:
             end = middle
@@ -239,13 +235,13 @@ def bound_energy_rise(block: Record, tendon_state: tuple[bool, int, float], star
     """Compute a lower bound on the change of potential energy along a path, divided by inertia, law by law."""
     nonlinear, side, plastic_elongation = tendon_state
     low, high, total = min(start, end), max(start, end), 0.0
-    slack_rotation = rotation_from_elongation(block, nonlinear, side, plastic_elongation + block.slack_elongation)
-    yield_rotation = rotation_from_elongation(block, nonlinear, side, plastic_elongation + block.yield_elongation)
+    slack_rotation = find_rotation(block, nonlinear, side, plastic_elongation + block.slack_elongation)
+    yield_rotation = find_rotation(block, nonlinear, side, plastic_elongation + block.yield_elongation)
     for upper in (min(max(slack_rotation, low), high), min(max(yield_rotation, low), high), high):
         half, middle = 0.5 * (upper - low), 0.5 * (upper + low)
         for node, weight in _GAUSS_LEGENDRE:
-            total += half * weight * static_restoring(block, tendon_state, middle - half * node)
-            total += half * weight * static_restoring(block, tendon_state, middle + half * node)
+            total += half * weight * compute_static_restoring(block, tendon_state, middle - half * node)
+            total += half * weight * compute_static_restoring(block, tendon_state, middle + half * node)
         low = upper
     size = abs(block.spring[side]) + abs(block.prestress[side]) + abs(block.base_prestress[side])
     size += block.tendon_stiffness[side] * (block.lever_arm[side] + plastic_elongation + abs(block.slack_elongation))
@@ -255,12 +251,12 @@ def bound_energy_rise(block: Record, tendon_state: tuple[bool, int, float], star
 
 
 @inlined
-def static_restoring(block: Record, tendon_state: tuple[bool, int, float], u: float) -> float:
+def compute_static_restoring(block: Record, tendon_state: tuple[bool, int, float], u: float) -> float:
     """Compute the restoring acceleration at a rotation without ground motion and damping."""
     nonlinear, side, plastic_elongation = tendon_state
     weight, push, pull = block.added_weight[side], block.added_push[side], block.prestress[side]
     if block.yielding:
-        elongation = elongation_from_rotation(block, nonlinear, side, u) - plastic_elongation
+        elongation = compute_elongation(block, nonlinear, side, u) - plastic_elongation
         stretch = max(elongation - block.slack_elongation, 0.0)
         weight, push, pull = block.base_weight[side], block.base_push[side], block.base_prestress[side]
         pull += block.tendon_stiffness[side] * min(stretch, block.yield_elongation - block.slack_elongation)

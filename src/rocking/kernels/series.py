@@ -45,7 +45,7 @@ _INTEGRATED = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 
 @inlined
-def weighted_term(weight: ValueAndSlope | None, current: float, previous: float) -> float:
+def apply_weight(weight: ValueAndSlope | None, current: float, previous: float) -> float:
     """Compute a coefficient of weight times series from two neighbouring ones of the series; None: weight 1."""
     return current if weight is None else weight[0] * current + weight[1] * previous
 
@@ -68,7 +68,7 @@ def write_linear_coefficients(block: Record, state: Record, scratch: Record, deg
 
 
 @inlined
-def weighted_coefficient(block: Record, side: int, scratch: Record, degree: int, k: int) -> float:
+def compute_weighted_coefficient(block: Record, side: int, scratch: Record, degree: int, k: int) -> float:
     """Compute c[k + 2] of a linear arc under varying weight from the earlier coefficients.
 
     ``degree`` applies to both the motion and the weight.
@@ -82,7 +82,7 @@ def weighted_coefficient(block: Record, side: int, scratch: Record, degree: int,
 
 
 @inlined
-def nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[int, int], k: int) -> float:
+def compute_nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[int, int], k: int) -> float:
     """Compute c[k + 2] of a nonlinear arc from sin and cos(alpha - u) up to k, for the degrees of motion and weight."""
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     degree, weight_degree = degrees
@@ -110,7 +110,7 @@ def write_angle_coefficients(scratch: Record, k: int) -> None:
 
 
 @inlined
-def restrained_force(
+def compute_restrained_coefficient(
     block: Record, side: int, scratch: Record, degrees: tuple[int, int], nonlinear: bool, k: int
 ) -> float:
     """Compute coefficient k of u'' + c u' from the rotation up to k."""
@@ -118,7 +118,7 @@ def restrained_force(
     lam = block.stiffness[side]
     value = -block.spring[side] * c[k]
     if nonlinear:
-        value += nonlinear_coefficient(lam, scratch, degrees, k) / INTEGRATED_TWICE[k]
+        value += compute_nonlinear_coefficient(lam, scratch, degrees, k) / INTEGRATED_TWICE[k]
         return value - block.prestress[side] * scratch.half_cosine[k]
     if k <= degrees[0]:
         value -= block.threshold_slope[side] * A[k]
@@ -146,16 +146,16 @@ def write_half_angle_coefficients(scratch: Record, k: int) -> None:
 
 
 @inlined
-def next_coefficient(
+def compute_next_coefficient(
     block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], k: int
 ) -> float:
     """Compute c[k + 2] of an arc from the earlier coefficients, for the degrees of motion and weight."""
     if block.restrained:
-        force = restrained_force(block, side, scratch, degrees, settings.nonlinear, k)
+        force = compute_restrained_coefficient(block, side, scratch, degrees, settings.nonlinear, k)
         return (force - block.damping[side] * ((k + 1) * scratch.rotation[k + 1])) * INTEGRATED_TWICE[k]
     if settings.nonlinear:
-        return nonlinear_coefficient(block.stiffness[side], scratch, degrees, k)
-    return weighted_coefficient(block, side, scratch, degrees[0], k)
+        return compute_nonlinear_coefficient(block.stiffness[side], scratch, degrees, k)
+    return compute_weighted_coefficient(block, side, scratch, degrees[0], k)
 
 
 @inlined
@@ -193,11 +193,14 @@ def expand_weighted(
 ) -> RotationCoefficients:
     """Compute the coefficients of u'' = weight (lam u - pull) - push, with weight and push linear in time."""
     z = lam * u - pull
-    c2 = 0.5 * (weighted_term(weight, z, 0.0) - push[0])
-    c3 = (1.0 / 6.0) * (weighted_term(weight, lam * v, z) - push[1])
-    c4, c5 = lam * weighted_term(weight, c2, v) * (1.0 / 12.0), lam * weighted_term(weight, c3, c2) * (1.0 / 20.0)
-    c6, c7 = lam * weighted_term(weight, c4, c3) * (1.0 / 30.0), lam * weighted_term(weight, c5, c4) * (1.0 / 42.0)
-    c8, c9 = lam * weighted_term(weight, c6, c5) * (1.0 / 56.0), lam * weighted_term(weight, c7, c6) * (1.0 / 72.0)
+    c2 = 0.5 * (apply_weight(weight, z, 0.0) - push[0])
+    c3 = (1.0 / 6.0) * (apply_weight(weight, lam * v, z) - push[1])
+    c4 = lam * apply_weight(weight, c2, v) * (1.0 / 12.0)
+    c5 = lam * apply_weight(weight, c3, c2) * (1.0 / 20.0)
+    c6 = lam * apply_weight(weight, c4, c3) * (1.0 / 30.0)
+    c7 = lam * apply_weight(weight, c5, c4) * (1.0 / 42.0)
+    c8 = lam * apply_weight(weight, c6, c5) * (1.0 / 56.0)
+    c9 = lam * apply_weight(weight, c7, c6) * (1.0 / 72.0)
     return u, v, c2, c3, c4, c5, c6, c7, c8, c9
 
 
@@ -214,31 +217,31 @@ def expand_nonlinear(
     s0, c0 = sine_cosine
     a, b = push
     l2 = -0.5 * lam
-    u2 = l2 * (weighted_term(weight, s0, 0.0) + a * c0)
+    u2 = l2 * (apply_weight(weight, s0, 0.0) + a * c0)
     s1, c1 = -(v * c0), v * s0
-    u3 = l2 * (weighted_term(weight, s1, s0) + (a * c1 + b * c0)) * (1.0 / 3.0)
+    u3 = l2 * (apply_weight(weight, s1, s0) + (a * c1 + b * c0)) * (1.0 / 3.0)
     r2 = 2.0 * u2
     s2, c2 = -0.5 * (v * c1 + r2 * c0), 0.5 * (v * s1 + r2 * s0)
-    u4 = l2 * (weighted_term(weight, s2, s1) + (a * c2 + b * c1)) * (1.0 / 6.0)
+    u4 = l2 * (apply_weight(weight, s2, s1) + (a * c2 + b * c1)) * (1.0 / 6.0)
     r3 = 3.0 * u3
     s3, c3 = -(v * c2 + r2 * c1 + r3 * c0) * (1.0 / 3.0), (v * s2 + r2 * s1 + r3 * s0) * (1.0 / 3.0)
-    u5 = l2 * (weighted_term(weight, s3, s2) + (a * c3 + b * c2)) * (1.0 / 10.0)
+    u5 = l2 * (apply_weight(weight, s3, s2) + (a * c3 + b * c2)) * (1.0 / 10.0)
     r4 = 4.0 * u4
     s4 = -0.25 * ((v * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
     c4 = 0.25 * ((v * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
-    u6 = l2 * (weighted_term(weight, s4, s3) + (a * c4 + b * c3)) * (1.0 / 15.0)
+    u6 = l2 * (apply_weight(weight, s4, s3) + (a * c4 + b * c3)) * (1.0 / 15.0)
     r5 = 5.0 * u5
     s5 = -0.2 * ((v * c4 + r2 * c3) + (r3 * c2 + r4 * c1) + r5 * c0)
     c5 = 0.2 * ((v * s4 + r2 * s3) + (r3 * s2 + r4 * s1) + r5 * s0)
-    u7 = l2 * (weighted_term(weight, s5, s4) + (a * c5 + b * c4)) * (1.0 / 21.0)
+    u7 = l2 * (apply_weight(weight, s5, s4) + (a * c5 + b * c4)) * (1.0 / 21.0)
     r6 = 6.0 * u6
     s6 = -(1.0 / 6.0) * ((v * c5 + r2 * c4) + (r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0))
     c6 = (1.0 / 6.0) * ((v * s5 + r2 * s4) + (r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0))
-    u8 = l2 * (weighted_term(weight, s6, s5) + (a * c6 + b * c5)) * (1.0 / 28.0)
+    u8 = l2 * (apply_weight(weight, s6, s5) + (a * c6 + b * c5)) * (1.0 / 28.0)
     r7 = 7.0 * u7
     s7 = -(1.0 / 7.0) * ((v * c6 + r2 * c5) + (r3 * c4 + r4 * c3) + ((r5 * c2 + r6 * c1) + r7 * c0))
     c7 = (1.0 / 7.0) * ((v * s6 + r2 * s5) + (r3 * s4 + r4 * s3) + ((r5 * s2 + r6 * s1) + r7 * s0))
-    u9 = l2 * (weighted_term(weight, s7, s6) + (a * c7 + b * c6)) * (1.0 / 36.0)
+    u9 = l2 * (apply_weight(weight, s7, s6) + (a * c7 + b * c6)) * (1.0 / 36.0)
     lowest_sums = (abs(v), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
     return (u, v, u2, u3, u4, u5, u6, u7, u8, u9), (
         *lowest_sums,
@@ -252,7 +255,7 @@ def expand_nonlinear(
 
 
 @inlined
-def weighted_velocity_terms(
+def compute_weighted_terms(
     r1: float, z0: float, q: float, push: ValueAndSlope, weight: ValueAndSlope
 ) -> tuple[VelocityTerms, float, float]:
     """Compute the terms r1 to r9, r10 and r11 of the velocity of a linear arc under varying weight.
@@ -274,7 +277,7 @@ def weighted_velocity_terms(
 
 
 @inlined
-def nonlinear_velocity_terms(
+def compute_nonlinear_terms(
     r1: float, sine_cosine: SineCosine, l2: float, push: ValueAndSlope, weight: ValueAndSlope | None
 ) -> tuple[VelocityTerms, AngleSums]:
     """Compute the terms r1 to r9 of the velocity of a nonlinear arc.
@@ -284,25 +287,25 @@ def nonlinear_velocity_terms(
     """
     s0, c0 = sine_cosine
     a, b = push
-    r2 = 2.0 * (l2 * (weighted_term(weight, s0, 0.0) + a * c0))
+    r2 = 2.0 * (l2 * (apply_weight(weight, s0, 0.0) + a * c0))
     s1, c1 = -(r1 * c0), r1 * s0
-    r3 = l2 * (weighted_term(weight, s1, s0) + (a * c1 + b * c0))
+    r3 = l2 * (apply_weight(weight, s1, s0) + (a * c1 + b * c0))
     s2, c2 = -0.5 * (r1 * c1 + r2 * c0), 0.5 * (r1 * s1 + r2 * s0)
-    r4 = (2.0 / 3.0) * (l2 * (weighted_term(weight, s2, s1) + (a * c2 + b * c1)))
+    r4 = (2.0 / 3.0) * (l2 * (apply_weight(weight, s2, s1) + (a * c2 + b * c1)))
     s3, c3 = -(1.0 / 3.0) * (r1 * c2 + (r2 * c1 + r3 * c0)), (1.0 / 3.0) * (r1 * s2 + (r2 * s1 + r3 * s0))
-    r5 = 0.5 * (l2 * (weighted_term(weight, s3, s2) + (a * c3 + b * c2)))
+    r5 = 0.5 * (l2 * (apply_weight(weight, s3, s2) + (a * c3 + b * c2)))
     s4 = -0.25 * ((r1 * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
     c4 = 0.25 * ((r1 * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
-    r6 = 0.4 * (l2 * (weighted_term(weight, s4, s3) + (a * c4 + b * c3)))
+    r6 = 0.4 * (l2 * (apply_weight(weight, s4, s3) + (a * c4 + b * c3)))
     s5 = -0.2 * ((r1 * c4 + r2 * c3) + (r3 * c2 + (r4 * c1 + r5 * c0)))
     c5 = 0.2 * ((r1 * s4 + r2 * s3) + (r3 * s2 + (r4 * s1 + r5 * s0)))
-    r7 = (1.0 / 3.0) * (l2 * (weighted_term(weight, s5, s4) + (a * c5 + b * c4)))
+    r7 = (1.0 / 3.0) * (l2 * (apply_weight(weight, s5, s4) + (a * c5 + b * c4)))
     s6 = -(1.0 / 6.0) * ((r1 * c5 + r2 * c4) + ((r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0)))
     c6 = (1.0 / 6.0) * ((r1 * s5 + r2 * s4) + ((r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0)))
-    r8 = (2.0 / 7.0) * (l2 * (weighted_term(weight, s6, s5) + (a * c6 + b * c5)))
+    r8 = (2.0 / 7.0) * (l2 * (apply_weight(weight, s6, s5) + (a * c6 + b * c5)))
     s7 = -(1.0 / 7.0) * (((r1 * c6 + r2 * c5) + (r3 * c4 + r4 * c3)) + ((r5 * c2 + r6 * c1) + r7 * c0))
     c7 = (1.0 / 7.0) * (((r1 * s6 + r2 * s5) + (r3 * s4 + r4 * s3)) + ((r5 * s2 + r6 * s1) + r7 * s0))
-    r9 = 0.25 * (l2 * (weighted_term(weight, s7, s6) + (a * c7 + b * c6)))
+    r9 = 0.25 * (l2 * (apply_weight(weight, s7, s6) + (a * c7 + b * c6)))
     lowest_sums = (abs(r1), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
     angle_sums = (*lowest_sums, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
     return (r1, r2, r3, r4, r5, r6, r7, r8, r9), angle_sums

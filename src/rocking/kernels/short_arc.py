@@ -8,16 +8,16 @@ import math
 
 import numpy as np
 
-from rocking.kernels.arc import side_sign, weight_at
+from rocking.kernels.arc import compute_weight, side_sign
 from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import StepEnd
 from rocking.kernels.ground import (
     Ground,
-    acceleration,
     coefficient,
+    compute_acceleration,
     has_vertical,
     is_piecewise_linear,
-    vertical_component,
+    select_vertical,
 )
 from rocking.kernels.series import (
     AngleSums,
@@ -53,53 +53,58 @@ _CONVERGED = 1e-8
 
 
 @inlined
-def short_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
+def take_short_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
     """Step to the next impact or by at most ``h_max``; UNDECIDED if the step is small or not simple."""
-    end = partial_step(ground, block, settings, state, h_max)
-    return undecided_step() if end.outcome == StepOutcome.STEP and end.time < _MIN_FRACTION * h_max else end
+    end = take_nine_term_step(ground, block, settings, state, h_max)
+    return create_undecided_step() if end.outcome == StepOutcome.STEP and end.time < _MIN_FRACTION * h_max else end
 
 
 @inlined
-def partial_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
+def take_nine_term_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
     """Step to the next impact or by at most ``h_max``, as far as nine terms suffice."""
     if not is_piecewise_linear(ground) or block.restrained:
-        return undecided_step()
+        return create_undecided_step()
     if has_vertical(ground):
-        return short_weighted_step(ground, block, settings, state, h_max)
+        return take_short_weighted_step(ground, block, settings, state, h_max)
     if settings.nonlinear:
-        return short_nonlinear_step(ground, block, state, h_max, None)
-    c = linear_series(ground, block, state)
-    end = resolve_step(c, reach(abs(block.stiffness[state.side]), SHORT_LINEAR, h_max), state, block.overturn_angle)
-    return end if is_sufficient_linear(c, end.time) else undecided_step()
+        return take_short_nonlinear_step(ground, block, state, h_max, None)
+    c = compute_linear_series(ground, block, state)
+    end = resolve_step(
+        c, limit_time(abs(block.stiffness[state.side]), SHORT_LINEAR, h_max), state, block.overturn_angle
+    )
+    return end if is_sufficient_linear(c, end.time) else create_undecided_step()
 
 
 @not_inlined
-def short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
+def take_short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
     """Compute a short step under varying weight."""
     lam = block.stiffness[state.side]
-    weight = weight_at(ground, state.piece, state.offset), coefficient(vertical_component(ground), state.piece, 1)
+    weight = compute_weight(ground, state.piece, state.offset), coefficient(select_vertical(ground), state.piece, 1)
     if settings.nonlinear:
-        return short_nonlinear_step(ground, block, state, h_max, weight)
-    c = weighted_series(ground, block, state, weight)
+        return take_short_nonlinear_step(ground, block, state, h_max, weight)
+    c = compute_weighted_series(ground, block, state, weight)
     end = resolve_step(
-        c, reach(abs(lam) * largest_weight(weight, h_max), SHORT_WEIGHTED, h_max), state, block.overturn_angle
+        c,
+        limit_time(abs(lam) * find_largest_weight(weight, h_max), SHORT_WEIGHTED, h_max),
+        state,
+        block.overturn_angle,
     )
-    return end if is_sufficient_weighted(c, lam, weight, end.time) else undecided_step()
+    return end if is_sufficient_weighted(c, lam, weight, end.time) else create_undecided_step()
 
 
 @inlined
-def short_nonlinear_step(
+def take_short_nonlinear_step(
     ground: Ground, block: Record, state: Record, h_max: float, weight: ValueAndSlope | None
 ) -> StepEnd:
     """Compute a short step in the nonlinear model."""
-    c, angles = nonlinear_series(ground, block, state, weight)
+    c, angles = compute_nonlinear_series(ground, block, state, weight)
     lam, slope = block.stiffness[state.side], coefficient(ground, state.piece, 1)
     start = coefficient(ground, state.piece, 0) + slope * state.offset
-    size = lam * (largest_weight(weight, h_max) + max(abs(start), abs(start + slope * h_max))) + state.v * state.v
-    end = resolve_step(c, reach(size, SHORT_NONLINEAR, h_max), state, block.overturn_angle)
-    push = (acceleration(ground, state.piece, state.offset), slope)
+    size = lam * (find_largest_weight(weight, h_max) + max(abs(start), abs(start + slope * h_max))) + state.v * state.v
+    end = resolve_step(c, limit_time(size, SHORT_NONLINEAR, h_max), state, block.overturn_angle)
+    push = (compute_acceleration(ground, state.piece, state.offset), slope)
     is_sufficient = is_sufficient_nonlinear(c, angles, lam, push, weight, end.time)
-    return end if is_sufficient else undecided_step()
+    return end if is_sufficient else create_undecided_step()
 
 
 @inlined
@@ -132,45 +137,47 @@ def is_sufficient_nonlinear(
 
 
 @inlined
-def undecided_step() -> StepEnd:
+def create_undecided_step() -> StepEnd:
     """Return an UNDECIDED step."""
     return StepEnd(StepOutcome.UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
-def reach(size: float, limit: float, max_time: float) -> float:
+def limit_time(size: float, limit: float, max_time: float) -> float:
     """Return the time t, at most ``max_time``, up to which size t^2 is within a limit."""
     return max_time if size * max_time * max_time <= limit else min(max_time, math.sqrt(limit / size))
 
 
 @inlined
-def largest_weight(weight: ValueAndSlope | None, duration: float) -> float:
+def find_largest_weight(weight: ValueAndSlope | None, duration: float) -> float:
     """Return the largest absolute weight during a time; 1 if constant."""
     return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * duration))
 
 
 @inlined
-def linear_series(ground: Ground, block: Record, state: Record) -> RotationCoefficients:
+def compute_linear_series(ground: Ground, block: Record, state: Record) -> RotationCoefficients:
     """Compute the series of a linear arc under a ground acceleration that is linear in time."""
     side = state.side
     gain = block.threshold_slope[side]
-    push = push_line(ground, state)
+    push = compute_push_line(ground, state)
     return expand_linear(
         state.u, state.v, block.stiffness[side], gain * (block.threshold[side] + push[0]), gain * push[1]
     )
 
 
 @inlined
-def weighted_series(ground: Ground, block: Record, state: Record, weight: ValueAndSlope) -> RotationCoefficients:
+def compute_weighted_series(
+    ground: Ground, block: Record, state: Record, weight: ValueAndSlope
+) -> RotationCoefficients:
     """Compute the series of a linear arc under two ground accelerations that are linear in time."""
     side, gain = state.side, block.threshold_slope[state.side]
-    push = push_line(ground, state)
+    push = compute_push_line(ground, state)
     pushes = (gain * push[0], gain * push[1])
     return expand_weighted(state.u, state.v, block.stiffness[side], gain * block.threshold[side], pushes, weight)
 
 
 @inlined
-def nonlinear_series(
+def compute_nonlinear_series(
     ground: Ground, block: Record, state: Record, weight: ValueAndSlope | None
 ) -> tuple[RotationCoefficients, AngleSums]:
     """Compute the series of a nonlinear arc under ground accelerations that are linear in time."""
@@ -179,21 +186,21 @@ def nonlinear_series(
     if u != 0.0:
         psi = block.slenderness[side] - u
         angle = (math.sin(psi), math.cos(psi))
-    return expand_nonlinear((u, state.v), angle, block.stiffness[side], push_line(ground, state), weight)
+    return expand_nonlinear((u, state.v), angle, block.stiffness[side], compute_push_line(ground, state), weight)
 
 
 @inlined
-def push_line(ground: Ground, state: Record) -> ValueAndSlope:
+def compute_push_line(ground: Ground, state: Record) -> ValueAndSlope:
     """Return the ground acceleration (linear in time) in the frame of the state's side, and its slope."""
     sign = side_sign(state.side)
-    return sign * acceleration(ground, state.piece, state.offset), sign * coefficient(ground, state.piece, 1)
+    return sign * compute_acceleration(ground, state.piece, state.offset), sign * coefficient(ground, state.piece, 1)
 
 
 @inlined
 def resolve_step(c: RotationCoefficients, t: float, state: Record, overturn_angle: float) -> StepEnd:
     """Return the end of a step of duration t, or its first impact; UNDECIDED if the bounds are inconclusive."""
     if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps forever
-        return undecided_step()
+        return create_undecided_step()
     outcome = StepOutcome.STEP
     higher_terms = bound_higher_curvature(c, t)
     max_curvature = 2.0 * c[2] + 6.0 * max(c[3], 0.0) * t + higher_terms
@@ -209,17 +216,17 @@ def resolve_step(c: RotationCoefficients, t: float, state: Record, overturn_angl
             is_falling = max_curvature < 0.0 or c[1] + max(max_curvature, 0.0) * t < 0.0
             t, outcome = find_impact_from_above(c, t) if end < 0.0 and is_falling else np.nan, StepOutcome.IMPACT
     if math.isnan(t):
-        return undecided_step()
+        return create_undecided_step()
     end, speed = (evaluate_rotation(c, t) if outcome == StepOutcome.STEP else 0.0), evaluate_velocity(c, t)
     peak_time, peak = t, end
     is_rising = c[1] + min(min_curvature, 0.0) * t > 0.0
     if not is_rising and max(c[0], end) - 0.125 * t * t * min(min_curvature, 0.0) > state.peak:
         if not (max_curvature < 0.0 and c[1] > 0.0 and speed < 0.0):
-            return undecided_step()
+            return create_undecided_step()
         peak_time = find_peak_time(c, t)
         peak = evaluate_rotation(c, peak_time)
     if not max(c[0], peak) < overturn_angle:
-        return undecided_step()
+        return create_undecided_step()
     return StepEnd(outcome, t, end, speed, peak_time, peak)
 
 

@@ -16,18 +16,25 @@ import math
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.kernels.arc import NEGLIGIBLE, expand_arc, pad_to_same_degree, side_sign, weight_at, write_weight_series
+from rocking.kernels.arc import (
+    NEGLIGIBLE,
+    compute_weight,
+    expand_arc,
+    pad_to_same_degree,
+    side_sign,
+    write_weight_series,
+)
 from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import StepEnd, find_first_negative_beyond_rounding
 from rocking.kernels.ground import (
     Ground,
-    acceleration,
     bound_piece,
     coefficient,
+    compute_acceleration,
     has_vertical,
     is_piecewise_linear,
     last_piece,
-    vertical_component,
+    select_vertical,
     write_local_series,
 )
 from rocking.kernels.series import INTEGRATED_TWICE, write_angle_coefficients
@@ -46,18 +53,18 @@ _MAX_SHORTENINGS = 60
 
 
 @inlined
-def slip_stiffness(block: Record, side: int) -> float:
+def compute_slip_stiffness(block: Record, side: int) -> float:
     """Return lam (1 + R^2/k^2), the rate of u'' while slipping."""
     return block.stiffness[side] * (1.0 + block.inertia_ratio[side])
 
 
 @inlined
-def slip_restoring(block: Record, settings: Record, side: int, direction: float) -> float:
+def compute_slip_restoring(block: Record, settings: Record, side: int, direction: float) -> float:
     """Compute the restoring acceleration at zero rotation and weight 1 for a slip in the side's frame (Eq. 11)."""
     if not settings.nonlinear:
-        return slip_stiffness(block, side) * (block.slenderness[side] - direction * block.kinetic_friction)
+        return compute_slip_stiffness(block, side) * (block.slenderness[side] - direction * block.kinetic_friction)
     lever = block.sine[side] - direction * block.kinetic_friction * block.cosine[side]
-    return slip_stiffness(block, side) * lever / (1.0 + block.inertia_ratio[side] * block.sine[side] * lever)
+    return compute_slip_stiffness(block, side) * lever / (1.0 + block.inertia_ratio[side] * block.sine[side] * lever)
 
 
 @inlined
@@ -74,7 +81,7 @@ def may_slip(ground: Ground, block: Record, settings: Record, scratch: Record, s
     """Return whether bounds do not exclude that the forces leave the cone of friction within a step; True for NaN."""
     side, h = state.side, end.time
     if is_piecewise_linear(ground) and not has_vertical(ground):
-        start = acceleration(ground, state.piece, state.offset)
+        start = compute_acceleration(ground, state.piece, state.offset)
         push = max(abs(start), abs(start + coefficient(ground, state.piece, 1) * h))
         allowed = block.sticking_push[side]
         if settings.nonlinear:
@@ -88,7 +95,7 @@ def may_slip(ground: Ground, block: Record, settings: Record, scratch: Record, s
     push = max(abs(push_low), abs(push_high))
     low = high = 1.0
     if has_vertical(ground):
-        lift = bound_piece(vertical_component(ground), state.piece, state.offset, h, scratch.ground)
+        lift = bound_piece(select_vertical(ground), state.piece, state.offset, h, scratch.ground)
         low, high = 1.0 + lift.low, 1.0 + lift.high
     max_acceleration = block.stiffness[side] * (max(abs(low), abs(high)) + push) * (1.0 + 0.5 * math.pi)
     dip = 0.125 * max_acceleration * h * h
@@ -182,9 +189,9 @@ def expand_slip(
     side = state.side
     sign = side_sign(side)
     direction = sign * state.direction
-    h = min(h_max, 1.0 / math.sqrt(slip_stiffness(block, side)))
+    h = min(h_max, 1.0 / math.sqrt(compute_slip_stiffness(block, side)))
     if state.u == 0.0 and state.v > 0.0:
-        g = slip_restoring(block, settings, side, direction) * weight_at(ground, state.piece, state.offset)
+        g = compute_slip_restoring(block, settings, side, direction) * compute_weight(ground, state.piece, state.offset)
         if g > 0.0:
             h = min(h, _FIRST_STEP * 2.0 * state.v / g)
     degree = write_local_series(ground, state.piece, state.offset, sign, scratch.ground)
@@ -226,7 +233,7 @@ def write_slip_coefficients(
         y = weight * (mu - block.slenderness[side])
         for m in range(n + 1):
             y += N[m] * c[n - m]
-        y *= slip_stiffness(block, side)
+        y *= compute_slip_stiffness(block, side)
         c[n + 2] = y * INTEGRATED_TWICE[n]
         V[n + 1] = (-mu * weight - push - arm * y) / (n + 1)
         return
@@ -243,7 +250,7 @@ def write_slip_coefficients(
     y = 0.0
     for m in range(n + 1):
         y -= N[m] * b[n - m]
-    c[n + 2] = slip_stiffness(block, side) * y * INTEGRATED_TWICE[n]
+    c[n + 2] = compute_slip_stiffness(block, side) * y * INTEGRATED_TWICE[n]
     force = -mu * N[n] - push
     for m in range(n + 1):
         force -= arm * (k[m] * (c[n - m + 2] / INTEGRATED_TWICE[n - m]) + s[m] * q[n - m])
@@ -348,7 +355,7 @@ def find_slide_end(
 
 
 @inlined
-def slip_factor(block: Record, side: int, e: float, direction: float) -> float:
+def compute_slip_factor(block: Record, side: int, e: float, direction: float) -> float:
     """Compute the factor on the speed of an impact that leaves a side and slips; ``direction`` is the slip's sign."""
     other = 1 - side
     h, d, next_d = block.height, block.pivot_distance[side], block.pivot_distance[other]
@@ -372,7 +379,7 @@ def strike_with_friction(block: Record, state: Record, side: int, speed: float) 
     mu = block.static_friction if V == 0.0 else block.kinetic_friction
     if abs(across) > mu * upward:
         direction = -math.copysign(1.0, across)
-        after = slip_factor(block, side, e, direction) * speed
+        after = compute_slip_factor(block, side, e, direction) * speed
         rate = V - direction * block.kinetic_friction * (next_d * after + d * speed) - j * h * (after - speed)
     if not after > 0.0:  # both pivots strike
         after, rate = 0.0, V + j * h * speed
@@ -385,14 +392,14 @@ def strike_with_friction(block: Record, state: Record, side: int, speed: float) 
 
 
 @inlined
-def min_sticking_friction(block: Record, side: int) -> float:
+def find_sticking_friction(block: Record, side: int) -> float:
     """Compute the friction with which an impact that leaves a side sticks if nothing slips before (Eq. 7)."""
     e = block.restitution[side]
     return block.height * (1.0 - e) / (block.pivot_distance[1 - side] * e + block.pivot_distance[side])
 
 
 @inlined
-def slip_after_sequence(
+def sum_slip_of_sequence(
     block: Record, settings: Record, state: Record, g: float, other_g: float
 ) -> tuple[float, float]:
     """Return changes of velocity and displacement of the foot at the end of a sequence of impacts while sliding.
@@ -407,14 +414,12 @@ def slip_after_sequence(
     drift = sign * block.height * w
     if settings.nonlinear:
         return drift + mu * d * w, 0.0
-    e = slip_factor(block, side, block.restitution[side], state.direction)
-    back = slip_factor(block, 1 - side, block.restitution[1 - side], state.direction)
+    e = compute_slip_factor(block, side, block.restitution[side], state.direction)
+    back = compute_slip_factor(block, 1 - side, block.restitution[1 - side], state.direction)
     product = e * back
     first, second = (d + next_d * e) * w, (next_d + d * back) * e * w
-    time, next_time = (
-        2.0 * w * (1.0 / g + e / other_g) / (1.0 - product),
-        2.0 * w * (1.0 / other_g + back / g) / (1.0 - product),
-    )
+    time = 2.0 * w * (1.0 / g + e / other_g) / (1.0 - product)
+    next_time = 2.0 * w * (1.0 / other_g + back / g) / (1.0 - product)
     impulse = mu * (first + second) / (1.0 - product)
     waiting = mu * (first * next_time * e + second * time * product) / (1.0 - product * product)
     return drift - impulse, impulse * time - waiting

@@ -22,7 +22,7 @@ Record = Any
 #: Highest power in an arc's series, sufficient for steps of 1/p in full double precision.
 ORDER = 22
 
-#: Side of a body at rest. Every negative side denotes rest: see `resting_side`.
+#: Side of a body at rest. Every negative side denotes rest: see `encode_resting_side`.
 AT_REST = -1
 
 #: Value of ``stop_piece`` of a march without a final piece.
@@ -302,7 +302,7 @@ def create_states(count: int, budget: int) -> Records:
     return states
 
 
-def state_at_node(node: Record, plastic_elongation: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
+def create_state_at_node(node: Record, plastic_elongation: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
     """Return the state of a march that starts at a node, with the plastic elongation of a tendon there."""
     state = create_states(1, budget)[0]
     for name in ("piece", "offset", "side", "u", "v", "tendon_law", "slip", "slip_rate", "direction"):
@@ -347,14 +347,14 @@ def signed_side(side: int) -> int:
 
 
 @inlined
-def resting_side(block: Record, side: int) -> int:
+def encode_resting_side(block: Record, side: int) -> int:
     """Return the side of a body at rest on a side, which identifies one of two facing stops."""
     return -1 - side if block.two_stops else AT_REST
 
 
 @inlined
 def find_stop_of_resting_side(resting: int) -> int:
-    """Return the stop at which a body rests (0 without two stops); ``resting`` is its `resting_side`."""
+    """Return the stop at which a body rests (0 without two stops); ``resting`` is its `encode_resting_side`."""
     return -1 - resting
 
 

@@ -11,19 +11,19 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats, Integers
-from rocking.kernels.arc import evaluate_series, expand_arc, restoring_acceleration, side_sign, weight_at
+from rocking.kernels.arc import compute_restoring, compute_weight, evaluate_series, expand_arc, side_sign
 from rocking.kernels.compiled import inlined, kernel, not_inlined
-from rocking.kernels.events import find_first_root, mean_factor, relative_speed_slope, restitution_factor
+from rocking.kernels.events import compute_mean_factor, compute_restitution_factor, compute_speed_slope, find_first_root
 from rocking.kernels.ground import (
     Ground,
-    acceleration,
-    acceleration_rate,
+    compute_acceleration,
+    compute_acceleration_rate,
     has_vertical,
     piece_length,
     piece_start,
-    vertical_component,
+    select_vertical,
 )
-from rocking.kernels.restraints import apply_tendon_law, tendon_law_at_rest, update_plastic_elongation
+from rocking.kernels.restraints import apply_tendon_law, find_tendon_law_at_rest, update_plastic_elongation
 from rocking.kernels.series import INTEGRATED_TWICE, write_variation_coefficients
 from rocking.kernels.sliding import expand_slide, expand_slip, integrate_slip
 from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, create_records
@@ -183,7 +183,7 @@ def compute_variation(
     impact_count = event_count = 0
     du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
     dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
-    plastic_elongation, plastic_variation = 0.0, plastic_by_start(trail) * du  # of a tendon
+    plastic_elongation, plastic_variation = 0.0, differentiate_start_plasticity(trail) * du  # of a tendon
     written = count_times_until(times, 0, nodes[0].time)
     changes[:written] = du
     changes[written:] = 0.0
@@ -200,7 +200,7 @@ def compute_variation(
         start, duration = (du, dv, plastic_variation), next_node.time - node.time
         first, written = written, count_times_until(times, written, next_node.time)
         if node.side < 0:
-            tendon_change = restoring_by_tendon(trail.block, next_node.side, plastic_elongation, plastic_variation)
+            tendon_change = vary_tendon_restoring(trail.block, next_node.side, plastic_elongation, plastic_variation)
             shift_of_rest = events[event_count - 1] if event_count > 0 else 0.0
             du = 0.0
             events[event_count], dv = vary_uplift(trail, node, next_node, quantity, tendon_change, shift_of_rest)
@@ -208,7 +208,7 @@ def compute_variation(
         elif next_node.side < 0:
             shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
             variations = (dv, shift, plastic_elongation, plastic_variation)
-            events[event_count] = rest_shift(trail, node, quantity, variations, next_node)
+            events[event_count] = compute_rest_shift(trail, node, quantity, variations, next_node)
             event_count += 1
             if written > first:
                 order = expand_variation(trail, scratch, variation, node, quantity, start, duration)
@@ -217,16 +217,16 @@ def compute_variation(
         else:
             order = expand_variation(trail, scratch, variation, node, quantity, start, duration)
             write_changes(trail, scratch, variation, node, order, times[first:written], changes[first:written], False)
-            t = step_duration(trail, node, next_node)
+            t = compute_step_duration(trail, node, next_node)
             du, dv, _ = evaluate_series(variation.change, order, t)
             if node.tendon_law == TendonLaw.PLASTIC and next_node.tendon_law != node.tendon_law:
-                plastic_variation = elongation_rate(trail, node.side, next_node.u) * du
+                plastic_variation = compute_elongation_rate(trail, node.side, next_node.u) * du
             if is_impact(nodes, k):
                 _, speed, _ = evaluate_series(scratch.rotation, order, t)
                 shift = du / -speed
                 sign = -1.0 if trail.block.two_stops and next_node.side != node.side else 1.0  # the other stop
                 rates = sign * dv, -sign * speed
-                du, dv = saltation(trail, node, next_node, quantity, shift, rates, impact_count)
+                du, dv = compute_saltation(trail, node, next_node, quantity, shift, rates, impact_count)
                 impacts[impact_count] = shift
                 impact_count += 1
 
@@ -237,9 +237,9 @@ def vary_uplift(
 ) -> tuple[float, float]:
     """Compute shift and velocity variation of an uplift after a rest whose start shifts by ``shift_of_rest``."""
     if next_node.time > node.time or node.time == trail.nodes[0].time:
-        return uplift_shift(trail, next_node, quantity, tendon_change), 0.0
+        return compute_uplift_shift(trail, next_node, quantity, tendon_change), 0.0
     # The ground ends the rest immediately: the arc starts at the same time.
-    return shift_of_rest, shift_of_rest * restoring_acceleration(
+    return shift_of_rest, shift_of_rest * compute_restoring(
         trail.ground, trail.block, next_node.side, next_node.piece, next_node.offset
     )
 
@@ -272,7 +272,7 @@ def write_changes(
 
 
 @inlined
-def quantity_on_side(quantity: int, side: int) -> int:
+def find_side_quantity(quantity: int, side: int) -> int:
     """Return the quantity that varies on a side: itself, its counterpart for both sides, or NOTHING."""
     if quantity <= Quantity.RESTITUTION:
         return quantity
@@ -281,18 +281,18 @@ def quantity_on_side(quantity: int, side: int) -> int:
 
 
 @inlined
-def elongation_rate(trail: Trail, side: int, u: float) -> float:
+def compute_elongation_rate(trail: Trail, side: int, u: float) -> float:
     """Compute the elongation of a tendon per rotation."""
     return trail.block.lever_arm[side] * (math.cos(0.5 * u) if trail.settings.nonlinear else 1.0)
 
 
 @inlined
-def plastic_by_start(trail: Trail) -> float:
+def differentiate_start_plasticity(trail: Trail) -> float:
     """Return the plastic elongation per rotation at the start of a response: 0 unless the tendon yields there."""
     node = trail.nodes[0]
     if not trail.block.yielding or update_plastic_elongation(trail.block, trail.settings, trail.nodes, 0, 0.0) <= 0.0:
         return 0.0
-    return elongation_rate(trail, node.side, node.u)
+    return compute_elongation_rate(trail, node.side, node.u)
 
 
 @inlined
@@ -306,7 +306,7 @@ def is_impact(nodes: Records, k: int) -> bool:
 
 
 @inlined
-def step_duration(trail: Trail, node: Record, next_node: Record) -> float:
+def compute_step_duration(trail: Trail, node: Record, next_node: Record) -> float:
     """Compute the length of a step without the rounding of absolute times."""
     if next_node.piece == node.piece:
         return next_node.offset - node.offset
@@ -325,7 +325,7 @@ def expand_variation(
     """
     order, _, degree = expand_arc(trail.ground, trail.block, trail.settings, scratch, node, duration)
     expand_derivatives(trail, scratch, variation, node.side, degree, order)
-    side_quantity = quantity_on_side(quantity, node.side)
+    side_quantity = find_side_quantity(quantity, node.side)
     if side_quantity == Quantity.FREQUENCY:
         for k in range(order - 1):
             variation.forcing[k] = 2.0 * scratch.rotation[k + 2] / INTEGRATED_TWICE[k]
@@ -377,9 +377,9 @@ def expand_derivatives(trail: Trail, scratch: Record, variation: Record, side: i
                 forcing += A[j] * C[k - j]
             variation.forcing[k] = -lam * forcing
         else:
-            forcing = gain * (A[k] + threshold * motion_weight(W, k, weight_degree)) if k <= degree else 0.0
+            forcing = gain * (A[k] + threshold * select_motion_weight(W, k, weight_degree)) if k <= degree else 0.0
             for j in range(min(k, weight_degree) + 1):
-                forcing -= lam * motion_weight(W, j, weight_degree) * scratch.rotation[k - j]
+                forcing -= lam * select_motion_weight(W, j, weight_degree) * scratch.rotation[k - j]
             variation.forcing[k] = -forcing
 
 
@@ -402,7 +402,7 @@ def expand_unforced(trail: Trail, scratch: Record, variation: Record, side: int,
 
 
 @inlined
-def motion_weight(W: Floats, k: int, weight_degree: int) -> float:
+def select_motion_weight(W: Floats, k: int, weight_degree: int) -> float:
     """Return a coefficient of the weight added by the motion."""
     if k > weight_degree:
         return 0.0
@@ -410,7 +410,7 @@ def motion_weight(W: Floats, k: int, weight_degree: int) -> float:
 
 
 @inlined
-def saltation(
+def compute_saltation(
     trail: Trail, node: Record, next_node: Record, quantity: int, shift: float, rates: tuple[float, float], number: int
 ) -> tuple[float, float]:
     """Compute the variation after an impact that shifts; ``rates``: velocity variation before it, and impact speed.
@@ -420,30 +420,30 @@ def saltation(
     block = trail.block
     dv, speed = rates
     hit = next_node.side if block.two_stops else node.side
-    g_before = restoring_acceleration(trail.ground, block, hit, next_node.piece, next_node.offset)
+    g_before = compute_restoring(trail.ground, block, hit, next_node.piece, next_node.offset)
     g_before -= block.damping[hit] * speed
-    e = restitution_factor(block, hit, speed, number)
-    g_after = restoring_acceleration(trail.ground, block, next_node.side, next_node.piece, next_node.offset)
+    e = compute_restitution_factor(block, hit, speed, number)
+    g_after = compute_restoring(trail.ground, block, next_node.side, next_node.piece, next_node.offset)
     g_after += block.damping[next_node.side] * (e * speed)
-    speed_change = -(dv - g_before * shift) * relative_speed_slope(block, hit, speed, e)
-    speed_change += speed if quantity_on_side(quantity, hit) == Quantity.RESTITUTION else 0.0
+    speed_change = -(dv - g_before * shift) * compute_speed_slope(block, hit, speed, e)
+    speed_change += speed if find_side_quantity(quantity, hit) == Quantity.RESTITUTION else 0.0
     return -next_node.v * shift, e * speed_change + g_after * shift
 
 
 @inlined
-def uplift_shift(trail: Trail, node: Record, quantity: int, tendon_change: float) -> float:
-    """Compute the shift of the uplift of a node; ``tendon_change``: see `restoring_by_tendon`."""
+def compute_uplift_shift(trail: Trail, node: Record, quantity: int, tendon_change: float) -> float:
+    """Compute the shift of the uplift of a node; ``tendon_change``: see `vary_tendon_restoring`."""
     ground, block, settings, _ = trail
     threshold = block.threshold[node.side]
-    push = -push_towards_side(ground, block, node.side, node.piece, node.offset)
-    rate = -push_rate(ground, block, node.side, node.piece, node.offset)
+    push = -compute_side_push(ground, block, node.side, node.piece, node.offset)
+    rate = -compute_push_rate(ground, block, node.side, node.piece, node.offset)
     if is_jump(trail, node):
         return 0.0
     tendon_shift = tendon_change / (block.threshold_slope[node.side] * rate)
     if quantity == Quantity.MOTION:
         return -push / rate + tendon_shift
-    if quantity_on_side(quantity, node.side) == Quantity.SLENDERNESS:
-        growth = weight_at(ground, node.piece, node.offset) + block.added_weight[node.side]
+    if find_side_quantity(quantity, node.side) == Quantity.SLENDERNESS:
+        growth = compute_weight(ground, node.piece, node.offset) + block.added_weight[node.side]
         if settings.nonlinear:
             growth *= 1.0 + threshold * threshold
             growth += block.prestress[node.side] * threshold / block.threshold_slope[node.side]
@@ -455,34 +455,34 @@ def uplift_shift(trail: Trail, node: Record, quantity: int, tendon_change: float
 def is_jump(trail: Trail, node: Record) -> bool:
     """Return whether the motion jumps past the threshold at the uplift of a node."""
     threshold, restraint = trail.block.threshold[node.side], trail.block.restraint_threshold[node.side]
-    push = -push_towards_side(trail.ground, trail.block, node.side, node.piece, node.offset)
+    push = -compute_side_push(trail.ground, trail.block, node.side, node.piece, node.offset)
     return bool(abs(push - threshold - restraint) > _MIN_JUMP_EXCESS * (abs(threshold) + abs(restraint)))
 
 
 @inlined
-def restoring_by_tendon(block: Record, side: int, plastic_elongation: float, change: float) -> float:
+def vary_tendon_restoring(block: Record, side: int, plastic_elongation: float, change: float) -> float:
     """Compute the effect of a change of plastic elongation on the restoring acceleration at zero rotation."""
-    if not block.yielding or tendon_law_at_rest(block, plastic_elongation) == TendonLaw.SLACK:
+    if not block.yielding or find_tendon_law_at_rest(block, plastic_elongation) == TendonLaw.SLACK:
         return 0.0
     return -block.tendon_stiffness[side] * change
 
 
 @inlined
-def push_towards_side(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+def compute_side_push(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
     """Compute the acceleration towards a side plus the weight's contribution to its threshold."""
-    added = weight_at(ground, piece, offset) - 1.0
-    return side_sign(side) * acceleration(ground, piece, offset) + block.threshold[side] * added
+    added = compute_weight(ground, piece, offset) - 1.0
+    return side_sign(side) * compute_acceleration(ground, piece, offset) + block.threshold[side] * added
 
 
 @inlined
-def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
-    """Compute the rate of `push_towards_side`."""
-    vertical = acceleration_rate(vertical_component(ground), piece, offset) if has_vertical(ground) else 0.0
-    return side_sign(side) * acceleration_rate(ground, piece, offset) + block.threshold[side] * vertical
+def compute_push_rate(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+    """Compute the rate of `compute_side_push`."""
+    vertical = compute_acceleration_rate(select_vertical(ground), piece, offset) if has_vertical(ground) else 0.0
+    return side_sign(side) * compute_acceleration_rate(ground, piece, offset) + block.threshold[side] * vertical
 
 
 @inlined
-def rest_shift(
+def compute_rest_shift(
     trail: Trail, node: Record, quantity: int, changes: tuple[float, float, float, float], rest: Record
 ) -> float:
     """Compute the shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
@@ -496,15 +496,15 @@ def rest_shift(
         return shift
     block, i = trail.block, node.side
     j = block.next_side[i]
-    g_i = restoring_acceleration(trail.ground, block, i, node.piece, node.offset)
-    g_j = restoring_acceleration(trail.ground, block, j, node.piece, node.offset)
-    tendon_i = restoring_by_tendon(block, i, plastic_elongation, plastic_variation)
-    dg_i = restoring_shift(trail, node, i, quantity, shift) + tendon_i
-    tendon_j = restoring_by_tendon(block, j, plastic_elongation, plastic_variation)
-    dg_j = restoring_shift(trail, node, j, quantity, shift) + tendon_j
-    e_i, e_j = mean_factor(block, i, node.v), mean_factor(block, j, node.v)
-    de_i = 1.0 if quantity_on_side(quantity, i) == Quantity.RESTITUTION else 0.0
-    de_j = 1.0 if quantity_on_side(quantity, j) == Quantity.RESTITUTION else 0.0
+    g_i = compute_restoring(trail.ground, block, i, node.piece, node.offset)
+    g_j = compute_restoring(trail.ground, block, j, node.piece, node.offset)
+    tendon_i = vary_tendon_restoring(block, i, plastic_elongation, plastic_variation)
+    dg_i = compute_restoring_shift(trail, node, i, quantity, shift) + tendon_i
+    tendon_j = vary_tendon_restoring(block, j, plastic_elongation, plastic_variation)
+    dg_j = compute_restoring_shift(trail, node, j, quantity, shift) + tendon_j
+    e_i, e_j = compute_mean_factor(block, i, node.v), compute_mean_factor(block, j, node.v)
+    de_i = 1.0 if find_side_quantity(quantity, i) == Quantity.RESTITUTION else 0.0
+    de_j = 1.0 if find_side_quantity(quantity, j) == Quantity.RESTITUTION else 0.0
     per_speed = 2.0 * (1.0 / g_i + e_i / g_j)
     change = -2.0 * (dg_i / (g_i * g_i) + e_i * dg_j / (g_j * g_j) - de_i * e_i / g_j)
     change += per_speed * (de_i + de_j) * e_i * e_j / (1.0 - e_i * e_j)
@@ -512,17 +512,17 @@ def rest_shift(
 
 
 @inlined
-def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: float) -> float:
+def compute_restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: float) -> float:
     """Compute the change of a restoring acceleration at an impact that shifts."""
     ground, block, settings, _ = trail
-    motion = acceleration(ground, node.piece, node.offset)
-    change = block.threshold_slope[j] * shift * push_rate(ground, block, j, node.piece, node.offset)
+    motion = compute_acceleration(ground, node.piece, node.offset)
+    change = block.threshold_slope[j] * shift * compute_push_rate(ground, block, j, node.piece, node.offset)
     if quantity == Quantity.MOTION:
-        change += block.threshold_slope[j] * push_towards_side(ground, block, j, node.piece, node.offset)
-    elif quantity_on_side(quantity, j) == Quantity.FREQUENCY:
-        change += 2.0 * restoring_acceleration(ground, block, j, node.piece, node.offset)
-    elif quantity_on_side(quantity, j) == Quantity.SLENDERNESS:
-        per_angle = weight_at(ground, node.piece, node.offset) + block.added_weight[j]
+        change += block.threshold_slope[j] * compute_side_push(ground, block, j, node.piece, node.offset)
+    elif find_side_quantity(quantity, j) == Quantity.FREQUENCY:
+        change += 2.0 * compute_restoring(ground, block, j, node.piece, node.offset)
+    elif find_side_quantity(quantity, j) == Quantity.SLENDERNESS:
+        per_angle = compute_weight(ground, node.piece, node.offset) + block.added_weight[j]
         if settings.nonlinear:
             per_angle = block.cosine[j] * per_angle - (side_sign(j) * motion + block.added_push[j]) * block.sine[j]
         change += block.stiffness[j] * per_angle * block.slenderness[j]

@@ -10,19 +10,19 @@ import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, not_inlined
-from rocking.kernels.events import bound_rounding, find_first_negative_beyond_rounding, leading_power
+from rocking.kernels.events import bound_rounding, find_first_negative_beyond_rounding, find_leading_power
 from rocking.kernels.ground import (
     ROUNDING,
     Ground,
     Grounds,
     bound_piece,
+    find_piece_beyond,
     has_vertical,
     last_piece,
-    next_piece_beyond,
     piece_length,
     piece_start,
     select_ground,
-    vertical_component,
+    select_vertical,
     write_local_series,
 )
 from rocking.kernels.restraints import apply_tendon_law, update_plastic_elongation
@@ -40,7 +40,7 @@ class Uplift(NamedTuple):
 
 
 @inlined
-def rest_threshold(block: Record, side: int) -> float:
+def find_threshold(block: Record, side: int) -> float:
     """Return the threshold of a side, of an uplift or of a slip."""
     return min(block.threshold[side], block.static_friction) if block.has_friction else block.threshold[side]
 
@@ -54,12 +54,12 @@ def find_next_uplift(
     Without an uplift before ``stop``, the side is AT_REST and the piece the last one examined.
     """
     A, d = scratch.ground, scratch.auxiliary
-    plus, minus = rest_threshold(block, 0), rest_threshold(block, 1)
+    plus, minus = find_threshold(block, 0), find_threshold(block, 1)
     restraint_plus, restraint_minus = block.restraint_threshold[0], block.restraint_threshold[1]
     if block.two_stops:  # only the stop at which the body rests
         plus, minus = (plus, np.inf) if find_stop_of_resting_side(resting) == 0 else (np.inf, minus)
     while True:
-        next_piece = next_piece_beyond(ground, piece, (-plus, minus), (-restraint_plus, restraint_minus))
+        next_piece = find_piece_beyond(ground, piece, (-plus, minus), (-restraint_plus, restraint_minus))
         if next_piece > piece:
             piece, offset = next_piece, 0.0
         if piece == last_piece(ground) or not piece_start(ground, piece) + offset < stop:
@@ -69,7 +69,7 @@ def find_next_uplift(
         bounds = bound_piece(ground, piece, offset, remaining, A)
         weight = 1.0
         if has_vertical(ground):
-            weight += bound_piece(vertical_component(ground), piece, offset, remaining, A).low
+            weight += bound_piece(select_vertical(ground), piece, offset, remaining, A).low
         if bounds.high > minus * weight + restraint_minus or -bounds.low > plus * weight + restraint_plus:
             degree = write_push(ground, piece, offset, plus, -1.0, A, d)
             to_plus, jump_plus = find_first_excess(A, degree, remaining, plus + restraint_plus, -1.0, d)
@@ -113,7 +113,7 @@ def find_uplift_side(ground: Ground, block: Record, piece: int, offset: float, h
     only by rounding, and the push on the body decides: side + without a push.
     """
     degree = write_threshold_difference(ground, block, piece, offset, A, d)
-    lead = leading_power(A, degree, h, bound_rounding(A, degree, h))
+    lead = find_leading_power(A, degree, h, bound_rounding(A, degree, h))
     return 1 if lead <= degree and A[lead] > 0.0 else 0
 
 
@@ -122,7 +122,7 @@ def is_side_uncertain(ground: Ground, block: Record, piece: int, offset: float, 
     """Return whether the push has negligible leading terms, so that rounding decides the side without weight."""
     degree = write_threshold_difference(ground, block, piece, offset, A, d)
     negligible_terms = 0.0
-    for k in range(leading_power(A, degree, h, bound_rounding(A, degree, h))):
+    for k in range(find_leading_power(A, degree, h, bound_rounding(A, degree, h))):
         negligible_terms += abs(A[k])
     return negligible_terms > 0.0
 
@@ -150,7 +150,7 @@ def write_push(ground: Ground, piece: int, offset: float, threshold: float, sign
     degree = write_local_series(ground, piece, offset, 1.0, A)
     if not has_vertical(ground) or threshold == np.inf:  # the threshold of a side that is never lifted stays infinite
         return degree
-    weight_degree = write_local_series(vertical_component(ground), piece, offset, 1.0, d)
+    weight_degree = write_local_series(select_vertical(ground), piece, offset, 1.0, d)
     for k in range(degree + 1, weight_degree + 1):
         A[k] = 0.0
     for k in range(weight_degree + 1):
@@ -200,7 +200,9 @@ def write_completeness(
 def exceeds_threshold_again(ground: Ground, block: Record, scratch: Record, state: Record) -> bool:
     """Return whether the motion, after an uplift and a return within the thresholds, passes one before the rest."""
     rest_time = state.first_rest
-    uplift = find_next_uplift(ground, block, scratch, AT_REST, piece_before(ground, state.first_uplift), 0.0, rest_time)
+    uplift = find_next_uplift(
+        ground, block, scratch, AT_REST, find_piece_before(ground, state.first_uplift), 0.0, rest_time
+    )
     if uplift.side == AT_REST:
         return False
     piece, offset = find_return(ground, block, scratch, uplift)
@@ -209,7 +211,7 @@ def exceeds_threshold_again(ground: Ground, block: Record, scratch: Record, stat
 
 
 @inlined
-def piece_before(ground: Ground, time: float) -> int:
+def find_piece_before(ground: Ground, time: float) -> int:
     """Return the last piece that is over before a time, or the first one."""
     low, high = 0, last_piece(ground)
     while high - low > 1:
@@ -229,10 +231,10 @@ def find_return(ground: Ground, block: Record, scratch: Record, uplift: Uplift) 
     """
     piece, offset, side = uplift.piece, uplift.offset, uplift.side
     while piece < last_piece(ground):
-        end = offset + time_above_threshold(ground, block, scratch, piece, offset, side)
+        end = offset + measure_time_above_threshold(ground, block, scratch, piece, offset, side)
         if end == offset:
             side = 1 - side
-            end = offset + time_above_threshold(ground, block, scratch, piece, offset, side)
+            end = offset + measure_time_above_threshold(ground, block, scratch, piece, offset, side)
         if end == offset:
             return piece, offset
         offset = end
@@ -243,9 +245,11 @@ def find_return(ground: Ground, block: Record, scratch: Record, uplift: Uplift) 
 
 
 @inlined
-def time_above_threshold(ground: Ground, block: Record, scratch: Record, piece: int, offset: float, side: int) -> float:
+def measure_time_above_threshold(
+    ground: Ground, block: Record, scratch: Record, piece: int, offset: float, side: int
+) -> float:
     """Return the time for which the motion exceeds a threshold within a piece; inf if to its end."""
-    sign, threshold = 1.0 if side == 1 else -1.0, rest_threshold(block, side)
+    sign, threshold = 1.0 if side == 1 else -1.0, find_threshold(block, side)
     if threshold == np.inf:
         return 0.0
     A, d = scratch.ground, scratch.auxiliary

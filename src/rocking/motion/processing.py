@@ -361,29 +361,33 @@ def _compute_floor_motion(
     """
     end = float(motion.breakpoints[-1])
     natural_period = checks.positive(period, "period", MotionError, "s")
-    rate, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, MotionError)
+    angular_frequency, damping_ratio = 2.0 * math.pi / natural_period, check_damping(damping, MotionError)
     if free_vibration is None and damping_ratio == 0.0:
         raise MotionError("the motion of a floor without {} does not decay; give {}, in s", "damping", "free_vibration")
     # By default a free oscillation continues until it has decayed to a thousandth.
     if free_vibration is None:
-        tail = -math.log(1e-3) / (damping_ratio * rate)
+        tail = -math.log(1e-3) / (damping_ratio * angular_frequency)
     else:
         tail = checks.between(free_vibration, "free_vibration", MotionError, 0.0, 1e15, "s")
-    if not (end + tail) / (_MAX_ANGLE / rate) <= 1e6:
+    if not (end + tail) / (_MAX_ANGLE / angular_frequency) <= 1e6:
         message = f"{{}} = {natural_period:g} s is too short for a floor motion of {end + tail:.4g} s"
         raise MotionError(f"{message}; use a longer one, or a shorter {{}}", "period", "free_vibration", value=period)
-    breakpoints, solution = compute_oscillator(motion, rate, damping_ratio, tail)
+    breakpoints, solution = compute_oscillator(motion, angular_frequency, damping_ratio, tail)
     columns = solution.shape[1] - 2
     velocity = solution[:, 1:] * np.arange(1, columns + 2)
-    acceleration = -(2.0 * damping_ratio * rate * velocity[:, :columns] + rate**2 * solution[:, :columns])
+    acceleration = -(
+        2.0 * damping_ratio * angular_frequency * velocity[:, :columns] + angular_frequency**2 * solution[:, :columns]
+    )
     peak = float(np.max(np.abs(acceleration[:, 0]), initial=0.0))
     truncation_error = 4.0 * peak * _MAX_ANGLE**columns / math.factorial(columns)
     # The effects of an error of the acceleration add up.
-    propagated_error = error * (2.0 / damping_ratio if damping_ratio > 0.0 else rate * (end + tail))
+    propagated_error = error * (2.0 / damping_ratio if damping_ratio > 0.0 else angular_frequency * (end + tail))
     return breakpoints, acceleration, truncation_error + propagated_error
 
 
-def compute_oscillator(motion: Piecewise, rate: float, damping_ratio: float, tail: float) -> tuple[Floats, Floats]:
+def compute_oscillator(
+    motion: Piecewise, angular_frequency: float, damping_ratio: float, tail: float
+) -> tuple[Floats, Floats]:
     """Return breakpoints, s, and coefficients of the displacement u, m, with u'' + 2 z w u' + w^2 u = -a(t), from rest.
 
     On each piece u is the Taylor series of the exact solution about its start, from the series of the solutions of the
@@ -391,26 +395,29 @@ def compute_oscillator(motion: Piecewise, rate: float, damping_ratio: float, tai
     """
     nodes = motion.breakpoints
     nodes = np.append(nodes, nodes[-1] + tail) if tail > 0.0 else nodes
-    subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / (_MAX_ANGLE / rate))).astype(np.intp)
+    subdivisions = np.maximum(1, np.ceil(np.diff(nodes) / (_MAX_ANGLE / angular_frequency))).astype(np.intp)
     start, width = np.repeat(nodes[:-1], subdivisions), np.repeat(np.diff(nodes) / subdivisions, subdivisions)
     index = np.arange(subdivisions.sum()) - np.repeat(np.cumsum(subdivisions) - subdivisions, subdivisions)
     breakpoints = np.append(start + index * width, nodes[-1])
     width = np.diff(breakpoints)
     columns = max(motion.coefficients.shape[1], _SERIES_DEGREE + 1)
     forcing = piecewise.refine_pieces(motion.breakpoints, motion.coefficients, breakpoints, columns)
-    series = _compute_oscillator_series(forcing, rate, damping_ratio, columns + 2)
-    rates = series[..., 1:] * np.arange(1, columns + 2)
-    end_states = [piecewise.evaluate_pieces(s, np.broadcast_to(width, s.shape[:-1])) for s in (series, rates)]
+    series = _compute_oscillator_series(forcing, angular_frequency, damping_ratio, columns + 2)
+    velocity_series = series[..., 1:] * np.arange(1, columns + 2)
+    end_states = [piecewise.evaluate_pieces(s, np.broadcast_to(width, s.shape[:-1])) for s in (series, velocity_series)]
     states = _propagate_states(np.stack(end_states))
     return breakpoints, series[2] + np.einsum("jn,jnk->nk", states, series[:2])
 
 
-def _compute_oscillator_series(forcing: Floats, rate: float, damping_ratio: float, terms: int) -> Floats:
+def _compute_oscillator_series(forcing: Floats, angular_frequency: float, damping_ratio: float, terms: int) -> Floats:
     """Return series of two free solutions and of the one from rest on each piece, shape (3, pieces, terms)."""
     series = np.zeros((3, len(forcing), terms))
     series[0, :, 0] = series[1, :, 1] = 1.0
     for k in range(terms - 2):
-        forces = 2.0 * damping_ratio * rate * (k + 1) * series[..., k + 1] + rate * rate * series[..., k]
+        forces = (
+            2.0 * damping_ratio * angular_frequency * (k + 1) * series[..., k + 1]
+            + angular_frequency * angular_frequency * series[..., k]
+        )
         forces[2] += forcing[:, k]
         series[..., k + 2] = -forces / ((k + 1) * (k + 2))
     return series

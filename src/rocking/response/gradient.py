@@ -258,7 +258,7 @@ def _find_later_nodes(response: Response, row: int, until: float) -> Records:
 
 def _has_ties_before(trail: Trail, instant: float) -> bool:
     """Return whether rounding determined a touch up to an instant, by integrating again."""
-    settings, start = trail.settings.copy(), state.state_at_node(trail.nodes[0])
+    settings, start = trail.settings.copy(), state.create_state_at_node(trail.nodes[0])
     settings["stop"], settings["no_end_time"], settings["writes_tables"] = (
         math.nextafter(instant, math.inf),
         False,

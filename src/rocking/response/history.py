@@ -198,7 +198,7 @@ def add_all_impacts(trail: Trail, *, ends_in_sequence: bool) -> Trail:
     table = state.create_table(1024)
     parts, next_row, plastic_elongations = [], 0, compute_plastic_elongations(trail)
     for row in last_impacts:
-        start = state.state_at_node(nodes[row], plastic_elongations[row], _MAX_IMPACTS)
+        start = state.create_state_at_node(nodes[row], plastic_elongations[row], _MAX_IMPACTS)
         body["rest_limit"] = np.maximum(min_speeds, _MIN_SPEED_RATIO * start["v"])
         start["peak"] = math.inf  # the peak is not needed, and weight is positive at a proven rest
         settings["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]

@@ -21,7 +21,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisect
 from rocking.errors import OptionError
-from rocking.kernels.ground import component_coefficients
+from rocking.kernels.ground import scale_coefficients
 from rocking.kernels.state import Record
 from rocking.motion import piecewise
 from rocking.response.history import TimeHistory, compute_elongation, compute_plastic_elongations
@@ -163,7 +163,7 @@ class ContactForces:
         current = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
         piece = np.where(is_resting, current, self.history.trail.nodes["piece"][rows])
         elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
-        components = component_coefficients(ground, piece)
+        components = scale_coefficients(ground, piece)
         push, *lift = (piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in components)
         return push, lift[0] if lift else np.zeros_like(push)
 
@@ -196,7 +196,7 @@ _FIELDS: Final = (
 
 
 @dataclass(frozen=True, eq=False)
-class Energy:
+class EnergyHistory:
     """Energy of a block divided by the smallest energy from rest to an unstable balance without ground motion.
 
     ``record`` is the body as a record for kernels. Rotations are in the frame of a side, u = |theta|. A side is 0, 1,
@@ -320,13 +320,13 @@ def _solve_linear_balance(record: Record, added_weight: Floats, added_push: Floa
     return balance
 
 
-def create_energy(body: Body, record: Record, *, nonlinear: bool) -> Energy:
+def create_energy(body: Body, record: Record, *, nonlinear: bool) -> EnergyHistory:
     """Return the energy of a block; raise `OptionError` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
         raise OptionError(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")
     if record["yielding"]:
         raise OptionError("the energy is not defined for a yielding tendon; omit the strength of the tendon")
-    energy = Energy(body, record, nonlinear)
+    energy = EnergyHistory(body, record, nonlinear)
     if not np.any(np.isfinite(energy.balance)):
         raise OptionError("this block has no overturning energy, because its restraints hold it at any rotation")
     return energy

@@ -20,7 +20,15 @@ from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.engine.problem import build_settings, gather_bodies
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, create_task, simulate_tasks, split_simulations
+from rocking.engine.tasks import (
+    OUTCOME_DTYPE,
+    Setup,
+    Task,
+    check_components,
+    create_task,
+    simulate_tasks,
+    split_simulations,
+)
 from rocking.errors import OptionError
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION
@@ -82,7 +90,7 @@ _SHARE_MEANING: Final = "share of the simulation and its repeats within 3e-6 of 
 
 
 @dataclass(frozen=True, eq=False)
-class Scales:
+class ScalingLevels:
     """Levels of a measure to which motions are scaled. Without a measure, motions are not scaled.
 
     Attributes
@@ -110,7 +118,7 @@ class Scales:
     values: Floats = field(default_factory=lambda: np.ones(1))
 
     @classmethod
-    def from_levels(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
+    def from_levels(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> ScalingLevels:
         """Create scales from `levels` and `measure` as in `simulate_many`, or for unscaled motions."""
         parsed = Measure.parse(measure, among=SCALING_MEASURES)
         if levels is None:
@@ -142,7 +150,7 @@ class Scales:
 
 
 @dataclass(frozen=True, eq=False)
-class Product:
+class SimulationProduct:
     """Combinations of all bodies, motions, scales and polarities.
 
     Attributes
@@ -179,7 +187,7 @@ class Product:
 
     bodies: Bodies
     motions: tuple[Motion, ...]
-    scales: Scales
+    scales: ScalingLevels
     polarity: Polarity
     model: Model
     chattering: ChatteringScheme
@@ -229,21 +237,21 @@ def create_product(
     chattering: str | ChatteringScheme,
     duration: float | None,
     friction: Friction | None = None,
-) -> Product:
+) -> SimulationProduct:
     """Create a product from the arguments of `simulate_many`."""
     bodies, ground_motions = gather_bodies(blocks), tuple(list_motions(motions))
-    scales, scheme = Scales.from_levels(levels, measure), chattering_scheme(chattering)
+    scales, scheme = ScalingLevels.from_levels(levels, measure), chattering_scheme(chattering)
     coefficients = resolve_friction(friction)
-    return Product(bodies, ground_motions, scales, polarity, model, scheme, duration, coefficients)
+    return SimulationProduct(bodies, ground_motions, scales, polarity, model, scheme, duration, coefficients)
 
 
-def create_setup(product: Product, bodies: slice | None = None) -> Setup:
+def create_setup(product: SimulationProduct, bodies: slice | None = None) -> Setup:
     """Return the setup for all or some bodies of a product."""
     selected = product.bodies if bodies is None else product.bodies.select(bodies)
     return Setup(selected, product.model, product.chattering, product.duration, friction=product.friction)
 
 
-def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
+def _generate_tasks(product: SimulationProduct, perturbation: float) -> Iterator[Task]:
     """Divide a product into tasks for the engine, with slices of its outcomes, in order, as keys."""
     signs, per_motion = np.asarray(product.signs, dtype=float), math.prod(product.shape[1:])
     factors = [product.scales.factors(motion) for motion in product.motions]
@@ -254,7 +262,7 @@ def _generate_tasks(product: Product, perturbation: float) -> Iterator[Task]:
         yield create_task(block, product.motions, m, perturbation * (signs[k] * scales), part)
 
 
-def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
+def create_dataset(product: SimulationProduct, outcomes: Mapping[str, Any]) -> xr.Dataset:
     """Create a dataset from arrays named as in `VARIABLES`, without the dimensions that were not requested."""
     import xarray as xr
 
@@ -433,11 +441,11 @@ def simulate_many(
 
 
 def simulate_product(
-    product: Product, setup: Setup, names: Iterable[str] = tuple(VARIABLES), perturbation: float = 1.0
+    product: SimulationProduct, setup: Setup, names: Iterable[str] = tuple(VARIABLES), perturbation: float = 1.0
 ) -> dict[str, NDArray[np.generic]]:
-    """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME`."""
+    """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME_DTYPE`."""
     count = math.prod(product.shape)
-    results: dict[str, NDArray[np.generic]] = {name: np.empty(count, dtype=OUTCOME[name]) for name in names}
+    results: dict[str, NDArray[np.generic]] = {name: np.empty(count, dtype=OUTCOME_DTYPE[name]) for name in names}
     with Progress("simulating", count) as bar:
         for task, outcomes in simulate_tasks(setup, _generate_tasks(product, perturbation)):
             for name, values in results.items():

@@ -280,7 +280,7 @@ class Plane(NamedTuple):
     """Body in a vertical plane."""
 
     azimuth: float  # direction of side +, deg
-    pivots: polygons.Extent  # pivots of both sides
+    pivots: polygons.SupportExtent  # pivots of both sides
     height: float  # height of the centre of mass, m
     gyration: float  # radius of gyration, m
 

@@ -25,7 +25,7 @@ _EDGE_TOLERANCE: Final = 1e-6
 _MAX_BANDS: Final = 120
 
 
-class Extent(NamedTuple):
+class SupportExtent(NamedTuple):
     """Reach of a support in n directions, m, shape (n,) each."""
 
     distance: Floats  # distance of the outermost edge or corner
@@ -74,14 +74,14 @@ def check_polygon(value: ArrayLike) -> Floats:
     return polygon
 
 
-def compute_extents(polygon: Floats, azimuths: ArrayLike) -> Extent:
+def compute_extents(polygon: Floats, azimuths: ArrayLike) -> SupportExtent:
     """Return the reach in each direction of a polygon around the centre of mass."""
     directions = compute_directions(azimuths)
     reach, across = polygon @ directions.T, polygon @ np.column_stack([-directions[:, 1], directions[:, 0]]).T
     max_reach = reach.max(axis=0)
     outermost = reach >= max_reach - _EDGE_TOLERANCE * float(np.ptp(polygon, axis=0).max())
     low, high = np.where(outermost, across, np.inf).min(axis=0), np.where(outermost, across, -np.inf).max(axis=0)
-    return Extent(max_reach, low, high)
+    return SupportExtent(max_reach, low, high)
 
 
 def compute_edges(polygon: Floats) -> tuple[Floats, Floats]:

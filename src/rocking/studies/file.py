@@ -43,7 +43,7 @@ from rocking.inputs.toml import Tables
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.named import OWN, expand_record_names, load_motion, path_exists
-from rocking.simulation.ensemble import Product, Scales
+from rocking.simulation.ensemble import ScalingLevels, SimulationProduct
 
 #: Template of a study file, with comments.
 TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")
@@ -113,7 +113,7 @@ class StudyFile:
     2
     """
 
-    product: Product
+    product: SimulationProduct
     skipped: tuple[str, ...]
     records: tuple[str, ...] = ()
 
@@ -161,7 +161,7 @@ def read_study(path: str | Path) -> StudyFile:
     with tables.locating_errors("simulation", "scales", "blocks"):
         model, duration = rules.get("model", "nonlinear"), rules.get("duration")
         friction = resolve_friction(rules.get("friction"))
-        product = Product(blocks, tuple(motions), scales, polarity, model, chattering, duration, friction)
+        product = SimulationProduct(blocks, tuple(motions), scales, polarity, model, chattering, duration, friction)
     return StudyFile(product, tuple(skipped), tuple(names))
 
 
@@ -265,7 +265,7 @@ def _create_stochastic_motions(tables: Tables, k: int) -> list[Motion]:
     return [*itertools.chain(*_create_objects(tables, table, k, tables.table(table, k), readers, create))]
 
 
-def _read_scales(tables: Tables) -> Scales:
+def _read_scales(tables: Tables) -> ScalingLevels:
     entries = tables.table("scales")
     measures = [name for name in _MEASURES if name in entries]
     if len(measures) > 1:
@@ -276,15 +276,15 @@ def _read_scales(tables: Tables) -> Scales:
         raise tables.create_error("scales", option, "{} is only allowed with {}", option, "sa")
     options |= {"component": entries["component"]} if "component" in entries else {}
     if not measures:
-        return Scales.from_levels(None, FACTOR)
+        return ScalingLevels.from_levels(None, FACTOR)
     (name,) = measures
     with tables.locating_errors("scales", key=name):
         values = quantities.read_axis(entries[name], name, _MEASURES[name])
         checks.positive_numbers(values, name, OptionError)
-        return Scales.from_levels(values, Measure(cast(MeasureName, name), **options))
+        return ScalingLevels.from_levels(values, Measure(cast(MeasureName, name), **options))
 
 
-def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
+def _load_motions(tables: Tables, scales: ScalingLevels) -> tuple[list[Motion], list[str], list[str]]:
     """Load the motions; return them, their records, and a sentence for each skipped record."""
     entries, folder = tables.table("motions"), tables.file.parent
     if "vertical" in entries and not entries.get("records"):

@@ -27,7 +27,7 @@ from rocking.errors import DamagedStudyError, OutputError, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.simulation.ensemble import Product, Scales, create_setup
+from rocking.simulation.ensemble import ScalingLevels, SimulationProduct, create_setup
 from rocking.studies.units import OUTCOMES, Key, UnitGrid, UnitInput, decode, format_key, identify_program, seal, unseal
 
 if sys.platform == "win32":
@@ -77,7 +77,7 @@ class Store:
         self._factors = functools.lru_cache(1)(self._compute_factors)  # neighbouring units share their motions
 
     @staticmethod
-    def create(path: str | Path, product: Product, unit: Sequence[int], records: Sequence[str]) -> None:
+    def create(path: str | Path, product: SimulationProduct, unit: Sequence[int], records: Sequence[str]) -> None:
         """Write a new store into an empty folder."""
         header = {"format": _FORMAT, "program": identify_program(), "unit": unit, "records": records}
         arrays: dict[str, Any] = _product_to_arrays(product) | {"about": np.array(json.dumps(header))}
@@ -92,7 +92,7 @@ class Store:
             message = f"the study was created by {self.program}, this is {identify_program()}: {remedy}"
             raise StudyError(message, path=str(self.folder))
 
-    def check_inputs(self, product: Product) -> None:
+    def check_inputs(self, product: SimulationProduct) -> None:
         """Check the inputs against the store; a StudyError names the parts that differ."""
         inputs = self.inputs, _product_to_arrays(product)
         stored, new = ({name: array.tobytes() for name, array in arrays.items()} for arrays in inputs)
@@ -230,7 +230,7 @@ def _convert_errors(operation: str, file: Path) -> Iterator[None]:
         raise OutputError(f"the file cannot be {operation}: {error.strerror or error}", path=str(file)) from error
 
 
-def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
+def _product_to_arrays(product: SimulationProduct) -> dict[str, NDArray[Any]]:
     """Convert all inputs to arrays by part and name."""
     bodies, scales = product.bodies, product.scales
     arrays = {f"{bodies.kind}/{name}": values for name, (values, _) in bodies.parameters().items()}
@@ -251,7 +251,7 @@ def _product_to_arrays(product: Product) -> dict[str, NDArray[Any]]:
     return arrays | {"scales/values": scales.values} | texts
 
 
-def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
+def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> SimulationProduct:
     """Create the inputs from their arrays."""
     kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in BODIES_TYPES), "")
     if not kind:
@@ -267,10 +267,10 @@ def _product_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Product:
     )
     if isinstance(bodies, Blocks):
         bodies.__dict__.update(radii=arrays.get("sizes/radii"), labels=labels)
-    return Product(
+    return SimulationProduct(
         bodies,
         tuple(_motion_from_arrays(arrays, f"motions/{k}") for k in motions),
-        Scales(None if measure is None else Measure(**measure), arrays["scales/values"]),
+        ScalingLevels(None if measure is None else Measure(**measure), arrays["scales/values"]),
         *(texts["rules/polarity"], texts["rules/model"], chattering, texts["rules/duration"]),
         friction and (friction[0], friction[1]),
     )

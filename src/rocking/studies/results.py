@@ -47,11 +47,11 @@ from rocking.core.tables import (
     format_count,
 )
 from rocking.engine.problem import compute_slenderness
-from rocking.engine.tasks import OUTCOME, describe_missing
+from rocking.engine.tasks import OUTCOME_DTYPE, describe_missing
 from rocking.errors import FitError, OptionError, StudyError, describe_install
 from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import (
-    Product,
+    SimulationProduct,
     body_coordinates,
     collect_verticals,
     create_dataset,
@@ -102,13 +102,13 @@ def _create_lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable
 
     def read(key: _Selection) -> NDArray[Any]:
         (values,) = _read_selection(store, [name], complete, key)
-        return values.astype(OUTCOME[name]) if complete else values
+        return values.astype(OUTCOME_DTYPE[name]) if complete else values
 
     class Outcome(BackendArray):
         """Lazy array that reads the selected units."""
 
         shape = store.grid.shape
-        dtype = OUTCOME[name] if complete else np.dtype(np.float64)
+        dtype = OUTCOME_DTYPE[name] if complete else np.dtype(np.float64)
 
         def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
             outer = indexing.IndexingSupport.OUTER
@@ -254,7 +254,7 @@ def _iterate_peak_ratios(store: Store, larger: Measure | None = None) -> Iterato
         yield blocks, ratios
 
 
-def _list_counted_motions(product: Product, measure: Measure, *, larger: bool) -> Integers:
+def _list_counted_motions(product: SimulationProduct, measure: Measure, *, larger: bool) -> Integers:
     """Return the positions of the motions that count: all, or the first of each pair."""
     if not larger:
         return np.arange(len(product.motions))
@@ -535,7 +535,7 @@ def fit_block_fragilities(
     return BlockTable(xr.Dataset(variables, coordinates, attributes))
 
 
-def _compute_intensities(product: Product, measure: Measure) -> Floats:
+def _compute_intensities(product: SimulationProduct, measure: Measure) -> Floats:
     """Compute the intensity of every motion at every scale, shape (motions, scales)."""
     scales = product.scales
     values = compute_intensities(product.motions, measure)

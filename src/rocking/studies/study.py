@@ -36,7 +36,7 @@ from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import OptionError, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions
-from rocking.simulation.ensemble import Polarity, Product, create_product
+from rocking.simulation.ensemble import Polarity, SimulationProduct, create_product
 from rocking.studies.folder import Store, contains_study, lock_folder, read_bytes, require_empty, write_atomically
 from rocking.studies.results import (
     BlockTable,
@@ -171,7 +171,7 @@ class Study:
     def __init__(self, folder: str | Path) -> None:
         self._store = Store(folder)
         self.folder = str(self._store.folder)
-        self.product: Product = self._store.product
+        self.product: SimulationProduct = self._store.product
 
     @property
     def status(self) -> Status:
@@ -439,7 +439,7 @@ def create_study(
 
 
 def open_or_create(
-    folder: str | Path, product: Product, unit_blocks: int | None = None, records: Sequence[str] = ()
+    folder: str | Path, product: SimulationProduct, unit_blocks: int | None = None, records: Sequence[str] = ()
 ) -> Study:
     """Create the study of a product, or open it and check its inputs."""
     if not contains_study(folder):

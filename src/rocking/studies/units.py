@@ -23,7 +23,7 @@ from rocking.engine.tasks import Setup, Task, create_task, simulate_task, split_
 from rocking.errors import OptionError, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
-from rocking.simulation.ensemble import VARIABLES, Product
+from rocking.simulation.ensemble import VARIABLES, SimulationProduct
 
 #: All outcomes of a simulation, in the order of the encoding.
 OUTCOMES: Final = tuple(VARIABLES)
@@ -88,7 +88,7 @@ def format_key(key: Key) -> str:
     return "unit." + ".".join(map(str, key))
 
 
-def choose_unit_shape(product: Product, unit_blocks: int | None) -> tuple[int, ...]:
+def choose_unit_shape(product: SimulationProduct, unit_blocks: int | None) -> tuple[int, ...]:
     """Choose the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
     if unit_blocks is not None:
         width = checks.integer(unit_blocks, "unit_blocks", OptionError, minimum=_GROUP_SIZE)

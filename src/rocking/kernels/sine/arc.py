@@ -59,7 +59,7 @@ def sum_basis(q: float, delta: float, order: int) -> Basis:
 
 
 @inlined
-def closed_form_basis(t: float, delta: float) -> Basis:
+def compute_closed_form_basis(t: float, delta: float) -> Basis:
     """Compute the basis of long arcs by its definition; decay is exp(-sqrt(delta) t), so that nothing overflows."""
     q = t * t
     growth = math.sqrt(delta) * t
@@ -85,7 +85,7 @@ def compute_basis(t: float, delta: float) -> Basis:
         return sum_basis(q, delta, LONG)
     if reach < REACH_LONGEST:
         return sum_basis(q, delta, LONGEST)
-    return closed_form_basis(t, delta)
+    return compute_closed_form_basis(t, delta)
 
 
 #: No first arc ends before x = pi beyond this a - 1: even without growth, U(pi) = pi kappa - pi^2/2 + 2.
@@ -122,7 +122,7 @@ class Correction(NamedTuple):
 
 
 @inlined
-def side_acceleration(P: float, s: float) -> float:
+def compute_side_acceleration(P: float, s: float) -> float:
     """Return the restoring acceleration of the first (s > 0) or second side."""
     return P if s > 0.0 else 2.0 - P
 
@@ -134,7 +134,7 @@ def estimate_duration(start: State, s: float, delta: float) -> float:
     Reciprocals are written out, because a compiler may not replace a division by a constant by a product.
     """
     V, P, D = start
-    G = side_acceleration(P, s)
+    G = compute_side_acceleration(P, s)
     t = 4.0 * V / (G + math.sqrt(max(0.0, G * G + (8.0 / 3.0) * V * (s * D - delta * V))))
     growth = delta * t * t
     bend = s * t * D
@@ -145,17 +145,17 @@ def estimate_duration(start: State, s: float, delta: float) -> float:
 
 
 @inlined
-def arc_height(t: float, start: State, s: float, delta: float, basis: Basis) -> float:
+def compute_arc_height(t: float, start: State, s: float, delta: float, basis: Basis) -> float:
     """Compute the height of an arc at t times the decay of the basis at t."""
     V, P, D = start
     q = t * t
     A = basis.decay * basis.sine + (1.0 + delta) * q * basis.E
     B = basis.decay * basis.versine + (1.0 + delta) * q * basis.W
-    return t * (V * A - t * (side_acceleration(P, s) * B + s * t * (D * basis.E + t * (1.0 - P) * basis.W)))
+    return t * (V * A - t * (compute_side_acceleration(P, s) * B + s * t * (D * basis.E + t * (1.0 - P) * basis.W)))
 
 
 @inlined
-def arc_speed(t: float, start: State, s: float, delta: float, basis: Basis) -> float:
+def compute_arc_speed(t: float, start: State, s: float, delta: float, basis: Basis) -> float:
     """Compute the rate of the height of an arc at t times the decay of the basis at t."""
     V, P, D = start
     q = t * t
@@ -163,7 +163,7 @@ def arc_speed(t: float, start: State, s: float, delta: float, basis: Basis) -> f
     B = basis.decay * basis.versine + (1.0 + delta) * q * basis.W
     bend = basis.decay * basis.versine + delta * q * basis.W
     return V * (basis.decay + delta * q * B) - t * (
-        side_acceleration(P, s) * A + s * t * (D * bend + t * (1.0 - P) * basis.E)
+        compute_side_acceleration(P, s) * A + s * t * (D * bend + t * (1.0 - P) * basis.E)
     )
 
 
@@ -177,11 +177,11 @@ def correct_duration(t: float, start: State, s: float, delta: float, basis: Basi
     P, D = start.P, start.D
     q = t * t
     mean = 1.0 - P
-    speed = arc_speed(t, start, s, delta, basis)
+    speed = compute_arc_speed(t, start, s, delta, basis)
     P_t = P + q * basis.versine * mean + t * basis.sine * D
     D_t = D - q * basis.versine * D + t * basis.sine * mean
-    height = arc_height(t, start, s, delta, basis)
-    acceleration = delta * height - basis.decay * side_acceleration(P_t, s)
+    height = compute_arc_height(t, start, s, delta, basis)
+    acceleration = delta * height - basis.decay * compute_side_acceleration(P_t, s)
     jerk = delta * speed - s * basis.decay * D_t
     snap = delta * acceleration - s * basis.decay * (1.0 - P_t)
     inverse = 1.0 / speed
@@ -225,7 +225,7 @@ def bracket_arc(start: State, s: float, delta: float, max_duration: float) -> tu
 
     A corrected estimate is tried after the bracket was at least halved.
     """
-    if outlasts(start, s, delta, max_duration):
+    if is_longer_than(start, s, delta, max_duration):
         return SequenceStatus.INCOMPLETE, max_duration, start
     low = 0.0
     high = max_duration
@@ -239,7 +239,7 @@ def bracket_arc(start: State, s: float, delta: float, max_duration: float) -> tu
             if is_precise(correction, t, delta) and correction.t < max_duration:
                 return SequenceStatus.FOUND, correction.t, correction.impact
             corrected = correction.t
-        if arc_height(t, start, s, delta, basis) > 0.0:
+        if compute_arc_height(t, start, s, delta, basis) > 0.0:
             low = t
         else:
             high = t
@@ -250,9 +250,9 @@ def bracket_arc(start: State, s: float, delta: float, max_duration: float) -> tu
 
 
 @inlined
-def outlasts(start: State, s: float, delta: float, max_duration: float) -> bool:
+def is_longer_than(start: State, s: float, delta: float, max_duration: float) -> bool:
     """Return whether an arc is still up after the time ``max_duration`` to x = pi."""
-    return arc_height(max_duration, start, s, delta, compute_basis(max_duration, delta)) >= 0.0
+    return compute_arc_height(max_duration, start, s, delta, compute_basis(max_duration, delta)) >= 0.0
 
 
 @inlined
@@ -262,7 +262,7 @@ def estimate_first_impact(kappa: float, delta: float) -> float:
 
 
 @inlined
-def uplift_state(excess: float) -> State:
+def create_uplift_state(excess: float) -> State:
     """Return the state at uplift for a = 1 + excess, where D is -kappa."""
     return State(0.0, 0.0, -math.sqrt(excess * (2.0 + excess)))
 
@@ -270,7 +270,7 @@ def uplift_state(excess: float) -> State:
 @not_inlined
 def solve_first_arc(excess: float, delta: float) -> tuple[int, float, State]:
     """Compute status and phase of the first impact for a = 1 + excess > 1, and the state just before."""
-    start = uplift_state(min(excess, MAX_EXCESS))
+    start = create_uplift_state(min(excess, MAX_EXCESS))
     if excess > MAX_EXCESS:
         return SequenceStatus.INCOMPLETE, math.pi, start
     return solve_arc(start, estimate_first_impact(-start.D, delta), 1.0, delta, math.pi)

@@ -36,7 +36,7 @@ def estimate_remaining_phase(entry: State, delta: float, eta: float) -> float:
 
 
 @inlined
-def richardson_weights(eta: float) -> Weights:
+def compute_richardson_weights(eta: float) -> Weights:
     """Compute the factors of the change between pairs of impacts in each extrapolation.
 
     With Q = eta^2, the errors of successive pairs are sums of Q^{kn}, k = 3, 4, ..., with these ratios at any
@@ -142,7 +142,7 @@ def find_rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float
     if status != SequenceStatus.FOUND:
         return status, x
     entry = apply_restitution(impact, eta)
-    weights = richardson_weights(eta)
+    weights = compute_richardson_weights(eta)
     row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     elapsed = 0.0
     for pair in range(_MAX_PAIRS):

@@ -15,7 +15,7 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.remaining import ImpactSide, estimate_remaining_time
-from rocking.kernels.sine.sequence import LEVELS, MIN_MOVING_SPEED, richardson_weights
+from rocking.kernels.sine.sequence import LEVELS, MIN_MOVING_SPEED, compute_richardson_weights
 
 
 class PowerSeries:
@@ -139,7 +139,7 @@ def expand_remaining_phase(
 
 def extrapolate_series(remaining: Series, elapsed: Series, eta: float) -> tuple[Series, Series]:
     """Extrapolate the estimates of successive pairs, as `sequence.extrapolate`: last column and its changes."""
-    weights = getattr(richardson_weights, "py_func", richardson_weights)(eta)
+    weights = getattr(compute_richardson_weights, "py_func", compute_richardson_weights)(eta)
     column = previous = remaining
     for k, weight in enumerate(weights):
         previous = column[1:]

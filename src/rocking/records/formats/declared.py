@@ -29,8 +29,8 @@ from rocking.errors import RecordError, escape_braces
 from rocking.records.formats.channel import Channel, Recognised, create_channel, missing_value_error, resolve_timing
 from rocking.records.formats.engine import (
     NUMBER,
-    Count,
     Layout,
+    StatedCount,
     compute_rounding,
     find_numeric_end,
     parse_layout,
@@ -251,7 +251,7 @@ class Header:
     def _read_numbers(self, name: str, count: int, rows: int, layout: Layout | None) -> None:
         start = self.end
         self.skip(rows)
-        self.numbers[name] = read_values(self.source, start, self.end, layout, Count(count, start))
+        self.numbers[name] = read_values(self.source, start, self.end, layout, StatedCount(count, start))
 
     def read_skip(self, *rows: int) -> None:
         """Skip rows of numbers later, as many as leave the stated number of values."""
@@ -296,23 +296,23 @@ class Header:
         statements = [statement for statement in self.statements.get(name, ()) if statement.text]
         return self._read_number(statements[0], positive=positive) if statements else 0.0
 
-    def find_count(self, surplus: int) -> Count:
+    def find_count(self, surplus: int) -> StatedCount:
         """Return the stated number of values in each column."""
         if self.form.count_place:
-            return Count(self.get_number(*self.form.count_place), self.offset, max_surplus=surplus)
+            return StatedCount(self.get_number(*self.form.count_place), self.offset, max_surplus=surplus)
         counts = [(self._read_number(statement), statement.offset) for statement in self.statements.get("count", ())]
         if len({count for count, _ in counts}) > 1:
             self._fail(f"the header specifies both {counts[0][0]:.15g} and {counts[1][0]:.15g} values", counts[0][1])
         if counts:
-            return Count(*counts[0], self.form.count_name, surplus)
+            return StatedCount(*counts[0], self.form.count_name, surplus)
         if not self.statements.get("seconds"):
             if self.form.is_paired:
                 raise self._missing_count_error(self.offset)
-            return Count(0.0, self.offset, max_surplus=math.inf)
+            return StatedCount(0.0, self.offset, max_surplus=math.inf)
         rate = self.find_number("rate")
         # The duration is in whole seconds. Fewer samples, or a surplus of a second, are errors.
         place = self.statements["seconds"][0].offset
-        return Count(self.find_number("seconds") * rate, place, "the duration", max_surplus=max(rate - 1.0, 0.0))
+        return StatedCount(self.find_number("seconds") * rate, place, "the duration", max_surplus=max(rate - 1.0, 0.0))
 
     def find_step(self, count: float) -> tuple[float | None, int]:
         """Return the sampling step, s, or None for pairs, and the offset of its line."""
@@ -371,7 +371,7 @@ class Header:
         stated = parse_layout(self.lines[-1].text) if self.lines else None
         return stated or Layout.parse(form.layout)
 
-    def _read_values(self, end: int, layout: Layout | None, count: Count) -> Floats:
+    def _read_values(self, end: int, layout: Layout | None, count: StatedCount) -> Floats:
         """Read the numbers after as many rows of header numbers as leave the stated count."""
         start = self.end
         for rows in self.skips:
@@ -394,7 +394,7 @@ class Header:
         columns = re.sub(r"\([^)]*\)|[/;]", " ", words).split() or [""]
         layout = self._choose_layout()
         count = self.find_count(layout.per_line if layout and form.is_padded else 0)
-        step, place = self.find_step(count.values)
+        step, place = self.find_step(count.number)
         dt, times = None if step is None else request.check_step(source, step, place), None
         values = self._read_scaled(end, layout, count, 2 if form.is_paired else len(columns))
         if step is None:
@@ -418,20 +418,20 @@ class Header:
             self._check_peak(channels[-1].acceleration, index, unit)
         return channels
 
-    def _read_scaled(self, end: int, layout: Layout | None, count: Count, multiple: int) -> Floats:
+    def _read_scaled(self, end: int, layout: Layout | None, count: StatedCount, multiple: int) -> Floats:
         """Read the stated number of values in several columns, times the stated factor."""
-        form, size = self.form, count.values * multiple
+        form, size = self.form, count.number * multiple
         if form.total_count_places:
             counts = self.numbers[form.total_count_places[0]][
                 form.total_count_places[1] - 1 : form.total_count_places[2]
             ]
-            if counts[0] != count.values:
-                self._fail(f"the header specifies both {count.values:.15g} and {counts[0]:.15g} values", count.offset)
+            if counts[0] != count.number:
+                self._fail(f"the header specifies both {count.number:.15g} and {counts[0]:.15g} values", count.offset)
             size = float(counts.sum())
-        stated = count._replace(values=size, max_surplus=count.max_surplus * multiple)
+        stated = count._replace(number=size, max_surplus=count.max_surplus * multiple)
         values = self._read_values(end, layout, stated)
-        if (form.total_count_places or form.is_padded) and count.values:
-            values = values[: int(count.values * multiple)]
+        if (form.total_count_places or form.is_padded) and count.number:
+            values = values[: int(count.number * multiple)]
         missing = self.find_number("missing") if form.missing_value is None else form.missing_value
         if missing and (values == missing).any():
             raise missing_value_error(self.source, missing, self.offset)

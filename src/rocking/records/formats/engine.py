@@ -43,17 +43,17 @@ def compute_rounding(text: str) -> float:
     return min(float(f"0.5e{printed.as_tuple().exponent}"), 0.03 * abs(float(printed)))
 
 
-class Count(NamedTuple):
+class StatedCount(NamedTuple):
     """Number of values stated in a file."""
 
-    values: float  # number
+    number: float
     offset: int  # offset of its line
     stated_by: str = "the header"  # name for messages
     max_surplus: float = 0.0  # number of values that may fill the last row or the last second
 
-    def fits(self, count: int) -> bool:
+    def allows(self, count: int) -> bool:
         """Return whether this many values may follow."""
-        return -0.5 < count - self.values < self.max_surplus + 0.5
+        return -0.5 < count - self.number < self.max_surplus + 0.5
 
 
 class Layout(NamedTuple):
@@ -84,21 +84,21 @@ def find_numeric_end(source: Source, start: int) -> int:
     return len(data)
 
 
-def read_values(source: Source, start: int, end: int, layout: Layout | None, stated: Count) -> Floats:
+def read_values(source: Source, start: int, end: int, layout: Layout | None, stated: StatedCount) -> Floats:
     """Return all numbers between the offsets `start` and `end` of lines, as many as stated."""
     values, values_end = _read_blocks(source, start, end, None)
     columns_end = values_end
-    if layout is not None and not (values_end == end and stated.fits(len(values))):
+    if layout is not None and not (values_end == end and stated.allows(len(values))):
         column_values, columns_end = _read_blocks(source, start, end, layout)
-        if columns_end == end and (values_end < end or stated.fits(len(column_values))):
+        if columns_end == end and (values_end < end or stated.allows(len(column_values))):
             values, values_end = column_values, end
     if values_end < end:
         # The reading that got further has the helpful error message.
         tokens = _find_first_invalid(source, values_end, None), _find_first_invalid(source, columns_end, layout)
         raise invalid_number_error(source, *max(tokens, key=lambda token: token[1]))
-    if not stated.fits(len(values)):
-        advice = "remove the other values" if len(values) > stated.values else "download the complete file again"
-        mismatch = f"{stated.stated_by} specifies {stated.values:.15g} values, but {len(values)} follow"
+    if not stated.allows(len(values)):
+        advice = "remove the other values" if len(values) > stated.number else "download the complete file again"
+        mismatch = f"{stated.stated_by} specifies {stated.number:.15g} values, but {len(values)} follow"
         raise source.error(f"{mismatch}; {advice}, or correct that number", stated.offset)
     return values
 
