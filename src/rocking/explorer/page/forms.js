@@ -171,7 +171,7 @@ export class MotionForm {
     this.list = list;
     this.reload = reload;
     this.names = namesOf("motion", "start");
-    this.motion = choice("motion", "Shaken by", [], (value) => this.another(value));
+    this.motion = choice("motion", parameter("motion").label, [], (value) => this.another(value));
     this.vertical = choice("vertical", parameter("vertical").label, [], () => this.tell());
     this.missing = make("div");
     this.corrections = make("details", {}, [make("summary", {}, ["Corrections"]), ...["baseline", "highpass"].map((name) => {
