@@ -268,3 +268,44 @@ def test_the_command_writes_the_report_and_names_what_it_leaves_out(run, tmp_pat
     assert len(result["outcomes"]) == 16
     assert [*result["failures"]] == ["urn (line 3)"]
     assert [*result["skipped"]] == [str(records / "read me.txt")]
+
+
+def write_three_channels(path, first, second):
+    """Write a table with two horizontal channels and a vertical one."""
+    times = np.arange(0.0, 3.0, 0.01)
+    columns = np.column_stack([times, first.acceleration(times), second.acceleration(times), 0.1 * np.sin(times)])
+    rows = "\n".join(",".join(f"{value:.6f}" for value in row) for row in columns)
+    path.write_text(f"time (s),N-S (m/s2),E-W (m/s2),U-D (m/s2)\n{rows}\n")
+
+
+def test_both_horizontal_channels_of_a_file_are_a_pair_and_its_vertical_is_named(run, tmp_path):
+    (tmp_path / "inventory.csv").write_text(TABLE)
+    records = tmp_path / "records"
+    records.mkdir()
+    motions = [*MOTIONS.values()]
+    for k in range(4):
+        write_three_channels(records / f"station {k}.csv", motions[k], motions[k + 4])
+    code, printed, err = run("assess", tmp_path / "inventory.csv", records, "--count", "8", "--json")
+    assert code == 0, err
+    result = json.loads(printed)
+    names = [entry["motion"] for entry in result["records"]]
+    assert names == [f"station {k}.csv, {channel}" for k in range(4) for channel in ("N-S", "E-W")]
+    assert [*result["skipped"]] == [f"station {k}.csv, vertical" for k in range(4)]
+    peaks = [entry["pga_m_s2"] for entry in result["records"]]
+    expected = [motion.pga for k in range(4) for motion in (motions[k], motions[k + 4])]
+    assert peaks == pytest.approx(expected, rel=0.01)
+    code, _, _ = run("assess", tmp_path / "inventory.csv", records, "--count", "8", "--component", "rotd50")
+    assert code == 0
+    code, _, err = run("ida", records / "station 0.csv", "--width", "0.3", "--height", "1")
+    assert code == 2
+    assert "3 channels; give --channel as one of 1 'N-S', 2 'E-W', 3 'U-D'" in err
+
+
+def test_the_friction_of_a_label_is_that_of_surveys_and_of_comparisons_with_rules():
+    block = VASE.with_labels(name="vase", friction="0.1")
+    motion = {"0.5 Hz": MOTIONS["0.5 Hz"]}
+    slides, rocks = (rocking.simulate(VASE, MOTIONS["0.5 Hz"], friction=friction) for friction in (0.1, None))
+    assert (slides.overturned, rocks.overturned) == (False, True)
+    for found in (rocking.survey([block, VASE], motion), rocking.rules.compare_rules([block, VASE], motion)):
+        assert [response.overturned for response in found.responses] == [False, True]
+        assert found.responses[0].peak_rotation == slides.peak_rotation

@@ -68,6 +68,9 @@ def test_a_stiff_floor_moves_as_the_ground_and_one_that_rings_fades_to_a_thousan
     at_end = np.linspace(ground.duration, ground.duration + 0.5, 200)
     assert np.max(np.abs(floor.acceleration(late))) < 2e-3 * np.max(np.abs(floor.acceleration(at_end)))
     assert ground.with_vertical(GROUNDS["jumps"]).on_floor(0.5).vertical is GROUNDS["jumps"]
+    pair = ground.with_orthogonal(GROUNDS["jumps"]).on_floor(0.5, 0.02)
+    assert np.array_equal(pair.orthogonal.coefficients, GROUNDS["jumps"].on_floor(0.5, 0.02).coefficients)
+    assert np.array_equal(pair.coefficients, ground.on_floor(0.5, 0.02).coefficients)
     assert floor.history[-1] == "on a floor of period 0.5 s, damping 0.05"
     assert floor.error < 1e-9 * floor.pga
 

@@ -122,7 +122,9 @@ def test_components_follow_delays_processing_and_scaling_and_are_dropped_otherwi
     trimmed = pair.processed(trim=(0.2, 0.8))
     both = pair.processed(trim=(0.2, 0.8)), noise(7).processed(trim=(0.2, 0.8))
     assert measure.value(trimmed) == measure.value(both[0].with_orthogonal(both[1]))
-    assert pair.on_floor(0.3).orthogonal is None
+    assert measure.value(pair.on_floor(0.3)) == measure.value(
+        noise(6).on_floor(0.3).with_orthogonal(noise(7).on_floor(0.3))
+    )
     assert pair.with_orthogonal(None).orthogonal is None
 
 

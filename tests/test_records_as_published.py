@@ -275,3 +275,21 @@ def test_shipped_records_are_corrected_only_on_request() -> None:
 def test_uneven_samples_cannot_be_filtered() -> None:
     sentence = "highpass requires samples at even steps; resample the record in Python first"
     assert sentence in refusal(lambda: read(written.FOLDER / "film.smc", highpass=0.1), MotionError)
+
+
+def test_corrections_apply_to_shipped_records_in_pairs(capsys: pytest.CaptureFixture[str]) -> None:
+    """A pair of shipped records is filtered as single ones are, with a note on the peaks."""
+    with notes_for("everybody"):
+        first, _ = rocking.records.load_pairs("ridgecrest-clc-*", baseline=0, highpass=0.1)
+    alone = rocking.records.load("ridgecrest-clc-090").processed(baseline=0, band_pass=(0.1, None))
+    assert first.pga == alone.pga
+    assert first.history == alone.history
+    assert "ridgecrest-clc-090: baseline of degree 0 removed and band-passed" in capsys.readouterr().err
+
+
+def test_rows_of_spectra_are_no_series(tmp_path: Path) -> None:
+    """Wrapped numbers below a heading of spectra are refused even if the step is given."""
+    rows = "\n".join(" ".join(f"{0.1 * k + j:.3f}" for j in range(15)) for k in range(20))
+    (tmp_path / "a.V3").write_text(f"Response and Fourier amplitude spectra\n of 86 periods\n{rows}\n")
+    message = refusal(lambda: read(tmp_path / "a.V3", dt=0.01, units="g"))
+    assert "this seems to be a response spectrum: its heading names spectra" in message

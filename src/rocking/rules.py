@@ -27,6 +27,7 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.tables import format_count, format_range
 from rocking.errors import BlockError, OptionError
+from rocking.inputs.inventory import find_friction
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.records.named import Motions, index_motions, list_motions
@@ -436,7 +437,8 @@ def compare_rules(
     model : {"nonlinear", "linear"}
         Equation of motion of the simulations.
     friction : optional
-        Friction of the simulations, as for `simulate`; the rules assume that the block does not slide.
+        Friction of the simulations, as for `simulate`, of blocks without a label ``friction``. The rules assume that
+        the block does not slide.
 
     Returns
     -------
@@ -483,8 +485,9 @@ def compare_rules(
     responses, margins = [], []
     with Progress("checking", total=len(ratios)) as bar:
         for body, motion in itertools.product(blocks, named_motions.values()):
-            responses.append(simulate(body, motion, model=model, friction=friction))
-            margins.append(_compute_margin(responses[-1], body, motion, model, friction))
+            coefficient = find_friction(body, friction)
+            responses.append(simulate(body, motion, model=model, friction=coefficient))
+            margins.append(_compute_margin(responses[-1], body, motion, model, coefficient))
             bar.advance()
     return RuleComparison(block, tuple(named_motions) * len(blocks), tuple(responses), tuple(ratios), tuple(margins))
 

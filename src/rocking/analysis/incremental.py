@@ -334,11 +334,11 @@ def _combine_bands(
     lowest[np.isinf(lowest)] = np.nan
     attributes: dict[str, Any] = {"units": measure.units, "long_name": measure.quantity, "label": measure.label}
     attributes |= {"scale": measure.display_factor, **measure.options()}
-    table = table.transpose(..., "block")
+    table = table[list(RATIO_VARIABLES)].transpose(..., "block")
     ratios = compute_ratios(alpha, *(table[name].values for name in RATIO_VARIABLES))
     ratio_attributes = {"units": "1", "long_name": "peak rotation over slenderness"}
-    return table[["peak_rotation", "overturned"]].assign(
-        level=("level", table.level.values, attributes),
+    table["level"].attrs = attributes
+    return table.drop_vars("unfinished").assign(
         peak_over_alpha=(table.peak_rotation.dims, ratios, ratio_attributes),
         overturning_level=(("motion", "block"), lowest, attributes),
         band_motion=("band", motion, {"units": "1", "long_name": "position of the motion"}),

@@ -385,7 +385,7 @@ class Brackets:
 
 
 #: Number of simulations that take hardly longer together than one.
-_SIMULATED_TOGETHER: Final = 16
+_SIMULATED_TOGETHER: Final = 48
 
 
 def find_boundaries(

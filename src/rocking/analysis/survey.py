@@ -22,6 +22,7 @@ from rocking.core.result import Result
 from rocking.core.tables import Column, add_unit, format_count, format_table, records_to_columns, round_decimal
 from rocking.engine.problem import gather_bodies, require_body
 from rocking.errors import OptionError
+from rocking.inputs.inventory import find_friction
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
 from rocking.response import Response
@@ -307,7 +308,8 @@ def survey(
     precision : float
         Relative precision of the motions, from 1e-6 to 0.1. Outcomes are also counted within this precision.
     **options : object
-        As for `rocking.simulate`: model, chattering, duration, friction, ...
+        As for `rocking.simulate`: model, chattering, duration, friction, ... A label ``friction`` of a block is its
+        coefficient.
 
     Returns
     -------
@@ -342,10 +344,10 @@ def survey(
             raise OptionError(f"{message}; got {type(body).__name__}")
     if available_friction is not None:
         check_available_friction(available_friction)
-    responses = []
+    responses, friction = [], options.get("friction")
     with Progress("simulating", total=len(bodies) * len(named_motions)) as bar:
         for body, motion in itertools.product(bodies, named_motions.values()):
-            responses.append(simulate(body, motion, **options))
+            responses.append(simulate(body, motion, **{**options, "friction": find_friction(body, friction)}))
             # The response caches the expensive results while the progress bar is shown.
             _create_row(responses[-1], precision)
             bar.advance()

@@ -34,8 +34,7 @@ from rocking.core.progress import Progress
 from rocking.engine.problem import gather_bodies
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import FitError, OptionError, RockingError, escape_braces
-from rocking.inputs.inventory import Inventory, list_names
-from rocking.inputs.quantities import read_array
+from rocking.inputs.inventory import Inventory, find_friction, list_names
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, index_motions
@@ -185,7 +184,7 @@ class _Study:
 
     def assess(self, name: str, body: Body, sample: Blocks | None, friction: Friction | None) -> ObjectAssessment:
         """Assess one object, with its own friction if it has a label."""
-        coefficient = _read_friction(body, friction)
+        coefficient = find_friction(body, friction)
         options: dict[str, Any] = {**self.options, "friction": coefficient}
         blocks = gather_bodies(body) if sample is None else sample
         levels = self._choose_levels(blocks, options)
@@ -227,12 +226,3 @@ class _Study:
         levels = np.geomspace(low, search[last] if shares[last] >= _LAST_SHARE else search[-1], self.levels)
         scale = measure.display_factor
         return np.array([float(f"{scale * level:.3g}") / scale for level in levels])  # as they are displayed
-
-
-def _read_friction(body: Body, friction: Friction | None) -> Friction | None:
-    """Return the coefficient in the label of a body, or else the given one."""
-    text = str(getattr(body, "labels", {}).get("friction", ""))
-    if text in ("", "nan"):
-        return friction
-    values: list[float] = read_array(text.replace(";", ","), "friction").tolist()
-    return values[0] if len(values) == 1 else values

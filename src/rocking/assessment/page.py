@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from html import escape
 from importlib import metadata
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -47,13 +46,10 @@ def _write_overview(assessment: Assessment, title: str) -> str:
     """Write the summary table, the figure of all objects, and failures."""
     header, rows = assessment.tabulate()
     labels = assessment.labels
-    position = header.index("object") + 1
-    header = [*header[:position], *labels, *header[position:]]
-    linked = []
-    for k, row in enumerate(rows):
-        values = [assessment.label(name, k) for name in labels]
-        linked.append([*row[:position], *values, *row[position:]])
-    anchors = {(k, position - 1): f"object-{k + 1}" for k in range(len(rows))}
+    cells = []
+    for k, (rank, name, *values) in enumerate(rows):
+        texts = [escape(assessment.label(label, k)) for label in labels]
+        cells.append([rank, f'<a href="#object-{k + 1}">{escape(name)}</a>', *texts, *map(escape, values)])
     hazard = "" if assessment.hazard is None else f" The hazard curve is {escape(repr(assessment.hazard.name))}."
     basis = "return period of overturning" if assessment.hazard is not None else "median intensity"
     confidence = f"{100 * assessment.confidence:g} %"
@@ -63,7 +59,7 @@ def _write_overview(assessment: Assessment, title: str) -> str:
 <p>Intensity measure: {escape(assessment.measure.label)}.{hazard} Intervals have {confidence} confidence. Objects are
 ranked by their {basis}. The ranks in brackets are plausible with {confidence} confidence: the motions are resampled,
 the same ones for all objects.</p>
-{_write_table(header, linked, anchors=anchors)}
+{_write_table([*header[:2], *labels, *header[2:]], cells)}
 {failed}
 <h3>Median intensity of overturning</h3>
 {_draw_overview(assessment)}
@@ -92,20 +88,22 @@ def _write_object(assessment: Assessment, k: int) -> str:
         "",
         *map(str.title, rules),
     ]
-    rows, marks = [], {}
+    rows = []
     for m, name in enumerate(_shorten_names(assessment.motions)):
         low, high = (scale * float(data[end].values[k, m]) for end in ("stands_up_to", "overturns_at"))
         outcome, peak = _describe_outcome(data, k, m), float(data.peak_over_alpha.values[k, m])
-        text = f"&gt; {low:.2g}" if math.isinf(high) else f"{low:.2g} to {high:.2g}"
         recorded = scale * float(data[assessment.measure.name].values[m])
-        ratios = [f"{float(data[rule].values[k, m]):.2f}" for rule in rules]
-        pga = f"{float(data.pga.values[m]) / STANDARD_GRAVITY:.3g}"
-        peak_text = "" if math.isinf(peak) else f"{peak:.2f}"
-        bar = Chart.draw_bar((low, min(high, longest)), recorded, longest, has_end=high < math.inf)
-        rows.append([escape(name), pga, escape(outcome), peak_text, text, bar, *ratios])
-        marks[m] = outcome.startswith("overturns")
+        row = [
+            escape(name),
+            f"{float(data.pga.values[m]) / STANDARD_GRAVITY:.3g}",
+            f'<b class="overturns">{outcome}</b>' if outcome == "overturns" else outcome,
+            "" if math.isinf(peak) else f"{peak:.2f}",
+            f"&gt; {low:.2g}" if math.isinf(high) else f"{low:.2g} to {high:.2g}",
+            Chart.draw_bar((low, min(high, longest)), recorded, longest, has_end=high < math.inf),
+        ]
+        rows.append(row + [f"{float(data[rule].values[k, m]):.2f}" for rule in rules])
     statements = "".join(f"<li>{escape(text)}</li>" for text in describe_object(assessment, k))
-    table = _write_table(header, rows, marked=marks, dense=True, is_html=True)
+    table = _write_table(header, rows, dense=True)
     return f"""<section id="object-{k + 1}"><h2>{k + 1}. {escape(item.name)}</h2>
 <p class="soft">{"; ".join(details)}</p>
 {_draw_fragility(assessment, item)}
@@ -230,30 +228,26 @@ def _list_names(names: Sequence[str]) -> str:
 
 
 def _write_records(assessment: Assessment) -> str:
-    """Write the table of the ground motions."""
-    data = assessment.data
-    columns = {
+    """Write the table of the ground motions, and of the records that are not used."""
+    data, names = assessment.data, _shorten_names(assessment.motions)
+    further = [name for name in data.coords if data[name].dims == ("motion",) and name not in ("motion", "file")]
+    files = [str(file) for file in data["file"].values] if "file" in data.coords else [""] * len(names)
+    columns = {"record": names, "file": ["" if file in name else file for file, name in zip(files, names, strict=True)]}
+    columns |= {str(name): [str(value) for value in data[name].values] for name in (*further, "format")}
+    numbers = {
         "step, s": ("step", 1.0), "duration, s": ("duration", 1.0), "D5-95, s": ("significant_duration", 1.0),
         "PGA, g": ("pga", STANDARD_GRAVITY), "PGV, m/s": ("pgv", 1.0), "Arias, m/s": ("arias", 1.0),
     }  # fmt: skip
     if assessment.measure.name not in ("pga", "pgv", "arias"):
-        columns[assessment.measure.label] = (assessment.measure.name, 1.0 / assessment.measure.display_factor)
-    further = [name for name in data.coords if data[name].dims == ("motion",) and name not in ("motion", "file")]
-    rows = []
-    for m, name in enumerate(_shorten_names(assessment.motions)):
-        numbers = [
-            f"{float(data[key].values[m]) / divisor:.4g}".replace("nan", "-") for key, divisor in columns.values()
-        ]
-        texts = [str(data[key].values[m]) for key in further]
-        file = str(data["file"].values[m]) if "file" in data.coords else ""
-        file = "" if file in name else file
-        rows.append([name, file, *texts, str(data["format"].values[m]), *numbers, str(data.processing.values[m])])
-    blank = [""] * (len(rows[0]) - 2)
-    names = _shorten_names(assessment.skipped)
-    rows += [[name, *blank, f"not used: {why}"] for name, why in zip(names, assessment.skipped.values(), strict=True)]
-    header = ["record", "file", *map(str, further), "format", *columns, "corrections"]
-    kept = [k for k, title in enumerate(header) if title in columns or any(row[k] for row in rows)]
-    table = _write_table([header[k] for k in kept], [[row[k] for k in kept] for row in rows], dense=True)
+        numbers[assessment.measure.label] = (assessment.measure.name, 1.0 / assessment.measure.display_factor)
+    for title, (name, divisor) in numbers.items():
+        columns[title] = [f"{value / divisor:.4g}".replace("nan", "-") for value in data[name].values.tolist()]
+    columns["remarks"] = [str(value) for value in data.processing.values]
+    columns = {title: texts for title, texts in columns.items() if title == "remarks" or any(texts)}
+    rows = [[escape(text) for text in row] for row in zip(*columns.values(), strict=True)]
+    unused = zip(_shorten_names(assessment.skipped), assessment.skipped.values(), strict=True)
+    rows += [[escape(name), *[""] * (len(columns) - 2), f"not used: {escape(why)}"] for name, why in unused]
+    table = _write_table([*columns], rows, dense=True)
     return f'<section id="records"><h2>Ground motions</h2>\n{table}</section>'
 
 
@@ -308,29 +302,14 @@ def _draw_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
     return chart.write()
 
 
-def _write_table(
-    header: Sequence[str],
-    rows: Iterable[Sequence[str]],
-    *,
-    marked: Mapping[int, bool] = MappingProxyType({}),
-    anchors: Mapping[tuple[int, int], str] = MappingProxyType({}),
-    dense: bool = False,
-    is_html: bool = False,
-) -> str:
-    """Write a table of texts, or of HTML. The outcome (third cell) of some rows is marked; some cells are links."""
-    cells = [[cell if is_html else escape(cell) for cell in row] for row in rows]
-    kinds = [_choose_kind([row[k] for row in cells]) for k in range(len(header))]
+def _write_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, dense: bool = False) -> str:
+    """Write a table of HTML texts below a heading of plain texts."""
+    kinds = [_choose_kind([row[k] for row in rows]) for k in range(len(header))]
     heading = "".join(f"<th{kind}>{escape(title)}</th>" for kind, title in zip(kinds, header, strict=True))
-    lines = []
-    for k, row in enumerate(cells):
-        entries = [
-            f'<a href="#{anchors[k, j]}">{cell}</a>' if (k, j) in anchors else cell for j, cell in enumerate(row)
-        ]
-        styles = [' class="overturns"' if j == 2 and marked.get(k) else kind for j, kind in enumerate(kinds)]
-        pairs = zip(styles, entries, strict=True)
-        lines.append(f"<tr>{''.join(f'<td{style}>{entry}</td>' for style, entry in pairs)}</tr>\n")
-    table = f"<thead><tr>{heading}</tr></thead><tbody>\n{''.join(lines)}</tbody>"
-    return f'<div class="wide"><table{" class=dense" if dense else ""}>{table}</table></div>'
+    lines = ("".join(f"<td{kind}>{cell}</td>" for kind, cell in zip(kinds, row, strict=True)) for row in rows)
+    body = "".join(f"<tr>{line}</tr>\n" for line in lines)
+    style = " class=dense" if dense else ""
+    return f'<div class="wide"><table{style}><thead><tr>{heading}</tr></thead><tbody>\n{body}</tbody></table></div>'
 
 
 def _choose_kind(cells: Sequence[str]) -> str:

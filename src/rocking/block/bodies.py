@@ -180,12 +180,7 @@ class Blocks:
 
     @classmethod
     def sample(
-        cls,
-        count: int,
-        create: Callable[..., Block | RestrainedBlock] = Block,
-        *,
-        seed: int = 0,
-        **parameters: Any,
+        cls, count: int, create: Callable[..., Block | RestrainedBlock] = Block, *, seed: int = 0, **parameters: Any
     ) -> Blocks:
         """Sample blocks with uncertain parameters.
 

@@ -35,14 +35,14 @@ def resolve_friction(friction: Friction | None) -> tuple[float, float] | None:
     if friction is None:
         return None
     values = checks.numbers(friction, "friction", OptionError)
-    if values.shape not in ((), (2,)) or np.any(np.isnan(values)) or np.any(values <= 0.0):
+    if values.shape not in ((), (2,)) or not np.all(values > 0.0):
         raise OptionError(
             "{} must be a positive number or a pair (static, kinetic) of positive numbers, or None for a block that "
             f"never slips, not {checks.short_repr(friction)}",
             "friction",
             value=friction,
         )
-    static, kinetic = np.broadcast_to(values, 2).tolist()
+    static, kinetic = values.tolist() if values.ndim else 2 * (values.item(),)
     if static < kinetic:
         raise OptionError(
             f"the static {{}} must not be below the kinetic one; got {static:g} and {kinetic:g}: swap them",
@@ -70,9 +70,10 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
             "friction",
         )
     radii, g = _find_radii(bodies), bodies.gravity
-    height = (radii * np.cos(bodies.alpha)).mean(axis=1, keepdims=True)
+    heights = radii * np.cos(bodies.alpha)
+    height = 0.5 * (heights[:, :1] + heights[:, 1:])
     is_linear = model == "linear"
-    arm = np.broadcast_to(height, radii.shape) if is_linear else radii
+    arm = height + np.zeros(2) if is_linear else radii
     base = height * bodies.alpha if is_linear else radii * np.sin(bodies.alpha)
     ratio = arm * bodies.p**2 / g
     inertia = g * arm / bodies.p**2
@@ -86,7 +87,7 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
     largest = np.minimum(
         2.0 * np.sqrt(centroidal_inertia * (1.0 + centroidal_inertia)), pivot_square / (height * base[:, ::-1])
     )
-    if np.any(~(kinetic < largest)):
+    if not (kinetic < largest).all():
         index = int(np.argmin(largest.min(axis=1)))
         raise OptionError(
             f"the kinetic {{}} must be below {largest[index].min():.4g}, beyond which forces at a pivot have no unique "
@@ -116,7 +117,7 @@ def check_friction(bodies: Bodies, model: Model, friction: tuple[float, float] |
 
 
 def _refuse(is_invalid: Flags, text: str) -> None:
-    if np.any(is_invalid):
+    if is_invalid.any():
         index = int(np.argwhere(is_invalid)[0][0])
         raise OptionError(text + (f" of block {index}" if len(is_invalid) > 1 else ""), "friction")
 
@@ -128,11 +129,13 @@ def _find_radii(blocks: Blocks) -> Floats:
         radii: Floats = blocks.radii
     else:
         radii = 0.75 * blocks.gravity / blocks.p**2
-        _, depth = compute_rigid_bodies(blocks.p, blocks.alpha)
-        unequal = ~np.isnan(depth)
-        radii[unequal] = blocks.gravity * depth[unequal, None] / np.cos(blocks.alpha[unequal])
         differs = np.any((blocks.p[:, :1] != blocks.p[:, 1:]) | (blocks.alpha[:, :1] != blocks.alpha[:, 1:]), axis=1)
-        _refuse((differs & ~unequal)[:, None], _MISSING)
+        if not np.any(differs):
+            return radii
+        depth = np.full(len(blocks), np.inf)
+        depth[differs] = compute_rigid_bodies(blocks.p[differs], blocks.alpha[differs])[1]
+        _refuse(np.isnan(depth), _MISSING)
+        radii[differs] = blocks.gravity * depth[differs, None] / np.cos(blocks.alpha[differs])
     heights = radii * np.cos(blocks.alpha)
     squares = blocks.gravity * radii / blocks.p**2 - radii**2
     for sizes in (heights, squares):

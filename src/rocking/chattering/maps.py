@@ -218,9 +218,7 @@ class ChatteringMap(DatasetResult):
     [False, True, False]
     """
 
-    TABLES: ClassVar = {
-        "outcomes": ("outcome", "complete", "uplift", "rest", "lower", "upper", "rests", "overturned"),
-    }
+    TABLES: ClassVar = {"outcomes": ("outcome", "complete", "uplift", "rest", "lower", "upper", "rests", "overturned")}
 
     def summary(self) -> str:
         values, counts = np.unique(self.data.outcome, return_counts=True)

@@ -184,7 +184,7 @@ def ida(
     rtol
         Width of the refined ends of bands, relative to the level.
     """
-    body = block.bodies()
+    body = block.bodies(labels=("name",))  # all objects have the same friction
     with output.folder() as folder:
         loaded = motion.read_all(names)
         motions = [*loaded.motions.values()]

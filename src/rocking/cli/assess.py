@@ -6,7 +6,7 @@ import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -25,11 +25,7 @@ from rocking.cli.options import (
 )
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, skip_on_error
 from rocking.inputs.inventory import read_labelled
-from rocking.inputs.notes import is_vertical
 from rocking.simulation.ensemble import Polarity
-
-#: Reason for which a record is not used.
-_VERTICAL: Final = "its channel is vertical by its name; give the horizontal file with --vertical to include it"
 
 
 def assess(
@@ -72,11 +68,9 @@ def assess(
     settings |= {"polarity": polarity, "clusters": risk.parse_clusters(), "confidence": risk.confidence}
     with output.folder() as folder:
         objects = read_labelled(inventory, keep_going=True, expected=("name", "friction"))
-        loaded = replace(motion, keep_going=True).read_all(names)
-        skipped = {name: reason.removeprefix(f"{name}: ") for name, reason in loaded.skipped.items()}
-        skipped |= {name: _VERTICAL for name, record in loaded.motions.items() if is_vertical(record)}
-        motions = {name: record for name, record in loaded.motions.items() if name not in skipped}
-        result = assess_objects(objects, motions, hazard=curve, years=risk.years, samples=samples, **settings)
+        loaded = replace(motion, keep_going=True).read_all(names, with_pairs=True)
+        result = assess_objects(objects, loaded.motions, hazard=curve, years=risk.years, samples=samples, **settings)
+        skipped = {name: reason.removeprefix(name).lstrip(",: ") for name, reason in loaded.skipped.items()}
         result = replace(result, skipped=skipped | {**result.skipped})
         if folder is not None:
             result.to_html(folder / "report.html", command=shlex.join(["rocking", *sys.argv[1:]]))

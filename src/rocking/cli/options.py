@@ -15,16 +15,10 @@ from cyclopts import Group, Parameter, Token
 from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
-from rocking.errors import (
-    BlockError,
-    MotionError,
-    OptionError,
-    RecordError,
-    join_placeholders,
-)
+from rocking.errors import BlockError, MotionError, OptionError, RecordError, join_placeholders
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
-from rocking.inputs.inventory import read_inventory
+from rocking.inputs.inventory import read_labelled
 from rocking.inputs.notes import hazard_notes, motion_notes, vertical_notes
 from rocking.inputs.pulses import named_pulse
 from rocking.inputs.quantities import (
@@ -40,8 +34,15 @@ from rocking.inputs.quantities import (
 from rocking.inputs.texts import write_option_name
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import ComponentName, IntensityName, Measure
-from rocking.records.components import collect_pairs
-from rocking.records.named import OWN, expand_record_names, list_motion_names, load_motion, load_vertical
+from rocking.records.components import collect_pairs, name_components, note_skipped
+from rocking.records.named import (
+    OWN,
+    STANDARD_INPUT,
+    expand_record_names,
+    list_motion_names,
+    load_motion,
+    load_vertical,
+)
 
 if TYPE_CHECKING:
     from rocking.analysis.hazard import HazardCurve
@@ -152,14 +153,14 @@ class _InventoryOptions(BlockOptions):
 
     inventory: Annotated[Path | None, Parameter(help=_INVENTORY_HELP)] = None
 
-    def objects(self, create: Callable[[], Body]) -> Any:
-        """Return the objects of the table, or else the block that a function creates."""
+    def objects(self, create: Callable[[], Body], labels: Sequence[str]) -> Any:
+        """Return the objects of the table with labels that have a meaning, or the block that a function creates."""
         if self.inventory is None:
             return create()
         if conflicting := [name for name in self.supplied() if name != "inventory"]:
             message = f"{{}} replaces the block: omit {join_placeholders(conflicting)}"
             raise BlockError(message, "inventory", *conflicting)
-        inventory = read_inventory(self.inventory)
+        inventory = read_labelled(self.inventory, expected=labels)
         return inventory if len(inventory) > 1 else inventory[0]
 
 
@@ -169,16 +170,16 @@ class FreeObjectOptions(_InventoryOptions):
 
     def blocks(self) -> Any:
         """Return the block, or the objects."""
-        return self.objects(self.block)
+        return self.objects(self.block, ("name", "friction"))
 
 
 @dataclass(frozen=True)
 class ObjectOptions(RestrainedOptions, _InventoryOptions):
     """Block, or objects from a table."""
 
-    def bodies(self) -> Any:
-        """Return the block, or the objects."""
-        return self.objects(self.body)
+    def bodies(self, labels: Sequence[str] = ("name", "friction")) -> Any:
+        """Return the block, or the objects with labels that have a meaning."""
+        return self.objects(self.body, labels)
 
 
 _SAMPLES: Final = 100
@@ -351,15 +352,16 @@ class _RecordOptions(FileOptions):
     component: Annotated[ComponentName, Parameter(help=_COMPONENT_HELP)] = "own"
     reversed: Annotated[bool, Parameter(negative="", help="Also use every motion reversed (x -1).")] = False
 
-    def read_all(self, names: Sequence[str]) -> LoadedRecords:
-        """Return the motions by name."""
+    def read_all(self, names: Sequence[str], *, with_pairs: bool = False) -> LoadedRecords:
+        """Return the motions by name, with pairs those of all horizontal components."""
         records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
         stochastic = self.stochastic_motions()
         if not (records or pulses or stochastic):
             message = "at least one record is required: file, folder, or name of a shipped record, or {} or {}"
             raise OptionError(message, "pulse", "stochastic")
-        if self.component != "own":
-            return self._load_pairs(records, [*pulses, *stochastic])
+        names_channels = "channel" in self.supplied() or self.supplied().get("vertical", OWN) != OWN
+        if self.component != "own" or (with_pairs and records and not names_channels and STANDARD_INPUT not in records):
+            return self._load_pairs(records, [*pulses, *stochastic], names_channels=names_channels)
         pulse_motions = self.pulses()
         read = functools.partial(self.motion, several=len(records) > 1)
         motions, skipped = read_records(records, read, keep_going=self.keep_going)
@@ -372,22 +374,22 @@ class _RecordOptions(FileOptions):
         is_single = [*motions] == [*names, *pulses] and len(motions) == 1 and not self.reversed
         return LoadedRecords(self._add_reversed(motions), skipped, is_single)
 
-    def _load_pairs(self, records: Sequence[str], pulses: Sequence[str]) -> LoadedRecords:
-        """Return both horizontal components of each station, scaled by one factor."""
-        supplied = self.supplied()
-        if pulses or "channel" in supplied or supplied.get("vertical", OWN) != OWN:
+    def _load_pairs(self, records: Sequence[str], others: Sequence[str], *, names_channels: bool) -> LoadedRecords:
+        """Return both horizontal components of each station, scaled by one factor unless each has its own measure."""
+        is_own = self.component == "own"
+        if not is_own and (others or names_channels):
             message = f"{{}} {self.component} requires records: omit {{}}, {{}} and {{}}, and use {{}} {OWN} or omit it"
             raise OptionError(message, "component", "pulse", "stochastic", "channel", "vertical")
         target = self._target()
         if target is not None and target[1].name != "factor":
             target = target[0], replace(target[1], component=self.component)
-        options = self.read_values("dt", "units") | self.corrections()
-        with_vertical = "vertical" in supplied
+        options = self.read_values("dt", "units") | self.corrections() | {"singles": is_own}
+        with_vertical = "vertical" in self.supplied()
         pairs, skipped = collect_pairs(records, vertical=with_vertical, keep_going=self.keep_going, **options)
-        for message in skipped.values():
-            note(f"skipped: {message}")
-        named = dict(zip(list_motion_names(pairs), pairs, strict=True))
-        motions = {name: self._scale(name, motion, target) for name, motion in named.items()}
+        note_skipped(skipped)
+        motion_names = name_components(pairs) if is_own else list_motion_names(pairs)
+        motions = {name: self._scale(name, motion, target) for name, motion in zip(motion_names, pairs, strict=True)}
+        motions |= {**self.pulses(), **self.stochastic_motions()} if others else {}
         return LoadedRecords(self._add_reversed(motions), skipped, False)
 
     def _add_reversed(self, motions: dict[str, Motion]) -> dict[str, Motion]:

@@ -316,10 +316,8 @@ def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event 
     empty_table, scratch = state.new_table(0), state.new_scratch()
     ending = batch.states["ending"]
     for k in np.flatnonzero((ending == state.Ending.RUNNING) | (ending == state.Ending.PAUSED)):
-        body_state, ground = (
-            batch.states[k],
-            select_ground(batch.grounds, batch.motion_indices[k], float(batch.factors[k])),
-        )
+        body_state = batch.states[k]
+        ground = select_ground(batch.grounds, batch.motion_indices[k], float(batch.factors[k]))
         body_state["stop_piece"] = state.TO_THE_END
         for _ in range(count_slices(ground)):
             if cancelled is not None and cancelled.is_set():

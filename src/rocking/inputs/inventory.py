@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple, overload
 
 from rocking.block import Block, Blocks, RestrainedBlock, Restraint
 from rocking.block.body import Body
+from rocking.block.friction import Friction
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import format_count, read_csv_rows
@@ -23,7 +24,7 @@ from rocking.inputs.bodies import (
     sample_bodies,
 )
 from rocking.inputs.declared import BLOCK, FORCES, INPUTS, READERS, SUPPORTS
-from rocking.inputs.quantities import UNITS
+from rocking.inputs.quantities import UNITS, read_array
 from rocking.records.formats.source import read_text
 from rocking.records.named import make_names_unique
 from rocking.records.units import normalise_spelling
@@ -203,6 +204,15 @@ def list_names(bodies: Sequence[Body]) -> list[str]:
     """Return distinct names of bodies for texts and figures: their own, or else numbers from 1."""
     names = [getattr(body, "labels", {}).get("name") for body in bodies]
     return make_names_unique([str(name or f"block {k}") for k, name in enumerate(names, start=1)])
+
+
+def find_friction(body: Body, default: Friction | None) -> Friction | None:
+    """Return the coefficient, or the static and the kinetic one, in the label "friction" of a body, or else another."""
+    text = str(getattr(body, "labels", {}).get("friction", ""))
+    if text in ("", "nan"):
+        return default
+    values: list[float] = read_array(text.replace(";", ","), "friction").tolist()
+    return values[0] if len(values) == 1 else values
 
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:

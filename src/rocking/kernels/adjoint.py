@@ -111,9 +111,8 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
     weight = 1.0 + abs(block.added_weight[side])
     if has_vertical(ground):
         weight += 0.5 * ground.columns * sum_absolute_terms(vertical_component(ground), node.piece, end)[0]
-    force = block.threshold_slope[side] * (
-        abs(block.threshold[side]) * weight + abs(block.restraint_threshold[side]) + push
-    )
+    force = abs(block.threshold[side]) * weight + abs(block.restraint_threshold[side]) + push
+    force *= block.threshold_slope[side]
     force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
     force = _STEP_ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
     force += block.threshold_slope[side] * ground_error(ground)
@@ -207,9 +206,8 @@ def differentiate_rest_time(trail: Trail, node: Record, plastic_elongation: floa
     by_time += by_g_i * block.threshold_slope[i] * push_rate(trail.ground, block, i, node.piece, node.offset)
     by_time += by_g_j * block.threshold_slope[j] * push_rate(trail.ground, block, j, node.piece, node.offset)
     change[0], change[1] = -by_time / node.v, by_speed
-    change[2] = by_g_i * restoring_by_tendon(block, i, plastic_elongation, 1.0) + by_g_j * restoring_by_tendon(
-        block, j, plastic_elongation, 1.0
-    )
+    change[2] = by_g_i * restoring_by_tendon(block, i, plastic_elongation, 1.0)
+    change[2] += by_g_j * restoring_by_tendon(block, j, plastic_elongation, 1.0)
     by_i, by_j = by_g_i * block.threshold_slope[i], by_g_j * block.threshold_slope[j]
     push = by_i * side_sign(i) + by_j * side_sign(j)
     add_instant(trail, node, (push, by_i * block.threshold[i] + by_j * block.threshold[j]), out)

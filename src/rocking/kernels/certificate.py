@@ -144,10 +144,8 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
         first, second = widen_for_drag(first, drag), widen_for_drag(second, drag)
         energy_ratio = 1.0 + bound_arc(v, first)[0]
         max_speed = e_i * math.sqrt(energy_ratio) * v
-        if not (
-            energy_ratio <= _MAX_ENERGY_RATIO
-            and e_i * e_i * energy_ratio * (1.0 + bound_arc(max_speed, second)[0]) <= _MAX_ENERGY_RATIO
-        ):
+        next_ratio = e_i * e_i * energy_ratio * (1.0 + bound_arc(max_speed, second)[0])
+        if not (energy_ratio <= _MAX_ENERGY_RATIO and next_ratio <= _MAX_ENERGY_RATIO):
             return no_proof()
     max_speed = bound_impact_speed(v, first, second, e_i) if block.variable_restitution else v
     min_e = min_factor(block, i, max_speed), min_factor(block, j, max_speed)
@@ -262,9 +260,8 @@ def prove_slide(ground: Ground, block: Record, settings: Record, scratch: Record
     # max_restoring upper/(2 (1 - 1/3)), the sum of those before and after impacts at most 2.25 times as large.
     divisor = 1.0
     if settings.nonlinear:
-        divisor = min(
-            sliding_divisor(block, i, direction, max_height), sliding_divisor(block, j, -direction, max_height)
-        )
+        divisor = sliding_divisor(block, i, direction, max_height)
+        divisor = min(divisor, sliding_divisor(block, j, -direction, max_height))
     arm, base = max(block.arm[0], block.arm[1]), max(block.pivot_distance[0], block.pivot_distance[1])
     normal = (1.0 + motion.vertical.high) / min(1.0, divisor)
     along_arcs = mu * normal + max_magnitude(motion.horizontal) + arm * (3.0 * max_restoring + max_speed * max_speed)
@@ -372,9 +369,8 @@ def fit_restoring_parabola(block: Record, settings: Record, j: int, scratch: Rec
     horizontal, vertical = horizon.motion
     error = horizon.error + bound_higher_terms(A, horizon)
     # If almost no weight presses the block down, the rounding of weight and push remains.
-    error += ROUNDING * (
-        abs(threshold) * (1.0 + max_magnitude(vertical)) + abs(block.restraint_threshold[j]) + max_magnitude(horizontal)
-    )
+    from_weight = abs(threshold) * (1.0 + max_magnitude(vertical))
+    error += ROUNDING * (from_weight + abs(block.restraint_threshold[j]) + max_magnitude(horizontal))
     weight_changes = vertical.high > vertical.low
     weight_error = horizon.error + bound_higher_terms(W, horizon) if weight_changes else 0.0
     weight_change = vertical.slope * horizon.window + 2.0 * horizon.error if weight_changes else 0.0
@@ -388,10 +384,8 @@ def fit_restoring_parabola(block: Record, settings: Record, j: int, scratch: Rec
         stiffness = lam * (cosine * weight - push * sine) - block.spring[j]
         push_change = horizontal.slope * horizon.window + 2.0 * horizon.error
         change = lam * (sine * push_change + cosine * weight_change)
-        curvature = (
-            lam * euclidean_norm(max_weight(block, j, vertical), max_push(block, j, horizontal))
-            + 0.25 * block.prestress[j]
-        )
+        curvature = lam * euclidean_norm(max_weight(block, j, vertical), max_push(block, j, horizontal))
+        curvature += 0.25 * block.prestress[j]
         error = bound_restoring_error(lam * (error + weight_error) + horizon.drag, change, curvature, horizon.height)
     g = gain * (threshold * W[0] + block.restraint_threshold[j] + sign * A[0])
     rate, half_curvature = gain * (sign * A[1]), gain * (sign * A[2]) if horizon.columns > 2 else 0.0

@@ -113,10 +113,8 @@ def max_absolute_weights(grounds: Grounds, motions: Integers, factors: Floats) -
     if grounds.stretches.shape[1] == 1:
         return np.ones(len(factors))
     scale, first = np.abs(factors) * grounds.unit, grounds.first_stretches[:-1]
-    low, high = (
-        np.minimum.reduceat(grounds.stretches[:, 1, 0], first),
-        np.maximum.reduceat(grounds.stretches[:, 1, 1], first),
-    )
+    low = np.minimum.reduceat(grounds.stretches[:, 1, 0], first)
+    high = np.maximum.reduceat(grounds.stretches[:, 1, 1], first)
     weights = [1.0 + scale * np.minimum(low, 0.0)[motions], 1.0 + scale * np.maximum(high, 0.0)[motions]]
     return np.maximum(1.0, np.abs(weights).max(axis=0))
 

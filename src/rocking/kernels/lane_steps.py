@@ -26,7 +26,7 @@ _SIDES = ("f8", (2,))
 #: accelerations (horizontal, vertical) of the unscaled motion at its start, and their slopes; u, u' and (nonlinear) sin
 #: and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation;
 #: rotation of overturning; usual length of a sample; factor on the motion; with friction, the largest push without a
-#: slip at zero velocity, its decrease per squared velocity (`sliding.may_slip`), and twice the slenderness.
+#: slip at zero velocity and its decrease per squared velocity (`sliding.may_slip`).
 GROUP = define_record(
     **dict.fromkeys(
         ("simulation", "row", "end_row", "increment", "has_event", "has_substep_event", "is_truncated", "is_pending"),
@@ -37,7 +37,7 @@ GROUP = define_record(
             "length", "push_start", "push_slope", "lift_start", "lift_slope",
             "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine", "stiffness", "pull",
             "push_gain", "stumpff_1", "stumpff_2", "stumpff_3", "curvature_factor", "peak", "overturn_angle", "h",
-            "factor", "sticking_push", "sticking_slope", "twice_slenderness",
+            "factor", "sticking_push", "sticking_slope",
         ),
         _LANES,
     ),

@@ -16,7 +16,7 @@ import numpy as np
 from rocking.core.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import raise_peak
-from rocking.kernels.ground import FIRST, LENGTH, ROUNDING, START, Grounds, select_ground
+from rocking.kernels.ground import FIRST, LENGTH, START, Grounds, select_ground
 from rocking.kernels.lane_steps import (
     GROUP,
     STEP_CONSTANTS,
@@ -142,7 +142,7 @@ def fill_lane(pool: Pool, settings: Record, lane: int, index: int) -> None:
     if block.has_friction:
         group.sticking_push[lane] = block.sticking_push[side] if state.direction == 0 else -np.inf
         group.sticking_slope[lane] = block.sticking_slope[side]
-        group.twice_slenderness[lane] = 2.0 * block.slenderness[side]
+        group.overturn_angle[lane] = min(block.overturn_angle, 2.0 * block.slenderness[side])
     if settings.nonlinear:
         psi = block.slenderness[side] - state.u
         group.sine[lane] = math.sin(psi)
@@ -237,21 +237,27 @@ def load_samples(pool: Pool) -> None:
 def mark_slips(group: Record, unit: float, substeps: int) -> None:
     """Cause an event in each lane whose block may slip during a sample: without overturning angle until its march.
 
-    See `sliding.may_slip`. The weight is constant; without substeps the model is linear.
+    See `sliding.may_slip`. The weight is constant; without substeps the model is linear. Rotations beyond twice the
+    slenderness are events of all lanes with friction.
     """
+    if substeps == 0:
+        for lane in range(WIDTH):
+            sticks = largest_push(group, lane, unit) <= group.sticking_push[lane]
+            group.overturn_angle[lane] = group.overturn_angle[lane] if sticks else -np.inf
+        return
     for lane in range(WIDTH):
-        start, slope = push_line(group, lane, unit)
-        h = group.length[lane]
-        largest = max(abs(start), abs(start + slope * h)) * (1.0 + ROUNDING)
-        speed = abs(group.v[lane])
-        if substeps > 0:
-            speed += -2.0 * group.stiffness[lane] * (substeps * substeps) / h * (1.0 + largest)
-        else:
-            speed += group.stiffness[lane] * h * (group.twice_slenderness[lane] + largest)
+        largest = largest_push(group, lane, unit)
+        max_change = -2.0 * group.stiffness[lane] * (substeps * substeps) / group.length[lane]
+        speed = abs(group.v[lane]) + max_change * (1.0 + largest)
         sticks = largest <= group.sticking_push[lane] - group.sticking_slope[lane] * (speed * speed)
-        sticks &= max(group.peak[lane], group.u[lane] + speed * h) <= group.twice_slenderness[lane]
-        sticks |= group.simulation[lane] < 0
         group.overturn_angle[lane] = group.overturn_angle[lane] if sticks else -np.inf
+
+
+@inlined
+def largest_push(group: Record, lane: int, unit: float) -> float:
+    """Return the largest absolute ground acceleration during a sample, g."""
+    start, slope = push_line(group, lane, unit)
+    return max(abs(start), abs(start + slope * group.length[lane]))
 
 
 @inlined

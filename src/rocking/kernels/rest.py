@@ -142,10 +142,8 @@ def geometric_rest_time(ground: Ground, block: Record, settings: Record, state: 
     Sum of the paper's Eq. 75 without remainder: arcs of 2 v/g, with speeds reduced by a factor at each impact.
     """
     i, j = state.side, block.next_side[state.side]
-    g_i, g_j = (
-        present_restoring(ground, block, settings, state, i),
-        present_restoring(ground, block, settings, state, j),
-    )
+    g_i = present_restoring(ground, block, settings, state, i)
+    g_j = present_restoring(ground, block, settings, state, j)
     e_i, e_j = mean_factor(block, i, state.v), mean_factor(block, j, state.v)
     if state.direction != 0:
         e_i, e_j = slip_factor(block, i, e_i, state.direction), slip_factor(block, j, e_j, state.direction)

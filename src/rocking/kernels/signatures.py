@@ -35,6 +35,7 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
     sample = ground.Ground(array(3, 4), array(1, 1, 2), 0.0, 2, 2, 1.0, 1.0)
     block, settings, scratch = state.new_record(state.BLOCK), state.new_record(state.SETTINGS), state.new_scratch()
     blocks, states, table = state.new_records(1, state.BLOCK), state.new_states(1, 1), state.new_table(1)
+    variation = state.new_record(state.VARIATION)
     trail = Trail(sample, block, settings, state.new_records(1, state.NODE_ROW))
     grounds, motions = ground.join_grounds([sample]), array(1, dtype=np.int64)
     pool = build_pool(grounds, motions - 1, array(1), blocks, states, 1.0, 0)
@@ -45,29 +46,12 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
     return {
         "march.march": (sample, block, settings, table, scratch, states[0]),
         "trace.trace": (trail, scratch, fixed(), count, array(1, 3)),
-        "trace.compute_variation": (
-            trail,
-            scratch,
-            state.new_record(state.VARIATION),
-            0,
-            fixed(),
-            array(),
-            array(),
-            array(),
-        ),
-        "adjoint.adjoint": (trail, scratch, state.new_record(state.VARIATION), 0, 0.0, array(3), array(2, 2)),
+        "trace.compute_variation": (trail, scratch, variation, 0, fixed(), array(), array(), array()),
+        "adjoint.adjoint": (trail, scratch, variation, 0, 0.0, array(3), array(2, 2)),
         "adjoint.differentiate_step_end": (trail, scratch, 0, array(3), array(2, 2)),
         "periodic.iterate": (problem, scratch, states, 1, array(1, 1, 3), array(1, TRAP_COLUMNS), count, count),
-        "periodic.differentiate": (trail, scratch, state.new_record(state.VARIATION), table, states, array(1, 2, 2)),
-        "periodic.measure_stretches": (
-            trail,
-            scratch,
-            state.new_record(state.VARIATION),
-            table,
-            states[0],
-            array(3, 2),
-            array(1, 2),
-        ),
+        "periodic.differentiate": (trail, scratch, variation, table, states, array(1, 2, 2)),
+        "periodic.measure_stretches": (trail, scratch, variation, table, states[0], array(3, 2), array(1, 2)),
         "uplift.write_completeness": (grounds, motions, array(1), blocks, states, scratch, flags),
         "uplift.write_next_uplifts": (trail, scratch, array()),
         "ground.write_pieces": (fixed(3), fixed(2, 2), sample, array()),

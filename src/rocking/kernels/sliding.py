@@ -16,14 +16,7 @@ import math
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.kernels.arc import (
-    NEGLIGIBLE,
-    expand_arc,
-    pad_to_same_degree,
-    side_sign,
-    weight_at,
-    write_weight_series,
-)
+from rocking.kernels.arc import NEGLIGIBLE, expand_arc, pad_to_same_degree, side_sign, weight_at, write_weight_series
 from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import StepEnd, find_first_passing
 from rocking.kernels.ground import (

@@ -46,7 +46,7 @@ def copy_trail(trail: Trail) -> Trail:
     return trail._replace(block=trail.block.copy()) if trail.block["yielding"] else trail
 
 
-#: Variations variations.
+#: Variations of rotation, velocity and a tendon's plastic elongation.
 Variations = tuple[float, float, float]
 
 #: Columns of the output of `trace`.
@@ -197,6 +197,7 @@ def compute_variation(
                 events[event_count] = -du / node.v
             break
         next_node = nodes[k + 1]
+        start, duration = (du, dv, plastic_variation), next_node.time - node.time
         first, written = written, count_times_until(times, written, next_node.time)
         if node.side < 0:
             tendon_change = restoring_by_tendon(trail.block, next_node.side, plastic_elongation, plastic_variation)
@@ -210,14 +211,10 @@ def compute_variation(
             events[event_count] = rest_shift(trail, node, quantity, variations, next_node)
             event_count += 1
             if written > first:
-                order = expand_variation(
-                    trail, scratch, work, node, quantity, (du, dv, plastic_variation), next_node.time - node.time
-                )
+                order = expand_variation(trail, scratch, work, node, quantity, start, duration)
                 write_changes(trail, scratch, work, node, order, times[first:written], changes[first:written], True)
         else:
-            order = expand_variation(
-                trail, scratch, work, node, quantity, (du, dv, plastic_variation), next_node.time - node.time
-            )
+            order = expand_variation(trail, scratch, work, node, quantity, start, duration)
             write_changes(trail, scratch, work, node, order, times[first:written], changes[first:written], False)
             t = step_duration(trail, node, next_node)
             du, dv, _ = evaluate_series(work.change, order, t)
@@ -415,9 +412,8 @@ def saltation(
     block = trail.block
     dv, speed = rates
     hit = next_node.side if block.two_stops else node.side
-    g_before = (
-        restoring_acceleration(trail.ground, block, hit, next_node.piece, next_node.offset) - block.damping[hit] * speed
-    )
+    g_before = restoring_acceleration(trail.ground, block, hit, next_node.piece, next_node.offset)
+    g_before -= block.damping[hit] * speed
     e = restitution_factor(block, hit, speed, number)
     g_after = restoring_acceleration(trail.ground, block, next_node.side, next_node.piece, next_node.offset)
     g_after += block.damping[next_node.side] * (e * speed)

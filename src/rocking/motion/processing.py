@@ -145,7 +145,8 @@ class ProcessingMethods(MotionMeasures):
         Returns
         -------
         Motion
-            Polynomials of degree 9 on pieces of at most a quarter radian, with unchanged vertical component.
+            Polynomials of degree 9 on pieces of at most a quarter radian, with unchanged vertical component. An
+            orthogonal component also becomes a floor motion.
 
         Raises
         ------
@@ -160,7 +161,9 @@ class ProcessingMethods(MotionMeasures):
         """
         breakpoints, coefficients, error = _compute_floor_motion(self, period, damping, free_vibration, self.error)
         history_entry = f"on a floor of period {period:.6g} s, damping {damping:.6g}"
-        return self._derive("floor", history_entry, breakpoints=breakpoints, coefficients=coefficients, error=error)
+        other = self.orthogonal and self.orthogonal.on_floor(period, damping, free_vibration=free_vibration)
+        pieces: dict[str, Any] = {"breakpoints": breakpoints, "coefficients": coefficients, "error": error}
+        return self._derive("floor", history_entry, orthogonal=other, **pieces)
 
     def processed(
         self,

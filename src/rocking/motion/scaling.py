@@ -16,11 +16,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import add_unit
 from rocking.errors import MotionError, OptionError, escape_braces
 from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
-from rocking.motion.pairs import (
-    compute_directional_peaks,
-    compute_directional_spectrum,
-    iterate_directions,
-)
+from rocking.motion.pairs import compute_directional_peaks, compute_directional_spectrum, iterate_directions
 
 #: Intensity measures of the analyses.
 IntensityName = Literal[

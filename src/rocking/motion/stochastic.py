@@ -82,8 +82,9 @@ def synthesize_motions(
     -----
     The process is x(t) = q(t) sum_k s_k(t) w_k with standard normal w_k. The s_k(t) are impulse responses of a linear
     oscillator with the frequency at time k dt, normalised to unit variance at each t, and q(t)^2 is proportional to a
-    gamma density with the requested duration and time of the middle :cite:p:`rezaeian2010`. The high-pass filter and
-    the straight lines between samples reduce the Arias intensity slightly.
+    gamma density with the requested duration and time of the middle :cite:p:`rezaeian2010`. The lower limit of the
+    frequency, 0.3 Hz, is a choice of this program. The high-pass filter and the straight lines between samples reduce
+    the Arias intensity slightly.
 
     References
     ----------

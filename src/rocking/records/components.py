@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,7 +17,7 @@ from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
 from rocking.records.formats.source import Request
-from rocking.records.named import expand_record_names, is_shipped, split_factor
+from rocking.records.named import correct_motion, expand_record_names, is_shipped, make_names_unique, split_factor
 
 #: Names of vertical components.
 _VERTICAL: Final = re.compile(r"(?i)-?(?:up|u|ud|u-d|v\d?|vert\w*|z|down|dwn|dn|[BCDEHS][HLN]Z)(?:\W|$)")
@@ -127,30 +128,44 @@ def group_components(
     >>> [group.station for group in group_components("ridgecrest-*")]
     ['CI.CLC China Lake, G2 Tower Rd.', 'CI.TOW2 Tower 2']
     """
+    options: dict[str, Any] = {"dt": dt, "units": units, "baseline": baseline, "highpass": highpass}
+    groups, reasons = _read_groups(names, keep_going=keep_going, **options)
+    note_skipped(reasons)
+    return groups
+
+
+def _read_groups(
+    names: Any, *, dt: float | None, units: str | None, baseline: Any, highpass: float | None, keep_going: bool
+) -> tuple[tuple[Components, ...], dict[str, str]]:
+    """Return the components of `group_components`, and for each file that cannot be read the reason."""
     groups: dict[tuple[object, ...], list[Motion]] = {}
     single = [names] if isinstance(names, (str, os.PathLike)) else names
-    reasons = []
+    reasons = dict[str, str]()
     for record in expand_record_names([os.fspath(name) for name in single]):
         name, factor = split_factor(record)
         try:
             request = Request.create(dt, units, several=True)
             channels = [] if is_shipped(name) else formats.read_content(name, request)[1]
-        except RecordError as error:
+            originals = [(f", channel {each.label}", each.motion("none"), each.is_raw) for each in channels]
+            motions = [
+                correct_motion(f"{record}{label}", original, baseline, highpass, is_raw=is_raw)
+                for label, original, is_raw in originals or [("", catalogue.load(name), False)]
+            ]
+        except (RecordError, MotionError) as error:
             if not keep_going:
                 raise
-            reasons.append(str(error))
+            reasons[record] = str(error).removeprefix(error.path or "").lstrip(",: ")
             continue
-        motions = [channel.motion(baseline, highpass) for channel in channels] or [catalogue.load(name)]
         places = [f"{each.metadata.get('location', '')}{each.name.partition(' b')[2]}" for each in channels] or [""]
         for motion, place in zip(motions, places, strict=True):
             origin = motion.description.origin or Origin()
             key = (origin.station or name, origin.event, origin.format, motion.dt, place, factor)
             groups.setdefault(key, []).append(motion if factor == 1.0 else motion.scaled(factor))
-    for reason in reasons:
-        if not groups:
-            raise RecordError(f"no record could be read; the first: {escape_braces(reason)}")
-        note(f"skipped: {reason}")
-    return tuple(_create_components(str(key[0]), str(key[1]), motions) for key, motions in groups.items())
+    if not groups:
+        first = ": ".join(next(iter(reasons.items()), ()))
+        raise RecordError(f"no record could be read; the first: {escape_braces(first)}")
+    created = (_create_components(str(key[0]), str(key[1]), motions) for key, motions in groups.items())
+    return tuple(created), reasons
 
 
 def load_pairs(
@@ -191,23 +206,50 @@ def load_pairs(
     ('ridgecrest-clc-090', 'ridgecrest-clc-360')
     """
     motions, reasons = collect_pairs(names, vertical=vertical, **options)
-    for reason in reasons.values():
-        note(f"skipped: {reason}")
+    note_skipped(reasons)
     return motions
 
 
-def collect_pairs(names: Any, *, vertical: bool, **options: Any) -> tuple[tuple[Motion, ...], dict[str, str]]:
-    """Return the motions of `load_pairs`, and for each station without a pair the reason."""
-    motions, reasons = list[Motion](), dict[str, str]()
-    for group in group_components(names, **options):
+def note_skipped(reasons: Mapping[str, str]) -> None:
+    """Report the records that are not used."""
+    for name, reason in reasons.items():
+        note(f"skipped: {escape_braces(f'{name}: {reason}')}")
+
+
+def collect_pairs(
+    names: Any, *, vertical: bool, singles: bool = False, keep_going: bool = True, **options: Any
+) -> tuple[tuple[Motion, ...], dict[str, str]]:
+    """Return the motions of `load_pairs`, and the reason for each file and station without them.
+
+    With `singles`, stations without exactly two horizontal components are not pairs, and their components are separate.
+    """
+    names_of_options = ("dt", "units", "baseline", "highpass")
+    groups, reasons = _read_groups(names, keep_going=keep_going, **{key: options.get(key) for key in names_of_options})
+    motions = list[Motion]()
+    for group in groups:
         try:
-            motions += group.motions(vertical=vertical)
+            motions += (
+                group.horizontals if singles and len(group.horizontals) != 2 else group.motions(vertical=vertical)
+            )
         except (RecordError, MotionError) as error:
             reasons[group.station] = str(error)
+        if singles and not vertical and group.vertical is not None:
+            reasons[f"{name_components([group.vertical])[0]}, vertical"] = "vertical components are not used"
     if not motions:
         reason = escape_braces(next(iter(reasons.values()), "there are no records"))
         raise RecordError(f"no station has a pair of horizontal components: {reason}")
     return tuple(motions), reasons
+
+
+def name_components(motions: Sequence[Motion]) -> list[str]:
+    """Return the file of each motion, with the channel if several are in it, or the name without a file."""
+    origins = [motion.description.origin or Origin() for motion in motions]
+    counts = Counter(origin.file for origin in origins)
+    names = [
+        f"{origin.file}, {origin.channel}" if origin.file and counts[origin.file] > 1 else origin.file or motion.name
+        for origin, motion in zip(origins, motions, strict=True)
+    ]
+    return make_names_unique(names)
 
 
 def _create_components(station: str, event: str, motions: list[Motion]) -> Components:

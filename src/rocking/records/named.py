@@ -109,7 +109,14 @@ STANDARD_INPUT = "-"
 
 
 def load_motion(
-    name: str, *, vertical: str | None = None, scale: float = 1.0, several: bool = False, **options: Any
+    name: str,
+    *,
+    vertical: str | None = None,
+    scale: float = 1.0,
+    several: bool = False,
+    baseline: int | str | None = None,
+    highpass: float | None = None,
+    **metadata: Any,
 ) -> Motion:
     """Return the scaled motion of a record file ("-" is standard input), or of a shipped record if no file exists.
 
@@ -119,29 +126,28 @@ def load_motion(
     """
     several = several or (vertical is not None and _is_file_or_record(vertical))
     name, factor = split_factor(name)
-    metadata, corrections = _split_options(options)
     if is_shipped(name):
         reject_redundant_arguments(name, **({} if several else metadata))
-        original = catalogue.load(name)
-        motion = remove_baseline(original, *corrections)
+        motion = correct_motion(name, catalogue.load(name), baseline, highpass)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
         channel = formats.read_channel(file, Request.create(**metadata, several=several))
-        original, motion = channel.motion("none"), channel.motion(*corrections)
-    if motion.history:
-        peaks = " to ".join(
-            f"{each.pga:.4g} m/s^2 ({each.pga / STANDARD_GRAVITY:.4g} g)" for each in (original, motion)
-        )
-        note(f"{name}: {' and '.join(motion.history)}, which changes the peak acceleration from {peaks}")
+        motion = correct_motion(name, channel.motion("none"), baseline, highpass, is_raw=channel.is_raw)
     if vertical is not None:
+        options = {"baseline": baseline, "highpass": highpass, **metadata}
         motion = motion.with_vertical(load_vertical(vertical, name, several=several, **options))
     return motion if scale * factor == 1.0 else motion.scaled(scale * factor)
 
 
-def _split_options(options: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
-    """Return the options of a request, and baseline and highpass."""
-    names = ("baseline", "highpass")
-    return {name: value for name, value in options.items() if name not in names}, [options.get(name) for name in names]
+def correct_motion(
+    name: str, original: Motion, baseline: int | str | None, highpass: float | None, *, is_raw: bool = False
+) -> Motion:
+    """Return a motion without its baseline and high-pass filtered, with a note on the change of the peak."""
+    motion = remove_baseline(original, baseline, highpass, is_raw=is_raw)
+    if motion is not original:
+        texts = [f"{each.pga:.4g} m/s^2 ({each.pga / STANDARD_GRAVITY:.4g} g)" for each in (original, motion)]
+        note(f"{name}: {' and '.join(motion.history)}, which changes the peak acceleration from {' to '.join(texts)}")
+    return motion
 
 
 def split_factor(name: str) -> tuple[str, float]:
@@ -155,11 +161,11 @@ def load_vertical(name: str, record: str, *, several: bool = False, **options: A
     options = {key: value for key, value in options.items() if key != "channel"}  # the channel of the horizontal motion
     if _is_file_or_record(name):
         return load_motion(name, several=True, **options)
-    metadata, corrections = _split_options(options)
+    corrections = [options.pop(key, None) for key in ("baseline", "highpass")]
     if record == STANDARD_INPUT or not path_exists(record):
         text = f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels"
         raise RecordError(f"{text}; check the name")
-    channel = formats.read_channel(record, Request.create(**metadata, several=several), vertical=name)
+    channel = formats.read_channel(record, Request.create(**options, several=several), vertical=name)
     return channel.motion(*corrections)
 
 

@@ -15,18 +15,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
 from rocking.engine.problem import compute_thresholds
 from rocking.errors import OptionError
-from rocking.plot.canvas import (
-    ACCENT,
-    GREY,
-    INK,
-    PALE,
-    FigureOptions,
-    Page,
-    add_labels,
-    add_text,
-    add_ticks,
-    open_page,
-)
+from rocking.plot.canvas import ACCENT, GREY, INK, PALE, FigureOptions, Page, add_labels, add_text, add_ticks, open_page
 from rocking.plot.curves import draw_ground
 from rocking.response.simulated import ResponseData
 from rocking.response.summary import describe_subject, format_time

@@ -258,8 +258,10 @@ def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     """Create a dataset from arrays named as in `VARIABLES`, without the dimensions that were not requested."""
     import xarray as xr
 
-    dimensions = ("motion", "scale", "polarity", "block")
-    is_dropped = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
+    has_scales, has_polarities = product.scales.measure is not None, product.polarity == "both"
+    requested = {"motion": True, "scale": has_scales, "polarity": has_polarities, "block": True}
+    dimensions = tuple(name for name, is_requested in requested.items() if is_requested)
+    part = tuple(slice(None) if is_requested else 0 for is_requested in requested.values())
     meanings = {**VARIABLES, **TIMES, **SLIPS, "overturned_share": ("1", _SHARE_MEANING)}
     variable_attributes = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in meanings.items()}
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
@@ -269,7 +271,9 @@ def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
         variable_attributes["peak_rotation"]["long_name"] = f"largest {coordinate.name} in size"
         meaning = f"whether the {coordinate.name} passed its limit, where it has one"
         variable_attributes["overturned"]["long_name"] = meaning
-    variables = {name: (dimensions, values, variable_attributes.get(name, {})) for name, values in outcomes.items()}
+    variables = {
+        name: (dimensions, values[part], variable_attributes.get(name, {})) for name, values in outcomes.items()
+    }
     coordinates = {
         "motion": ("motion", list_motion_names(product.motions)),
         **motion_coordinates(product.motions),
@@ -277,6 +281,7 @@ def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
         "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in product.signs]),
         **body_coordinates(product.bodies),
     }
+    used = {name: values for name, values in coordinates.items() if values[0] in dimensions}
     attributes = {
         "program": f"rocking {VERSION}",
         "model": product.model,
@@ -286,8 +291,7 @@ def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
         "motions": [f"{motion.name}: {motion.description.text}" for motion in product.motions],
         "histories": ["; ".join(motion.history) for motion in product.motions],
     }
-    dataset = xr.Dataset(variables, coordinates, attributes)
-    return dataset.isel({name: 0 for name, dropped in is_dropped.items() if dropped}, drop=True)
+    return xr.Dataset(variables, used, attributes)
 
 
 def collect_verticals(motions: Sequence[Motion]) -> dict[str, Any]:

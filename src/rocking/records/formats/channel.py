@@ -235,11 +235,14 @@ class Channel:
             motion = Motion.from_points(self.times, self.acceleration, name=name, description=description)
         else:
             motion = Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
-        return remove_baseline(motion, 0 if baseline is None and self.is_raw else baseline, highpass)
+        return remove_baseline(motion, baseline, highpass, is_raw=self.is_raw)
 
 
-def remove_baseline(motion: Motion, baseline: int | str | None, highpass: float | None) -> Motion:
-    """Return a motion without its baseline ("none" and None keep it), high-pass filtered."""
+def remove_baseline(
+    motion: Motion, baseline: int | str | None, highpass: float | None, *, is_raw: bool = False
+) -> Motion:
+    """Return a motion without its baseline ("none" keeps it, None keeps all but that of raw counts), filtered."""
+    baseline = 0 if baseline is None and is_raw else baseline
     degree = int(baseline) if isinstance(baseline, str) and baseline.isdecimal() else baseline
     if isinstance(degree, str) and degree != "none":
         text = f"{{}} must be the degree of a polynomial (0 removes the mean) or none; got {degree!r}"

@@ -16,7 +16,7 @@ import math
 import re
 import tomllib
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from importlib import resources
@@ -47,13 +47,13 @@ _PEAK_RATIO: Final = 3.0
 _BEARING: Final = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d*)?)\s*([EW])\b")
 _DEGREES: Final = re.compile(r"(?ia)(\d{1,3}(?:\.\d*)?)\s*(?:deg|$)")
 _DIRECTIONS: Final = {"n": 0.0, "ns": 0.0, "n-s": 0.0, "north": 0.0, "e": 90.0, "ew": 90.0, "e-w": 90.0, "east": 90.0}
-_NUMERIC_ROW: Final = re.compile(r"(?=.*\d)[\d\s.+\-EeDd]+")
+_NUMERIC: Final = r"^(?=.*\d)[\d \t.+EeDd-]+$"
 
 
 @functools.cache
 def _compile(pattern: str) -> re.Pattern[str]:
-    r"""Return a pattern of `declared.toml`, in which `\s` is a blank within a line, and NUMBER a number."""
-    text = pattern.replace("NUMBER", NUMBER).replace(r"\s", r"[^\S\n]")
+    r"""Return a pattern of `declared.toml`: `\s` is a blank within a line, NUMBER a number, and NUMERIC a row."""
+    text = pattern.replace("NUMERIC", _NUMERIC).replace("NUMBER", NUMBER).replace(r"\s", r"[^\S\n]")
     return re.compile(text, re.ASCII | re.IGNORECASE | re.MULTILINE)
 
 
@@ -90,12 +90,9 @@ class Format:
     start_pattern: str = ""  # pattern at the start of the file
     has_several: bool = False  # whether a file may contain several channels
     other_data: str = "(?!)"  # line that begins data of other quantities, which are skipped
-    pairs_header: tuple[Mapping[str, Any], ...] = ()  # header of pairs of time and value, if the other one is not found
-    is_paired: bool = False  # whether the numbers are pairs
+    is_paired: bool = False  # whether the numbers are pairs of time and value
     layout: str = ""  # columns of the numbers, such as 8x10, if they may touch
-    pairs_layout: str = ""  # columns of pairs
     wide_layout: tuple[Any, ...] = ()  # place in the header's numbers, a number, and the columns that it selects
-    required: tuple[str, ...] = ()  # keys that must have a value
     count_name: str = "the header"  # name of the count, for messages
     count_place: tuple[Any, ...] = ()  # place of the count in the header's numbers
     total_count_places: tuple[
@@ -132,11 +129,12 @@ class Format:
             header = Header(source, self, start, len(channels) + 1)
             header.read()
             end = self._find_end(source, header.end)
-            if (quantity := header.find("quantity", "acceleration").lower()).startswith("acc"):
+            quantity = header.find("quantity", "" if "quantity" in header.statements else "acceleration")
+            if quantity.lower().startswith("acc"):
                 channels += header.create_channels(end, request)
             start = self._find_next(source, end)
         if not channels:
-            text = f"this {self.name} file contains {quantity!r}; use the file of the acceleration"
+            text = f"this {self.name} file contains {quantity.lower()!r}; use the file of the acceleration"
             raise source.error(text, header.offset)
         return channels
 
@@ -172,38 +170,23 @@ class Header:
     numbers: dict[str, Floats] = field(default_factory=dict)  # numbers of the header by name
     skips: Sequence[int] = (0,)  # alternative numbers of rows before the numbers
     statements: dict[str, list[Statement]] = field(default_factory=lambda: defaultdict(list))  # statements by name
-    is_paired: bool = False  # whether the numbers are pairs
 
     def read(self) -> None:
         """Read all parts and collect the statements."""
-        start, self.is_paired = self.end, self.form.is_paired
+        start = self.end
         if not self._read_parts(self.form.header):
-            self.end, self.lines, self.is_paired = start, [], True
-            is_read = self.form.pairs_header and self._read_parts(self.form.pairs_header)
-            self._collect()
-            if not (is_read and self.find("count") and self.find("units")):
-                raise self._missing_count_error(start)
-        else:
-            self._collect()
-        for key in self.form.required:
-            line = next((line for line in self.lines if line.text.startswith(key)), None)
-            if line is None or not line.text.partition(":")[2].strip():
-                text = f"the header does not contain {key}; download the record again"
-                raise self.source.error(text, self.end if line is None else line.start)
-
-    def _read_parts(self, parts: Sequence[Mapping[str, Any]]) -> bool:
-        """Read the parts; return whether each was found."""
-        kinds = ((getattr(self, f"read_{kind}"), value) for part in parts for kind, value in part.items())
-        return all(read(*(value if isinstance(value, list) else [value])) is not False for read, value in kinds)
-
-    def _collect(self) -> None:
-        """Collect what the header states, by name, in the order of the patterns."""
+            raise self._missing_count_error(start)
         text = "\n".join(line.text for line in self.lines)
         patterns = self.form.statement_patterns if self.lines else ()
         for match in filter(None, (_compile(pattern).search(text) for pattern in patterns)):
             for name, value in ((name, value) for name, value in match.groupdict().items() if value is not None):
                 line = self.lines[text.count("\n", 0, match.start(name))]
                 self.statements[re.sub(r"_\d$", "", name)].append(Statement(" ".join(value.split()), line.start))
+
+    def _read_parts(self, parts: Sequence[Mapping[str, Any]]) -> bool:
+        """Read the parts; return whether each was found."""
+        kinds = ((getattr(self, f"read_{kind}"), value) for part in parts for kind, value in part.items())
+        return all(read(*(value if isinstance(value, list) else [value])) is not False for read, value in kinds)
 
     def _fail(self, text: str, offset: int, advice: str = "correct the header, or download the file again") -> NoReturn:
         raise self.source.error(f"{text}; {advice}", offset)
@@ -242,26 +225,19 @@ class Header:
         """Read as many lines as the first one states."""
         self.read_text(int(self.read_line(pattern, "the title")[1]) - 1)
 
-    def read_until(self, pattern: str, limit: int) -> bool:
-        """Read the lines up to the first match, within a limit and the same channel."""
-        return self._read_before(lambda line: _compile(pattern).search(line.text) is not None, limit, 1)
-
-    def read_numeric(self, limit: int) -> bool:
-        """Read the lines before the first one that contains only numbers."""
-        return self._read_before(lambda line: _NUMERIC_ROW.fullmatch(line.text) is not None, limit)
-
-    def read_while(self, pattern: str) -> None:
-        """Read the lines that match."""
-        self._read_before(lambda line: not _compile(pattern).search(line.text), 200)
-
-    def _read_before(self, is_end: Callable[[Line], bool], limit: int, more: int = 0) -> bool:
+    def read_before(self, pattern: str, limit: int, more: int = 0) -> bool:
+        """Read the lines before the first match, within a limit and the same channel."""
         for k, line in enumerate(self.source.read_lines(self.end, limit)):
-            if is_end(line):
+            if _compile(pattern).search(line.text):
                 self.read_text(k + more)
                 return True
             if k > 0 and self.form.has_several and self.form.begins_channel(line):
                 break
         return False
+
+    def read_until(self, pattern: str, limit: int) -> bool:
+        """Read the lines up to the first match."""
+        return self.read_before(pattern, limit, 1)
 
     def read_listed(self, name: str, pattern: str) -> None:
         """Read numbers after a line with their count, lines and layout."""
@@ -330,6 +306,8 @@ class Header:
         if counts:
             return Count(*counts[0], self.form.count_name, surplus)
         if not self.statements.get("seconds"):
+            if self.form.is_paired:
+                raise self._missing_count_error(self.offset)
             return Count(0.0, self.offset, max_surplus=math.inf)
         rate = self.find_number("rate")
         # The duration is in whole seconds. Fewer samples, or a surplus of a second, are errors.
@@ -338,7 +316,7 @@ class Header:
 
     def find_step(self, count: float) -> tuple[float | None, int]:
         """Return the sampling step, s, or None for pairs, and the offset of its line."""
-        if self.is_paired:
+        if self.form.is_paired:
             return None, self.offset
         if self.form.rate_place:
             rate = self.get_number(*self.form.rate_place)
@@ -391,7 +369,7 @@ class Header:
         if form.wide_layout and self.get_number(*form.wide_layout[:2]) == form.wide_layout[2]:
             return Layout.parse(form.wide_layout[3])
         stated = parse_layout(self.lines[-1].text) if self.lines else None
-        return stated or Layout.parse((form.pairs_layout if self.is_paired else "") or form.layout)
+        return stated or Layout.parse(form.layout)
 
     def _read_values(self, end: int, layout: Layout | None, count: Count) -> Floats:
         """Read the numbers after as many rows of header numbers as leave the stated count."""
@@ -418,7 +396,7 @@ class Header:
         count = self.find_count(layout.per_line if layout and form.is_padded else 0)
         step, place = self.find_step(count.values)
         dt, times = None if step is None else request.check_step(source, step, place), None
-        values = self._read_scaled(end, layout, count, 2 if self.is_paired else len(columns))
+        values = self._read_scaled(end, layout, count, 2 if form.is_paired else len(columns))
         if step is None:
             if len(values) % 2 or len(values) < 4:
                 self._fail("expected pairs of time and acceleration", self.offset, "correct the file")

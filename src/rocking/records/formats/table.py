@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import escape_braces
+from rocking.errors import RecordError, escape_braces
 from rocking.records.formats.channel import (
     Channel,
     Recognised,
@@ -131,10 +131,7 @@ class _TextTable(NamedTuple):
     def _create_channels(self, request: Request, numbers: Floats) -> list[Channel]:
         chosen, times = self._find_acceleration_columns(), self.heading.find_columns("time")
         if self.heading.may_be_spectrum and (self.columns == 1 or times) and np.all(numbers[:, chosen] >= 0.0):
-            text = "this seems to be a response spectrum: no value is negative, and no column is named 'time'"
-            raise self.source.error(
-                f"{text}; use accelerations against time, or name the column 'time'", self.heading.offset
-            )
+            raise self.create_spectrum_error("no value is negative, and no column is named 'time'")
         if not times:
             self._check_step(request.dt)
         self._check_row_numbers(numbers)
@@ -154,6 +151,11 @@ class _TextTable(NamedTuple):
             values, fields["find_row"] = numbers[:, column], self._find_row_offset
             channels.append(create_channel(self.source, "text table", values, unit, self.start, **fields))
         return channels
+
+    def create_spectrum_error(self, reason: str) -> RecordError:
+        """Return the error for a table of a response spectrum."""
+        text = f"this seems to be a response spectrum: {reason}; use accelerations against time"
+        return self.source.error(f"{text}, or name the column 'time'", self.heading.offset)
 
     def _read_timing(self, request: Request, numbers: Floats, channel_column: int) -> dict[str, Any]:
         """Return step or times, and start (s), from the nearest column of times before a channel, else the first."""
@@ -267,6 +269,8 @@ def recognise_wrapped(source: Source) -> Recognised | None:
 def _read_wrapped(table: _TextTable, request: Request) -> list[Channel]:
     """Read all numbers row by row as one series."""
     source, start = table.source, table.start
+    if table.heading.may_be_spectrum:
+        raise table.create_spectrum_error("its heading names spectra")
     text = f"each line holds {table.columns} numbers"
     advice = f"name all {table.columns} columns in a heading line"
     if request.dt is None:
