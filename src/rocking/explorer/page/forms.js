@@ -259,6 +259,7 @@ export class MotionForm {
   /** Choose a record whose questions are open. @param {import("./records.js").Row} row */
   wait(row) {
     choose(this.motion.select, idOf(row.texts));
+    if (this.texts.motion === "none") for (const each of this.starts) each.show(each.spec.default);
     this.showFields();
   }
 
