@@ -23,7 +23,7 @@ from rocking.explorer.parameters import Texts
 from rocking.explorer.payload import Payload
 from rocking.inputs.declared import SCALINGS
 from rocking.motion.motion import Motion
-from rocking.response.figure import compute_course
+from rocking.response.figure import sample_interval
 
 #: Parameters of diagrams, and the parameter of the sine that each varies.
 SWEPT: Final = {"a": "amplitude", "omega": "frequency"}
@@ -117,7 +117,7 @@ def describe_orbit(case: Case) -> Payload:
     arrays: dict[str, Floats] = {}
     if period > 0:
         orbit = create_orbit(strobe, states[-1], period)
-        course = compute_course(orbit.response, 0.0, orbit.response.duration)
+        course = sample_interval(orbit.response, 0.0, orbit.response.duration)
         states, sentence = orbit.states, f"{orbit._headline().capitalize()}."
         arrays = {"rotation": course.rotation, "velocity": course.velocity, "jump": course.impact_rows.astype(float)}
     else:
