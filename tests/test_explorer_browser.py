@@ -537,13 +537,14 @@ def test_a_study_opens_as_a_map(opened, tmp_path):
     page.until(COMPUTED["map"])
     page.page.locator("#map-tools label", has_text="scale").locator("select").select_option("1")
     page.until("location.search.includes('scale_index=1')")
-    page.paused(300)
+    page.until(COMPUTED["map"])
     page.page.locator("#map").focus()
     page.page.keyboard.press("ArrowRight")
     page.page.keyboard.press("ArrowUp")
     said = page.text("#map-at")
     page.rested(lambda: page.page.keyboard.press("Enter"))
     page.until("document.body.dataset.view === 'shake' && location.search.includes('alpha')")
+    page.until(f"document.title.includes({re.search(r'p = [0-9.]+ rad/s', said)[0]!r})", "the case is shown")
     assert ("overturns" in page.text("#verdict")) == ("Overturns" in said or ": overturns" in said)
     server.server.should_exit = True
 

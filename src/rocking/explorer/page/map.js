@@ -161,6 +161,7 @@ export class View {
   /** A slice of a study. */
   async slice() {
     const {map} = this.page.state, names = this.study.axes.map((/** @type {any} */ each) => each.name);
+    document.body.dataset.map = "running";
     if (!names.includes(map.x)) map.x = names[0];
     if (!names.includes(map.y) || map.y === map.x) map.y = names.find((/** @type {string} */ each) => each !== map.x);
     const {header, arrays} = await payload("/api/study", {...map, quantity: this.quantity});
