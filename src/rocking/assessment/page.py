@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from rocking.analysis.levels import compute_block_units
 from rocking.analysis.risk import describe_extrapolated_shares
 from rocking.assessment.chart import Chart
 from rocking.core.constants import STANDARD_GRAVITY, VERSION
 from rocking.core.tables import format_count, write_text
+from rocking.engine.problem import gather_bodies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -257,9 +259,14 @@ def _write_method(assessment: Assessment, command: str) -> str:
     versions = [f"rocking {VERSION}", f"Python {platform.python_version()}"]
     versions += [f"{name} {metadata.version(name)}" for name in ("numpy", "scipy")]
     polarity = {"both": "Original and reversed motions", "+": "Original motions", "-": "Reversed motions"}
-    model = f"Rigid blocks, {assessment.model} model, events located and chattering certified."
+    measure, values = assessment.measure, assessment.data[assessment.measure.name].values
+    units = compute_block_units(gather_bodies([item.body for item in assessment.objects]), measure, assessment.model)
+    ends = [unit * item.levels[[0, -1], None] for unit, item in zip(units, assessment.objects, strict=True)]
+    low, high = (fold(measure.find_factor(np.array(ends), values)) for fold in (np.min, np.max))
     assumptions = [
-        model,
+        f"Rigid blocks, {assessment.model} model, events located and chattering certified.",
+        f"The levels scale the records by factors of {low:.2g} to {high:.2g}. Scaled weak motions differ from strong "
+        "ones in duration and frequency content.",
         f"{polarity[options['polarity']]}; a symmetric object responds equally to both, which count once.",
         "Fragility: lognormal curve by maximum likelihood; motions are independent, unless they were grouped.",
         "An undecided outcome changes if the motion is scaled by less than 3e-6.",

@@ -100,6 +100,16 @@ def format_count(number: float, noun: str) -> str:
     return f"{text} {noun[:-1]}ies" if noun.endswith("y") else f"{text} {noun}s"
 
 
+def format_reasons(reasons: Mapping[str, str]) -> list[str]:
+    """Return one line for each reason, after the names to which it applies, at most three of them."""
+    lines = []
+    for reason in dict.fromkeys(reasons.values()):
+        names = [name for name, other in reasons.items() if other == reason]
+        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+        lines.append(f"{', '.join(names[:3])}{more}: {reason}")
+    return lines
+
+
 def format_within(value: float, bounds: tuple[float, float], format_number: Callable[[float], str]) -> str:
     """Format a number or, if it is out of bounds, the bound after < or >."""
     low, high = bounds

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from rocking.core.progress import note
-from rocking.core.tables import format_count
+from rocking.core.tables import format_count, format_reasons
 from rocking.errors import MotionError, RecordError, escape_braces
 from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
@@ -212,8 +212,8 @@ def load_pairs(
 
 def note_skipped(reasons: Mapping[str, str]) -> None:
     """Report the records that are not used."""
-    for name, reason in reasons.items():
-        note(f"skipped: {escape_braces(f'{name}: {reason}')}")
+    for text in format_reasons(reasons):
+        note(f"skipped: {escape_braces(text)}")
 
 
 def collect_pairs(
@@ -232,9 +232,9 @@ def collect_pairs(
                 group.horizontals if singles and len(group.horizontals) != 2 else group.motions(vertical=vertical)
             )
         except (RecordError, MotionError) as error:
-            reasons[group.station] = str(error)
+            reasons[group.station] = str(error).removeprefix(f"{group.station} ")
         if singles and not vertical and group.vertical is not None:
-            reasons[f"{name_components([group.vertical])[0]}, vertical"] = "vertical components are not used"
+            reasons[f"{name_components([group.vertical])[0]}, vertical"] = "vertical components are not included"
     if not motions:
         reason = escape_braces(next(iter(reasons.values()), "there are no records"))
         raise RecordError(f"no station has a pair of horizontal components: {reason}")

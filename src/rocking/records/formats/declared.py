@@ -464,19 +464,22 @@ class Header:
             },
         }
 
-    def _check_peak(self, acceleration: Floats, index: int, unit: Unit) -> None:
-        """Raise an error if the peak of a component contradicts the stated one, as with another unit."""
+    def find_peak(self, index: int, unit: Unit) -> float:
+        """Return the stated peak of a component, m/s^2, or 0."""
         statements = [*self.statements.get("peaks", ()), *self.statements.get("peak", ())]
         numbers = [[abs(float(number)) for number in re.findall(NUMBER, each.text)] for each in statements]
         if len(numbers) == 1 and "peaks" in self.statements:
             numbers = [[number] for number in numbers[0]]
-        if index >= len(numbers) or not numbers[index]:
-            return
-        stated = float((find_unit(self.find("peak_units")) or unit).to_si(np.array(max(numbers[index]))))
+        largest = max(numbers[index], default=0.0) if index < len(numbers) else 0.0
+        return float((find_unit(self.find("peak_units")) or unit).to_si(np.array(largest)))
+
+    def _check_peak(self, acceleration: Floats, index: int, unit: Unit) -> None:
+        """Raise an error if the peak of a component contradicts the stated one, as with another unit."""
+        stated = self.find_peak(index, unit)
         peaks = [float(np.abs(values).max()) for values in (acceleration, acceleration - acceleration.mean())]
         if stated > 0.0 and all(peak > 0.0 and not 1.0 / _PEAK_RATIO < peak / stated < _PEAK_RATIO for peak in peaks):
             text = f"the header states a peak of {stated:.4g} m/s^2, but the largest value is {peaks[0]:.4g} m/s^2"
-            self._fail(text, statements[0].offset, "check the units, or download the file again")
+            self._fail(text, self.offset, "check the units, or download the file again")
 
 
 def _merge_repeated(times: Floats, values: Floats) -> tuple[Floats, Floats]:
