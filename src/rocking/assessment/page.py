@@ -15,7 +15,7 @@ import numpy as np
 
 from rocking.analysis.levels import compute_block_units
 from rocking.analysis.risk import describe_extrapolated_shares
-from rocking.assessment.chart import Chart
+from rocking.assessment.chart import Chart, draw_bar, draw_intervals
 from rocking.core.constants import STANDARD_GRAVITY, VERSION
 from rocking.core.tables import format_count, write_text
 from rocking.engine.problem import gather_bodies
@@ -101,7 +101,7 @@ def _write_object(assessment: Assessment, k: int) -> str:
             f'<b class="overturns">{outcome}</b>' if outcome == "overturns" else outcome,
             "" if math.isinf(peak) else f"{peak:.2f}",
             f"&gt; {low:.2g}" if math.isinf(high) else f"{low:.2g} to {high:.2g}",
-            Chart.draw_bar((low, min(high, longest)), recorded, longest, has_end=high < math.inf),
+            draw_bar((low, min(high, longest)), recorded, longest, has_end=high < math.inf),
         ]
         rows.append(row + [f"{float(data[rule].values[k, m]):.2f}" for rule in rules])
     statements = "".join(f"<li>{escape(text)}</li>" for text in describe_object(assessment, k))
@@ -291,7 +291,7 @@ def _draw_overview(assessment: Assessment) -> str:
             median, (low, high) = curve.median, curve.median_interval
         rows.append((f"{k + 1}. {item.name}", scale * low, scale * median, scale * high))
         ends += [end for end in rows[-1][1:] if 0.0 < end < math.inf]
-    return Chart.draw_intervals(rows, (min(ends), max(ends)), assessment.measure.label)
+    return draw_intervals(rows, (min(ends), max(ends)), assessment.measure.label)
 
 
 def _draw_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
