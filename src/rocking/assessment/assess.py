@@ -127,8 +127,7 @@ def assess(
     if isinstance(levels, int):
         checks.integer(levels, "levels", OptionError, 2)
     intensity = Measure.parse(measure)
-    if hazard is not None:
-        check_measure(hazard, intensity)
+    check_measure(hazard, intensity)
     named, unusable = index_motions(motions), dict[str, str]()
     failed = dict(blocks.failures) if isinstance(blocks, Inventory) else {}
     is_usable = [_check_intensity(name, motion, intensity, unusable) for name, motion in named.items()]

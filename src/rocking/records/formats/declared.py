@@ -245,16 +245,13 @@ class Header:
     def read_listed(self, name: str, pattern: str) -> None:
         """Read numbers after a line with their count, lines and layout."""
         match = self.read_line(pattern, "a line '... header values follow'")
-        self._read_numbers(name, int(match[1]), int(match[2]), parse_layout(match.string))
+        self.read_numbers(name, int(match[1]), int(match[2]), parse_layout(match.string))
 
-    def read_numbers(self, name: str, count: int, rows: int, layout: str) -> None:
+    def read_numbers(self, name: str, count: int, rows: int, layout: str | Layout | None) -> None:
         """Read this many numbers in this many lines."""
-        self._read_numbers(name, count, rows, Layout.parse(layout))
-
-    def _read_numbers(self, name: str, count: int, rows: int, layout: Layout | None) -> None:
-        start = self.end
+        columns, start = Layout.parse(layout) if isinstance(layout, str) else layout, self.end
         self.skip(rows)
-        self.numbers[name] = read_values(self.source, start, self.end, layout, Count(count, start))
+        self.numbers[name] = read_values(self.source, start, self.end, columns, Count(count, start))
 
     def read_skip(self, *rows: int) -> None:
         """Skip rows of numbers later, as many as leave the stated number of values."""
