@@ -38,7 +38,7 @@ exceeded = np.array([2e-2, 8e-3, 3e-3, 6e-4, 1e-4, 1e-5])  # times a year
 site = rocking.HazardCurve(velocity, exceeded, measure=rocking.Measure("pgv"))
 rate = fragility.annual_rate(site).rate("overturning")
 years = rate.return_period
-print(f"overturns {rate.in_words()}")
+print(f"overturns {rate.describe_period()}")
 
 # %%
 # What the age of the rock says: an intensity that has most likely never come, and whether the hazard

@@ -79,7 +79,7 @@ def drawn(count: int, two_sided: bool) -> Iterator[DataSet]:
     """Draw so many truths, and pass over those whose outcomes are all the same."""
     space = Space.from_bounds(**BOUNDS, two_sided=two_sided)
     rng = np.random.default_rng(two_sided)
-    truths = population.draw_dispersions(space, space.quasi_random(count, rng), rng)
+    truths = population.draw_dispersions(space, space.sample_quasi_randomly(count, rng), rng)
     for seed, truth in enumerate(truths[:, None]):
         motions = tests(rng)
         overturned = outcomes(space, truth, motions, rng)
@@ -98,10 +98,10 @@ def ranks(given: DataSet) -> dict[str, float]:
             p=BOUNDS["p"],
             alpha=BOUNDS["alpha"],
             restitution=BOUNDS["restitution"],
-            two_sided=given.space.two_sided,
+            two_sided=given.space.is_two_sided,
             outlier_probability=LAPSE,
         )
-    values = given.space.parameters_by_name(population.unpack(given.truth)[0])
+    values = given.space.parameters_by_name(population.split_populations(given.truth)[0])
     return {name: float(np.mean(found.draws[name] < values[name][0])) for name in found.estimates}
 
 

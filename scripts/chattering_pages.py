@@ -200,14 +200,14 @@ def records_table():
         found = chattering_episodes(response)
         episodes = found.episodes
         widest = float(np.max(episodes["upper"] - episodes["lower"], initial=0.0))
-        start, end = found.shaking
+        start, end = found.shaking_span
         rows.append(
             (
                 name,
                 f"{motion.pga / STATUE.gravity:.3f}",
                 "overturns" if response.overturned else "stands",
                 len(episodes),
-                int(found.amid_shaking.sum()),
+                int(found.ends_during_shaking.sum()),
                 f"{np.max(episodes['duration'], initial=0.0):.3f}" if len(episodes) else "",
                 ("below 1e-11" if widest < 1e-11 else f"{widest:.0e}") if len(episodes) else "",
                 f"{end - start:.3f}",

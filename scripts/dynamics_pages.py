@@ -48,8 +48,8 @@ def hogan_branches():
     """Branches of the symmetric and of an asymmetric orbit, by the periods that these take."""
     family, found = shaken(HOGAN_BLOCK, HOGAN_RATIO), {}
     for period, (below, above, top) in {1: (5.0, 6.0, 8.0), 3: (0.6, 0.7, 0.8)}.items():
-        whole = next(each for each in stable_orbits(family, below, period, "linear") if each.symmetric)
-        other = next(each for each in stable_orbits(family, above, period, "linear") if not each.symmetric)
+        whole = next(each for each in stable_orbits(family, below, period, "linear") if each.is_symmetric)
+        other = next(each for each in stable_orbits(family, above, period, "linear") if not each.is_symmetric)
         found[period] = (
             dynamics.continue_orbit(whole, family, below, (0.01, top)),
             dynamics.continue_orbit(other, family, above, (0.01, top)),
@@ -81,7 +81,7 @@ def hogan_figure(branches):
     """Branches of both orbits, and the states at the starts of periods on the way to chaos."""
     block, family = HOGAN_BLOCK, shaken(HOGAN_BLOCK, HOGAN_RATIO)
     alpha, restitution = block.alpha, block.restitution
-    start = next(each for each in stable_orbits(family, 4.5, 1, "linear") if each.symmetric).state
+    start = next(each for each in stable_orbits(family, 4.5, 1, "linear") if each.is_symmetric).state
     values, starts = np.linspace(4.5, 7.3, 561), start * [1.0, 1.0001]
     diagram = dynamics.bifurcation_diagram(
         family, values, starts, transient_periods=600, recorded_periods=48, model="linear"

@@ -228,7 +228,7 @@ def few_steps() -> Callable[[int], AbstractContextManager[None]]:
     def limited(steps: int) -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr("rocking.simulation.simulate.count_slices", lambda ground: 1)
-            patched.setattr("rocking.simulation.simulate.SLICE", steps)
+            patched.setattr("rocking.simulation.simulate.STEPS_PER_SLICE", steps)
             yield
 
     return limited

@@ -745,7 +745,8 @@ def maps_of_a_period() -> Iterator[Item]:
 def periodic_orbits() -> Iterator[Item]:
     for kind, (body, motion, _) in PERIODIC.items():
         for orbit in dynamics.periodic_orbits(body, motion, starts=24)[:4]:
-            yield kind, [orbit.state, np.sort(np.abs(orbit.multipliers)), orbit.impacts, orbit.symmetric, orbit.rests]
+            multipliers = np.sort(np.abs(orbit.multipliers))
+            yield kind, [orbit.state, multipliers, orbit.impacts, orbit.is_symmetric, orbit.rests]
             yield "summary", orbit.summary()
 
 
@@ -787,7 +788,7 @@ def basins() -> Iterator[Item]:
 def exponents() -> Iterator[Item]:
     for body, motion, (positions, velocities) in PERIODIC.values():
         found = dynamics.lyapunov_exponents(body, motion, (positions[1], velocities[2]), 40, transient_periods=5)
-        yield "exponents", [found.largest, found.smallest, found.impacts, found.resting, int(found.outcome)]
+        yield "exponents", [found.largest, found.smallest, found.impacts, found.share_at_rest, int(found.outcome)]
         yield "summary", found.summary()
 
 
@@ -812,8 +813,8 @@ def chattering_times() -> Iterator[Item]:
 def chattering_sequences() -> Iterator[Item]:
     for a, omega, eta in ((1.03, 2.0, 0.92), (1.01, 0.8, 0.7), (1.2, 5.0, 0.95)):
         found = chattering.sequence(a, omega, eta)
-        yield "sequence", [found.impacts[:40], found.complete, found.time]
-        yield "table", chattering.asymptotic_table(a, omega, eta) if found.complete else None
+        yield "sequence", [found.impacts[:40], found.is_complete, found.time]
+        yield "table", chattering.asymptotic_table(a, omega, eta) if found.is_complete else None
 
 
 @group(digits=6)
@@ -1059,7 +1060,7 @@ def studies() -> Iterator[Item]:
         study = rocking.create_study(folder / "study", SUITE_BLOCKS, motions, levels=LEVELS, measure="pga")
         with rocking.set_options(threads=1):
             study.run()
-        yield "complete", [study.status.complete, study.status.done, study.status.units, study.status.simulations]
+        yield "complete", [study.status.is_complete, study.status.done, study.status.units, study.status.simulations]
         yield "results", of_dataset(study.results())
         yield "critical", of_dataset(study.critical_scales())
         yield from of_result(study.fragility(limit_states=LIMITS))

@@ -47,7 +47,7 @@ def rocking_block(
     fallen: float = 0.5 * math.pi,
 ) -> Record:
     p, alpha = np.array(p, dtype=float), np.array(alpha, dtype=float)
-    return state.new_record(
+    return state.create_record(
         state.BLOCK,
         stiffness=p * p,
         slenderness=alpha,
@@ -64,7 +64,7 @@ def rocking_block(
 
 def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Record:
     """Something that bounces on one side: u'' = stiffness u - gain (threshold + a), and back with e times the speed."""
-    return state.new_record(
+    return state.create_record(
         state.BLOCK,
         stiffness=stiffness,
         threshold=(threshold, math.inf),
@@ -83,7 +83,7 @@ def rules_for(
     stop: float = math.inf,
     writes_tables: bool = True,
 ) -> Record:
-    return state.new_record(
+    return state.create_record(
         state.SETTINGS,
         nonlinear=nonlinear,
         rest_rule=rest_rule,
@@ -96,7 +96,7 @@ def rules_for(
 
 def state_of(side: int, u: float, v: float, *, piece: int = 0, offset: float = 0.0, **others: float) -> Record:
     """A block on its way: a march goes on from here to the end."""
-    made = state.new_states(1, 10**6)[0]
+    made = state.create_states(1, 10**6)[0]
     for name, value in {"side": side, "u": u, "v": v, "piece": piece, "offset": offset, "peak": u, **others}.items():
         made[name] = value
     return made

@@ -69,7 +69,7 @@ def unseen():
 
 def test_two_sides_by_housners_rule_are_those_of_one_rectangle():
     space = Space.from_bounds((1.0, 8.0), (0.05, 0.5), "housner", two_sided=True)
-    points = space.quasi_random(200, np.random.default_rng(3))
+    points = space.sample_quasi_randomly(200, np.random.default_rng(3))
     blocks, named = space.blocks(points), space.parameters_by_name(points)
     compared = 0
     for k, block in enumerate(blocks):
@@ -86,7 +86,7 @@ def test_two_sides_by_housners_rule_are_those_of_one_rectangle():
     assert compared > 150
     np.testing.assert_allclose(rocking.Blocks(blocks.p, blocks.alpha).restitution, blocks.restitution, rtol=1e-6)
     symmetric = Space.from_bounds(2.0, (0.05, 0.5), "housner", two_sided=False)
-    assert set(symmetric.blocks(symmetric.quasi_random(20, np.random.default_rng(3))).p.ravel()) == {2.0}
+    assert set(symmetric.blocks(symmetric.sample_quasi_randomly(20, np.random.default_rng(3))).p.ravel()) == {2.0}
 
 
 def test_what_a_hidden_block_will_do_is_predicted(found, unseen):
@@ -245,7 +245,7 @@ def test_a_mistaken_argument_is_refused(change, word):
 def test_even_points_fill_the_space_evenly():
     space = Space.from_bounds((1.0, 4.0), (0.1, 0.2), (0.5, 1.0), two_sided=True)
     rng = np.random.default_rng(0)
-    points = space.quasi_random(4096, rng)
+    points = space.sample_quasi_randomly(4096, rng)
     low, high = space.box
     independent = low + rng.random((200_000, 4)) * (high - low)
     inside = independent[space.contains(independent)]
@@ -264,7 +264,7 @@ def test_the_slenderness_of_a_side_is_the_mean_times_or_over_the_root_of_the_rat
 
 def test_a_known_slenderness_leaves_nothing_in_which_the_sides_differ():
     space = Space.from_bounds((1.0, 9.0), 0.2, (0.1, 1.0), two_sided=True)
-    assert not space.two_sided
+    assert not space.is_two_sided
     assert list(space.parameters_by_name(np.log([[3.0, 0.5]]))) == ["p", "restitution"]
     for name, expected in (("p", 3.0), ("alpha", 0.2), ("restitution", 0.5)):
         np.testing.assert_allclose(space.sides(np.log([[3.0, 0.5]]))[name][0], expected, rtol=1e-12)
@@ -275,7 +275,7 @@ def threshold_evidence():
     """Symmetric blocks that overturn where alpha is below a threshold, one threshold for each of 40 tests."""
     space = Space.from_bounds((1.0, 2.0), (0.05, 0.5), (0.5, 0.9), two_sided=False)
     rng = np.random.default_rng(3)
-    points = space.quasi_random(4096, rng)
+    points = space.sample_quasi_randomly(4096, rng)
     thresholds = np.log(np.geomspace(0.08, 0.35, 40))
     fallen = (points[:, 1:2] < thresholds).astype(np.float32)
     observed = np.log(0.17) + 0.1 * rng.standard_normal(40) < thresholds
@@ -296,7 +296,7 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
     drawn = sample_posterior(evidence, 512, 4, np.random.default_rng(0))
     rng = np.random.default_rng(1)
     space = evidence.candidates.space
-    prior = searching.draw_dispersions(space, space.quasi_random(8000, rng), rng)
+    prior = searching.draw_dispersions(space, space.sample_quasi_randomly(8000, rng), rng)
     likelihood = np.exp(evidence.log_likelihoods(prior))
     weights = likelihood / likelihood.sum()
     mean = weights @ prior
@@ -339,7 +339,7 @@ def test_shares_are_sums_over_weighted_candidates(threshold_evidence):
     evidence, _ = threshold_evidence
     rng = np.random.default_rng(6)
     populations = searching.draw_dispersions(evidence.candidates.space, evidence.candidates.points[:50], rng)
-    centre, dispersion = searching.unpack(populations)
+    centre, dispersion = searching.split_populations(populations)
     apart = (evidence.candidates.points - centre[:, None]) / dispersion[:, None]
     weights = np.exp(-0.5 * (apart**2).sum(axis=2) + evidence.candidates.log_weights)
     weights /= weights.sum(axis=1, keepdims=True)
@@ -415,7 +415,7 @@ def test_the_density_is_that_of_what_is_drawn():
     populations = np.array([[0.0, 1.0, 2.0, -2.3, -1.7, -2.9], [0.2, 1.1, 2.1, -2.3, -2.3, -2.3]])
     points = searching.draw_points(populations, 1.5, 40_000, rng)
     few = points[:100, None]
-    centre, dispersion = searching.unpack(populations)
+    centre, dispersion = searching.split_populations(populations)
     parts = norm.pdf(few, centre, 1.5 * dispersion).prod(axis=2)
     np.testing.assert_allclose(
         searching.compute_log_density(populations, 1.5, points[:100]), np.log(parts.mean(axis=1)), atol=1e-9
@@ -577,9 +577,9 @@ def test_what_is_known_is_kept(sure, mirrored):
 
 def test_a_fit_at_a_bound_says_so(coarse):
     found = rocking.calibrate_history(TIMES, released(), alpha=0.2, initial_rotation=0.1, restitution=(0.3, 0.8))
-    assert found.estimates["restitution"].at_bound
+    assert found.estimates["restitution"].is_at_bound
     assert "at its bound" in found.summary()
-    assert not found.estimates["p"].at_bound
+    assert not found.estimates["p"].is_at_bound
 
 
 def test_a_release_to_the_other_side_is_found_too(mirrored):

@@ -224,7 +224,7 @@ def test_episodes_under_a_record_are_those_of_the_response():
     assert np.all(episodes["uplift"] < episodes["proven"])
     assert np.all((episodes["lower"] <= episodes["rest"]) & (episodes["rest"] <= episodes["upper"]))
     assert episodes["impacts"].sum() == len(response.impacts)
-    assert found.amid_shaking.tolist() == [True] * 5 + [False]
+    assert found.ends_during_shaking.tolist() == [True] * 5 + [False]
     # It rests though the ground still shakes.
     assert np.all(np.abs(episodes["ground"]) > 0.1)
 
@@ -232,7 +232,7 @@ def test_episodes_under_a_record_are_those_of_the_response():
 def test_the_share_at_rest_is_the_share_of_instants_at_which_the_block_does_not_move():
     response = rocking.simulate(STATUE, rocking.records.load("ridgecrest-clc-360"))
     found = chattering_episodes(response)
-    start, end = found.shaking
+    start, end = found.shaking_span
     instants = np.linspace(start, end, 400_001)
     still = np.mean((response.rotation(instants) == 0.0) & (response.angular_velocity(instants) == 0.0))
     assert found.share_at_rest == pytest.approx(still, abs=1e-4)
@@ -259,7 +259,7 @@ def test_shaking_ends_when_the_block_has_overturned():
     assert response.overturned
     found = chattering_episodes(response)
     assert len(found.episodes) == 3
-    assert found.shaking[1] <= response.overturn_time
+    assert found.shaking_span[1] <= response.overturn_time
 
 
 @pytest.mark.parametrize(
@@ -276,7 +276,7 @@ def test_rests_that_are_proven_are_episodes_with_shaking_and_without(motion, opt
     found = chattering_episodes(response)
     assert len(found.episodes) == count and np.all(found.episodes["uplift"] == 0.0)
     assert (len(response.sequences) > 0) == (motion is None or "chattering" in options)
-    assert math.isnan(found.share_at_rest) == ("chattering" not in options) and not found.amid_shaking.any()
+    assert math.isnan(found.share_at_rest) == ("chattering" not in options) and not found.ends_during_shaking.any()
     assert ("never passes a threshold" in str(found)) == ("chattering" not in options)
 
 

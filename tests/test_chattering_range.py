@@ -110,7 +110,7 @@ def test_time_and_sequence_have_an_answer_at_every_corner(omega, eta):
     assert 0.0 < sequence.lower <= sequence.time <= sequence.upper < np.pi / omega
     assert sequence.time == pytest.approx(time, rel=1e-9)
     assert not chattering.is_complete(above, omega, eta)
-    assert not chattering.sequence(above, omega, eta).complete
+    assert not chattering.sequence(above, omega, eta).is_complete
 
 
 def test_a_place_where_the_correction_of_an_arc_vanishes_is_no_landing():
@@ -128,8 +128,8 @@ def test_within_rounding_of_the_critical_amplitude_there_is_one_verdict():
             if a <= 1.0:
                 continue
             found, time = chattering.sequence(a, omega, eta), float(chattering.chattering_time(a, omega, eta))
-            assert found.complete == np.isfinite(time)
-            if found.complete:
+            assert found.is_complete == np.isfinite(time)
+            if found.is_complete:
                 assert found.lower <= found.time <= found.upper
                 assert found.time == pytest.approx(time, rel=1e-6)
             judged += 1

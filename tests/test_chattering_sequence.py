@@ -61,14 +61,14 @@ def test_the_bracket_holds_the_rest_of_120_digits(case, tolerance):
 
 def test_incomplete_sequences_end_at_half_a_period():
     sequence = chattering.sequence(1.05, 2.0, 0.92)
-    assert not sequence.complete and np.isnan([sequence.time, sequence.lower, sequence.upper]).all()
+    assert not sequence.is_complete and np.isnan([sequence.time, sequence.lower, sequence.upper]).all()
     assert 0.0 < sequence.impacts["time"][-1] < np.pi / 2.0
     assert len(first_impacts(1.05, 2.0, 0.92, 100)) == sequence.impacts.size
 
 
 def test_no_rocking_at_the_threshold_of_uplift():
     sequence = chattering.sequence(1.0, 2.0, 0.92)
-    assert sequence.complete and sequence.impacts.size == 0 and sequence.time == 0.0
+    assert sequence.is_complete and sequence.impacts.size == 0 and sequence.time == 0.0
 
 
 @pytest.mark.parametrize(("a", "omega", "eta"), [(1.01, 5.0, 0.92), (1.03, 2.0, 0.86)])

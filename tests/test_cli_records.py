@@ -12,7 +12,7 @@ import pytest
 import rocking
 from rocking.cli import main
 from rocking.core.progress import note, notes_for
-from rocking.inputs.notes import motion_notes
+from rocking.inputs.notes import list_motion_notes
 from rocking.motion.scaling import Measure
 from rocking.records.named import expand_record_names
 
@@ -320,7 +320,7 @@ def test_a_step_that_no_record_has_is_noted(run, tmp_path, heading):
 
 
 def test_no_shipped_record_looks_like_a_mistake():
-    noted = {name: motion_notes(rocking.records.load(name)) for name in rocking.records.names()}
+    noted = {name: list_motion_notes(rocking.records.load(name)) for name in rocking.records.names()}
     assert [name for name, notes in noted.items() if notes] == [name for name in noted if name.endswith("-up")]
     assert len(noted) >= 9
 

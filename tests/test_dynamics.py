@@ -15,7 +15,7 @@ G = 9.81
 
 def integrated(body, motion, end, position, velocity):
     """Impact times and speeds, state at the end (None: it chatters), highest position; DOP853 from each impact on."""
-    stiffness, damping, pull, low, high = body.law
+    stiffness, damping, pull, low, high = body.equation
     times, speeds, t, x, v, peak = [], [], 0.0, position, velocity, position
 
     def rates(time, y):
@@ -98,9 +98,9 @@ def test_impacts_are_those_of_an_independent_integration(seeds):
             assert found.position(end) == pytest.approx(last[0], abs=1e-10)
             assert found.velocity(end) == pytest.approx(last[1], abs=1e-9)
             assert found.peak_position == pytest.approx(peak, abs=1e-10) and not math.isnan(peak)
-            two = math.isfinite(body.law.high)
-            ends, between, reached = ends + 1, between + two, reached + (two and peak == body.law.high)
-            assert ("at the stop" in found.summary()) == (two and peak == body.law.high)
+            two = math.isfinite(body.equation.high)
+            ends, between, reached = ends + 1, between + two, reached + (two and peak == body.equation.high)
+            assert ("at the stop" in found.summary()) == (two and peak == body.equation.high)
         impacts += len(known)
     assert impacts > 5 * len(seeds) and ends > len(seeds) // 2
     assert between >= len(seeds) // 5 and len(seeds) // 14 <= reached < between

@@ -124,7 +124,7 @@ def test_a_symmetric_orbit_with_a_large_multiplier_is_followed_to_grazing():
     (start,) = (
         each
         for each in dynamics.periodic_orbits(*family(3.0), starts=256)
-        if each.symmetric and each.impacts == 2.0 and not each.is_stable
+        if each.is_symmetric and each.impacts == 2.0 and not each.is_stable
     )
     branch = dynamics.continue_orbit(start, family, 3.0, (1.5, 6.0))
     assert branch.ends == ("limit of the parameter", "grazing") and len(branch) < 100

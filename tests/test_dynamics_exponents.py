@@ -62,7 +62,7 @@ def test_of_a_block_they_are_those_of_differences_of_its_map(amplitude, model):
 def test_where_every_period_holds_a_rest_they_are_minus_infinity():
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.5)
     found = dynamics.lyapunov_exponents(block, pulses.sine(2.1, 1.5, cycles=1), [0.0, 0.0], 100)
-    assert found.largest == found.smallest == -math.inf and found.resting == 1.0
+    assert found.largest == found.smallest == -math.inf and found.share_at_rest == 1.0
     assert found.outcome in (dynamics.PeriodOutcome.MOVES, dynamics.PeriodOutcome.RESTS)
     assert "comes to rest in 100 %" in found.summary()
     still = dynamics.lyapunov_exponents(block, pulses.sine(1.9, 0.5, cycles=1), [0.01, 0.0], 100)
@@ -112,7 +112,7 @@ def test_at_a_rest_where_impacts_lose_nothing_they_are_zero_as_the_multipliers_a
     (orbit,) = dynamics.periodic_orbits(block, motion, starts=[[0.0, 0.0]])
     found = dynamics.lyapunov_exponents(block, motion, [0.0, 0.0], 100)
     assert orbit.rests and np.log(np.abs(orbit.multipliers)).tolist() == [found.largest, found.smallest] == [0.0, 0.0]
-    assert found.resting == 1.0 and "rest" not in found.summary()
+    assert found.share_at_rest == 1.0 and "rest" not in found.summary()
 
 
 def test_they_are_those_of_a_map_whose_rests_are_decided_as_asked():
@@ -120,8 +120,8 @@ def test_they_are_those_of_a_map_whose_rests_are_decided_as_asked():
     motion = pulses.sine(2.0, 1.2, cycles=1)
     free = dynamics.lyapunov_exponents(block, motion, [0.02, 0.1], 30, chattering="velocity=1e-9")
     stopped = dynamics.lyapunov_exponents(block, motion, [0.02, 0.1], 30, chattering="velocity=10")
-    assert math.isfinite(free.largest) and free.resting == 0.0
-    assert stopped.largest == -math.inf and stopped.resting > 0.0
+    assert math.isfinite(free.largest) and free.share_at_rest == 0.0
+    assert stopped.largest == -math.inf and stopped.share_at_rest > 0.0
 
 
 def test_they_are_those_of_the_model_that_is_asked_for():

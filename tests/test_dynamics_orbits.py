@@ -60,7 +60,7 @@ def test_areas_shrink_by_restitution_and_damping_alone(found):
     judged = 0
     for name, orbits in found.items():
         body, _, _ = CASES[name]
-        damping = body.law.damping if not isinstance(body, Block) else 0.0
+        damping = body.equation.damping if not isinstance(body, Block) else 0.0
         e = body.restitution
         for orbit in orbits:
             if not orbit.rests and abs(orbit.multipliers[0]) < 1e3:
@@ -76,13 +76,13 @@ def test_a_symmetric_orbit_is_its_mirror_image_half_a_period_later(found):
         for orbit in orbits:
             times = orbit.duration * np.linspace(0.01, 0.49, 7)
             now, later = (orbit.response.states(times + shift)[:, 0] for shift in (0.0, 0.5 * orbit.duration))
-            assert orbit.symmetric == bool(np.all(np.abs(now + later) < 1e-7))
-            symmetric, asymmetric = symmetric + orbit.symmetric, asymmetric + (not orbit.symmetric)
+            assert orbit.is_symmetric == bool(np.all(np.abs(now + later) < 1e-7))
+            symmetric, asymmetric = symmetric + orbit.is_symmetric, asymmetric + (not orbit.is_symmetric)
     assert symmetric >= 6 and asymmetric >= 10
     # Where there is one side, or another restitution on each, no orbit is.
-    assert not any(orbit.symmetric for orbit in found["ball"])
+    assert not any(orbit.is_symmetric for orbit in found["ball"])
     leaning = Block.from_parameters(p=2.0, alpha=0.2, restitution=(0.8, 0.82))
-    assert not any(each.symmetric for each in dynamics.periodic_orbits(leaning, pulses.sine(2.4, 1.2, cycles=1)))
+    assert not any(each.is_symmetric for each in dynamics.periodic_orbits(leaning, pulses.sine(2.4, 1.2, cycles=1)))
 
 
 def test_a_stable_orbit_attracts_and_an_unstable_one_repels(found):
@@ -278,7 +278,7 @@ def test_a_doubled_branch_ends_at_the_flip_and_an_asymmetric_one_where_symmetry_
         return BLOCK, pulses.sine(amplitude, 1.2, cycles=1)
 
     orbits = dynamics.periodic_orbits(*rocked(3.15), period=3, model="linear")
-    one_sided = [each for each in orbits if each.period == 3 and not each.symmetric and each.is_stable]
+    one_sided = [each for each in orbits if each.period == 3 and not each.is_symmetric and each.is_stable]
     branch = dynamics.continue_orbit(one_sided[0], rocked, 3.15, (2.9, 3.2))
     assert branch.ends[0] == "symmetry breaking"
     assert branch.bifurcations[0].value == pytest.approx(breaking, abs=1e-9)

@@ -170,8 +170,8 @@ def test_branches_of_a_slender_block_bifurcate_where_closed_forms_say(ratio, res
         found = dynamics.periodic_orbits(*family(level), period=m, model="linear")
         return [each for each in found if each.is_stable and each.period == m and each.impacts == 2.0]
 
-    (whole,) = (each for each in orbits_at(below) if each.symmetric)
-    one_sided = next(each for each in orbits_at(level) if not each.symmetric)
+    (whole,) = (each for each in orbits_at(below) if each.is_symmetric)
+    one_sided = next(each for each in orbits_at(level) if not each.is_symmetric)
     symmetric = dynamics.continue_orbit(whole, family, below, (0.5 * fold, 1.05 * breaking), step=0.2)
     kinds = {each.kind: each.value for each in symmetric.bifurcations}
     assert kinds["fold"] == pytest.approx(fold, rel=1e-9)

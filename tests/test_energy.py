@@ -10,7 +10,7 @@ from scipy.integrate import quad
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, simulate
 from rocking.errors import OptionError
-from rocking.response.figure import compute_boundary, compute_course
+from rocking.response.figure import compute_boundary, sample_interval
 
 COLUMN = Block(width=0.4, height=2.0, mass=2000.0)
 BODIES = {
@@ -147,7 +147,7 @@ def _outward(energy):
 def test_a_course_jumps_at_impacts_and_nowhere_else():
     record = rocking.records.load("ridgecrest-clc-090")
     response = simulate(BODIES["two sides"], record.scaled_to(4.0, "pga"))
-    course = compute_course(response, 230.0, 236.0)
+    course = sample_interval(response, 230.0, 236.0)
     impacts = response.impacts[(response.impacts["time"] >= 230.0) & (response.impacts["time"] <= 236.0)]
     assert len(course.impact_rows) == len(impacts) > 30
     np.testing.assert_array_equal(course.time[course.impact_rows], impacts["time"])
@@ -171,7 +171,7 @@ def test_a_phase_plane_counts_in_radians_where_a_side_has_no_balance(model):
     response = simulate(body, rocking.pulses.one_sine(4.5, 1.0), model=model)
     balance = response.balance[0]
     assert math.isfinite(balance) and response.balance[1] == math.inf
-    course = compute_course(response, 0.0, response.duration)
+    course = sample_interval(response, 0.0, response.duration)
     smooth = np.delete(np.arange(len(course.time)), np.union1d(course.impact_rows, course.impact_rows + 1))
     times = course.time[smooth]
     np.testing.assert_array_equal(course.rotation[smooth], response.rotation(times))

@@ -456,8 +456,8 @@ def test_a_block_of_weight_zero_is_none_of_the_data():
     both = fragility([a, b], motions, measure="pga_ratio", weights=[1.0, 0.0])
     alone = fragility(a, motions, measure="pga_ratio")
     one, other = both.curves[0], alone.curves[0]
-    assert both.range == alone.range
-    assert one.independent and one.goodness.degrees_of_freedom == other.goodness.degrees_of_freedom
+    assert both.intensity_range == alone.intensity_range
+    assert one.is_independent and one.goodness.degrees_of_freedom == other.goodness.degrees_of_freedom
     assert one.goodness.p_value == pytest.approx(other.goodness.p_value, rel=1e-9)
     assert one.trials.sum() == other.trials.sum() == len(motions)
     assert one.median_interval == pytest.approx(other.median_interval, rel=1e-9)
@@ -503,8 +503,8 @@ def test_outcomes_of_one_cluster_at_one_intensity_are_no_independent_trials():
     levels, exceeded = [1.0, 2.0, 3.0, 4.0, 5.0], [2, 20, 50, 70, 100]
     independent = fit_fragility(levels, exceeded, trials=100).curves[0]
     together = fit_fragility(levels, exceeded, trials=100, clusters=range(5)).curves[0]
-    assert independent.independent
-    assert not together.independent
+    assert independent.is_independent
+    assert not together.is_independent
     assert math.isfinite(independent.goodness.p_value)
     assert math.isnan(together.goodness.p_value)
     widths = [one.median_interval[1] / one.median_interval[0] for one in (independent, together)]
@@ -533,7 +533,7 @@ def test_multiples_of_a_motion_are_one_cluster_however_they_are_given():
     cloud = fragility(BLOCK, [-motion if k % 2 else motion for k, motion in enumerate(scaled)])
     curve = cloud.curves[0]
     assert curve.clusters == stripes.clusters == len(PULSES)
-    assert not curve.independent
+    assert not curve.is_independent
     assert curve.median_interval == pytest.approx(stripes.median_interval, rel=1e-6)
     assert any("belong together" in note for note in cloud.notes)
     # Twice the same data say no more: only the count of trials differs.
@@ -580,7 +580,7 @@ def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_o
     longer = rocking.pulses.one_sine(1.0, 1.5)
     given = [pulse, longer, up, pulse.scaled(-3.0), up.scaled(-0.3), down, longer.scaled(1e-6), up.scaled(0.3)]
     assert assign_families(given).tolist() == [0, 1, 2, 0, 2, 3, 1, 2]
-    assert assign_families(given, reversed_too=False).tolist() == [0, 1, 2, 3, 4, 5, 1, 2]
+    assert assign_families(given, include_reversed=False).tolist() == [0, 1, 2, 3, 4, 5, 1, 2]
 
 
 @pytest.mark.parametrize("missing", [None, "", math.nan, np.nan])
@@ -588,7 +588,7 @@ def test_outcomes_without_a_label_are_on_their_own(missing):
     x, y = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [0, 1, 0, 1, 0, 1]
     own = fit_fragility(x, y, clusters=[missing] * 6).curves[0]
     assert own.clusters == 6
-    assert own.independent
+    assert own.is_independent
     assert fit_fragility(x, y, clusters=["a", missing, "a", missing, 3, 3.0]).curves[0].clusters == 4
 
 

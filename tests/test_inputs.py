@@ -11,7 +11,7 @@ from rocking.explorer.inputs import read_case
 from rocking.explorer.parameters import PARAMETERS
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.bodies import create_block, write_block_call
-from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, INPUTS, SUPPORTS
+from rocking.inputs.declared import BLOCK_DESCRIPTIONS, BLOCK_INPUTS, INPUTS, SUPPORT_INPUTS
 from rocking.studies import read_study
 from rocking.studies.file import SCHEMA
 
@@ -52,8 +52,8 @@ def in_a_study(tmp_path, table):
 @pytest.mark.parametrize(("texts", "block"), BLOCKS)
 def test_a_block_is_the_same_from_a_command_a_page_a_file_and_a_table(tmp_path, texts, block):
     without_mass = {name: text for name, text in texts.items() if name != "mass"}
-    assert sides(BlockOptions(**without_mass).block()) == sides(block)
-    body = RestrainedOptions(**texts).body()
+    assert sides(BlockOptions(**without_mass).create_block()) == sides(block)
+    body = RestrainedOptions(**texts).create_body()
     assert (sides(body), body.mass) == (sides(block), block.mass)
     if {*without_mass} <= PARAMETERS.keys():
         case = read_case({**without_mass, "motion": "none", "duration": "1"}, UploadStore())
@@ -86,9 +86,9 @@ def test_a_file_makes_a_block_of_every_combination(tmp_path):
 
 def test_every_input_of_a_body_is_an_option_and_a_key_and_every_other_has_an_option():
     options = {each for kind in (RestrainedOptions, MotionOptions, StartOptions) for each in kind.__dataclass_fields__}
-    assert {*BLOCK, *SUPPORTS} <= options & INPUTS.keys()
+    assert {*BLOCK_INPUTS, *SUPPORT_INPUTS} <= options & INPUTS.keys()
     keys = {*SCHEMA["blocks"]}
-    assert {*BLOCK} <= keys and all(name in keys or f"{name}s" in keys for name in SUPPORTS)
+    assert {*BLOCK_INPUTS} <= keys and all(name in keys or f"{name}s" in keys for name in SUPPORT_INPUTS)
     described = {name for name, each in INPUTS.items() if each.help}
     assert described - {"model", "chattering", "friction"} == options & INPUTS.keys()  # these have options of their own
 

@@ -11,7 +11,7 @@ from oracles.taylor import System, after, coefficients, mp
 from rocking.kernels import arc
 from rocking.kernels.arc import converged_order, evaluate_series, expand_arc, linear_order, step_length
 from rocking.kernels.series import write_linear_coefficients
-from rocking.kernels.state import ORDER, Record, new_scratch
+from rocking.kernels.state import ORDER, Record, create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -63,7 +63,7 @@ def linear_series(
     u: float, v: float, lam: float, gain: float, threshold: float, A: np.ndarray, h: float
 ) -> tuple[np.ndarray, int, float]:
     """Series, its order and the step, as for an arc of a response."""
-    scratch, start = new_scratch(), state_of(0, u, v)
+    scratch, start = create_scratch(), state_of(0, u, v)
     scratch["ground"][: len(A)] = A
     degree = len(A) - 1
     order = linear_order(lam, h) if degree <= 1 else ORDER
@@ -80,7 +80,7 @@ def linear_series(
 def nonlinear_series(
     u: float, v: float, lam: float, alpha: float, A: np.ndarray, h: float
 ) -> tuple[Record, int, float]:
-    scratch, p = new_scratch(), lam**0.5
+    scratch, p = create_scratch(), lam**0.5
     scratch["ground"][: len(A)] = A
     scratch["weight"][0] = 1.0
     block = rocking_block((p, p), (alpha, alpha), nonlinear=True)
@@ -178,7 +178,7 @@ def test_an_arc_takes_the_motion_about_its_start_and_in_the_frame_of_its_side(
     row, offset, h = 0.1 * (-0.5) ** np.arange(columns), 0.3, 0.02
     alpha, sign = 0.2 + 0.1 * side, 1.0 - 2.0 * side
     block = rocking_block((2.0, 3.0), (0.2, 0.3), nonlinear=nonlinear)
-    scratch, start = new_scratch(), state_of(side, 0.05, 0.1, piece=1, offset=offset)
+    scratch, start = create_scratch(), state_of(side, 0.05, 0.1, piece=1, offset=offset)
     ground = in_units_of_g([0.0, 1.0, 2.0], [9.0 + 0.0 * row, row])
     order, step, _ = expand_arc(ground, block, rules_for(nonlinear=nonlinear), scratch, start, h)
     assert step == h

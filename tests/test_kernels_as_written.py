@@ -157,7 +157,7 @@ def oscillators(model: str) -> Numbers:
         exponents = dynamics.lyapunov_exponents(
             body, pulses.sine(12.0, 2.0, cycles=1), (0.03, 0.1), 20, transient_periods=0
         )
-        yield from (exponents.largest, exponents.smallest, exponents.resting)
+        yield from (exponents.largest, exponents.smallest, exponents.share_at_rest)
 
 
 def yielding(model: str) -> Numbers:
@@ -220,7 +220,7 @@ def closed(model: str) -> Numbers:
     yield from chattering.chattering_time([1.02, 1.05], [0.5, 2.0], [0.5, 0.9], method="semianalytical")
     for amplitude, omega, eta in ((1.03, 1.0, 0.7), (1.5, 3.0, 0.9), (1.0 + 1e-7, 0.2, 0.3)):
         found = chattering.sequence(amplitude, omega, eta)
-        yield from (found.complete, found.time, found.lower, found.upper, len(found.impacts))
+        yield from (found.is_complete, found.time, found.lower, found.upper, len(found.impacts))
     for excess in (1e-2, 1e-3, 1e-4, 1e-5):
         yield from chattering.chattering_time(1.0 + excess * np.linspace(1.0, 1.5, 33), 0.5, 0.7)
     critical = float(chattering.critical_amplitude(2.0, 0.7))

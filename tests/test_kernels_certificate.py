@@ -23,10 +23,10 @@ from oracles.problem import Problem
 
 from rocking.kernels.arc import restoring_acceleration, write_weight_series
 from rocking.kernels.certificate import (
-    Bounds,
     Horizon,
     MotionBounds,
     Proof,
+    RestoringBounds,
     bound_arc,
     bound_motion,
     bound_side,
@@ -37,7 +37,7 @@ from rocking.kernels.certificate import (
     widen_for_error,
 )
 from rocking.kernels.ground import AccelerationBounds, bound_window, vertical_component, write_local_series
-from rocking.kernels.state import new_scratch
+from rocking.kernels.state import create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -96,7 +96,7 @@ def proof(
 ) -> Proof:
     rules = rules_for(nonlinear=problem.model == "nonlinear", tolerance=tolerance)
     start = state_of(side, 0.0, v, piece=piece, offset=offset)
-    return prove_rest(ground_of(problem, error), block_of(problem), rules, new_scratch(), start)
+    return prove_rest(ground_of(problem, error), block_of(problem), rules, create_scratch(), start)
 
 
 @long_uncompiled
@@ -105,7 +105,7 @@ def proof(
 def test_bounds_on_an_arc_hold_its_duration_and_its_impact(problem: Problem, side: int, share: float) -> None:
     v, i = speed(problem, side, 0.0, share), 1 - 2 * side
     window = 4.0 * v / problem.restoring(0.0, i)
-    seen = bound_window(ground_of(problem), 0, 0.0, window, ANYTHING, new_scratch()["ground"])
+    seen = bound_window(ground_of(problem), 0, 0.0, window, ANYTHING, create_scratch()["ground"])
     rules = rules_for(nonlinear=problem.model == "nonlinear")
     change, shortest, longest = bound_arc(v, bound_side(block_of(problem), rules, side, MotionBounds(seen, STILL)))
     assume(longest <= window)
@@ -200,20 +200,20 @@ def test_wider_bounds_never_give_a_narrower_bracket(
     bracket: tuple[float, list[list[float]], tuple[float, float]], side: int, which: int, more: float
 ) -> None:
     v, sides, e = bracket
-    lower, upper = bracket_geometrically(v, Bounds(*sides[0]), Bounds(*sides[1]), e, e)
+    lower, upper = bracket_geometrically(v, RestoringBounds(*sides[0]), RestoringBounds(*sides[1]), e, e)
     sides[side][which] *= 1.0 - 0.5 * more if which == 1 else 1.0 + more
-    wider_lower, wider_upper = bracket_geometrically(v, Bounds(*sides[0]), Bounds(*sides[1]), e, e)
+    wider_lower, wider_upper = bracket_geometrically(v, RestoringBounds(*sides[0]), RestoringBounds(*sides[1]), e, e)
     assert math.isnan(wider_upper) or wider_lower <= lower * (1.0 + 1e-14) <= upper <= wider_upper * (1.0 + 1e-14)
 
 
 def test_a_constant_motion_of_little_stiffness_leaves_only_rounding_between_the_bounds() -> None:
-    bounds = Bounds(1e-20, 3.0, 3.0, 0.0, 0.0, 0.0)
+    bounds = RestoringBounds(1e-20, 3.0, 3.0, 0.0, 0.0, 0.0)
     lower, upper = bracket_geometrically(0.6, bounds, bounds, (0.5, 0.8), (0.5, 0.8))
     assert lower == pytest.approx(0.4 * 1.5 / 0.6, rel=1e-13)
     assert lower < 0.4 * 1.5 / 0.6 < upper < lower * (1.0 + 1e-13)
 
 
-STEADY = Bounds(1.0, 2.0, 2.0, 0.0, 0.0, 0.0)
+STEADY = RestoringBounds(1.0, 2.0, 2.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -232,7 +232,7 @@ STEADY = Bounds(1.0, 2.0, 2.0, 0.0, 0.0, 0.0)
 def test_where_a_condition_fails_nothing_is_proven(
     v: float, first: tuple[float, ...], second: tuple[float, ...], e: float
 ) -> None:
-    assert np.all(np.isnan(bracket_geometrically(v, Bounds(*first), Bounds(*second), (e, e), (e, e))))
+    assert np.all(np.isnan(bracket_geometrically(v, RestoringBounds(*first), RestoringBounds(*second), (e, e), (e, e))))
     assert np.all(np.isfinite(bracket_geometrically(0.1, STEADY, STEADY, (0.5, 0.5), (0.5, 0.5))))
 
 
@@ -260,7 +260,7 @@ def test_a_jump_just_past_the_end_of_a_window_is_not_ruled_out() -> None:
 @pytest.mark.parametrize("error", [0.0, 1e-3])
 def test_a_disturbed_motion_may_be_off_by_its_error_at_any_time(error: float) -> None:
     problem = Problem("linear", (2.0, 2.0), (0.2, 0.2), (0.5, 0.5), np.array([0.0, 9.0]), np.array([[0.5, 0.1]]))
-    seen = bound_window(ground_of(problem), 0, 1.0, 2.0, ANYTHING, new_scratch()["ground"])
+    seen = bound_window(ground_of(problem), 0, 1.0, 2.0, ANYTHING, create_scratch()["ground"])
     wider = widen_for_error(seen, error)
     assert (wider.low, wider.high) == (seen.low - error, seen.high + error)
     assert (wider.slope, wider.jumps) == (seen.slope, seen.jumps + 2.0 * error)
@@ -306,11 +306,11 @@ def test_the_restoring_acceleration_stays_within_its_parabola_s_error(
     block, rules, scratch = (
         rocking_block((2.0, 3.0), (alpha, 0.9 * alpha), nonlinear=model == "nonlinear"),
         rules_for(nonlinear=model == "nonlinear"),
-        new_scratch(),
+        create_scratch(),
     )
     motion = MotionBounds(
         *(
-            widen_for_error(bound_window(component, 0, 0.0, window, ANYTHING, new_scratch()["ground"]), error)
+            widen_for_error(bound_window(component, 0, 0.0, window, ANYTHING, create_scratch()["ground"]), error)
             for component in (ground, vertical_component(ground))
         )
     )
@@ -336,7 +336,7 @@ def test_the_restoring_acceleration_stays_within_its_parabola_s_error(
 
 
 def test_resistance_takes_from_and_adds_to_the_restoring_acceleration() -> None:
-    assert widen_for_drag(Bounds(1.0, 2.0, 3.0, 0.5, 0.25, 0.125), 0.1) == (1.0, 1.9, 3.1, 0.7, 0.25, 0.325)
+    assert widen_for_drag(RestoringBounds(1.0, 2.0, 3.0, 0.5, 0.25, 0.125), 0.1) == (1.0, 1.9, 3.1, 0.7, 0.25, 0.325)
 
 
 @pytest.mark.parametrize("weight", [-0.5, 0.0, 0.5])
@@ -344,5 +344,5 @@ def test_resistance_takes_from_and_adds_to_the_restoring_acceleration() -> None:
 def test_a_motion_passes_the_threshold_where_the_greatest_weight_lets_it(weight: float, share: float) -> None:
     strong = share * 0.15 * (1.0 + weight)
     ground = in_units_of_g([0.0, 9.0], [[strong, 0.0]], 0.0, [[weight, 0.0]])
-    found = bound_motion(ground, rocking_block(), state_of(0, 0.0, 1e-3), 0.1, new_scratch())
+    found = bound_motion(ground, rocking_block(), state_of(0, 0.0, 1e-3), 0.1, create_scratch())
     assert math.isnan(found.horizontal.high) == (share > 1.0)

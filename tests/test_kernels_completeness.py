@@ -9,7 +9,7 @@ from kernel_records import long_uncompiled, rocking_block, state_of
 import rocking
 from rocking.engine.problem import prepare_ground
 from rocking.kernels.ground import join_grounds
-from rocking.kernels.state import AT_REST, new_records, new_scratch
+from rocking.kernels.state import AT_REST, create_records, create_scratch
 from rocking.kernels.uplift import write_completeness
 from rocking.motion.motion import find_exceedances
 
@@ -20,11 +20,11 @@ def is_complete(motion: rocking.Motion, thresholds: Pair, rest: float, *, uplift
     block = rocking_block()
     block["threshold"] = thresholds
     state = state_of(AT_REST, 0.0, 0.0, rests=rests, first_uplift=uplift, first_rest=rest)
-    blocks, states = new_records(1, block.dtype), new_records(1, state.dtype)
+    blocks, states = create_records(1, block.dtype), create_records(1, state.dtype)
     blocks[0], states[0] = block, state
     complete = np.zeros(1, dtype=bool)
     grounds, first = join_grounds([prepare_ground(motion, 1.0)]), np.zeros(1, dtype=np.int64)
-    write_completeness(grounds, first, np.ones(1), blocks, states, new_scratch(), complete)
+    write_completeness(grounds, first, np.ones(1), blocks, states, create_scratch(), complete)
     return bool(complete[0])
 
 

@@ -13,7 +13,7 @@ from oracles.exact import exact, polynomial
 from rocking.kernels.adjoint import add_moments
 from rocking.kernels.arc import significant_degree
 from rocking.kernels.ground import (
-    STRETCH,
+    PIECES_PER_STRETCH,
     Ground,
     acceleration,
     acceleration_rate,
@@ -27,7 +27,7 @@ from rocking.kernels.ground import (
     write_local_series,
 )
 from rocking.kernels.ground import build_ground as laid_out
-from rocking.kernels.state import new_scratch
+from rocking.kernels.state import create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -38,7 +38,7 @@ quick = settings(deadline=None, max_examples=50)
 
 
 def work() -> np.ndarray:
-    return new_scratch()["ground"]
+    return create_scratch()["ground"]
 
 
 rows = st.lists(numbers(-3.0, 3.0), min_size=1, max_size=14)
@@ -203,13 +203,17 @@ def piece_by_piece(ground: Ground, piece: int, offset: float, window: float) -> 
 
 @quick
 @given(
-    st.integers(0, 2**32 - 1), st.integers(2, 4), st.integers(0, 5 * STRETCH), st.floats(0.0, 0.99), st.floats(0.0, 1.2)
+    st.integers(0, 2**32 - 1),
+    st.integers(2, 4),
+    st.integers(0, 5 * PIECES_PER_STRETCH),
+    st.floats(0.0, 0.99),
+    st.floats(0.0, 1.2),
 )
 def test_bounds_over_whole_stretches_are_those_of_their_pieces(
     seed: int, columns: int, piece: int, share: float, part: float
 ) -> None:
     random = np.random.default_rng(seed)
-    count = 5 * STRETCH + 3
+    count = 5 * PIECES_PER_STRETCH + 3
     widths = random.uniform(0.01, 1.0, count)
     ground = in_units_of_g(np.cumsum([0.0, *widths]), random.normal(size=(count, columns)) * random.random((count, 1)))
     offset = share * float(ground.pieces[piece, 1]) * (seed % 2)
@@ -219,10 +223,10 @@ def test_bounds_over_whole_stretches_are_those_of_their_pieces(
 
 
 def test_a_window_over_too_many_stretches_has_no_bounds() -> None:
-    count = 200 * STRETCH
+    count = 200 * PIECES_PER_STRETCH
     ground = in_units_of_g(np.arange(count + 1.0), np.zeros((count, 2)))
-    assert np.all(np.isfinite(bound_window(ground, 0, 0.0, 100.0 * STRETCH, ANYTHING, work())))
-    assert np.all(np.isnan(bound_window(ground, 0, 0.0, 150.0 * STRETCH, ANYTHING, work())))
+    assert np.all(np.isfinite(bound_window(ground, 0, 0.0, 100.0 * PIECES_PER_STRETCH, ANYTHING, work())))
+    assert np.all(np.isnan(bound_window(ground, 0, 0.0, 150.0 * PIECES_PER_STRETCH, ANYTHING, work())))
 
 
 @long_uncompiled
@@ -243,13 +247,13 @@ def test_no_piece_that_passes_the_threshold_is_passed_over(
 
 
 def test_stretches_without_anything_are_passed_over() -> None:
-    count = 10 * STRETCH
+    count = 10 * PIECES_PER_STRETCH
     coefficients = np.full((count, 2), [0.1, 0.0])
-    coefficients[7 * STRETCH + 5, 0] = -0.5
+    coefficients[7 * PIECES_PER_STRETCH + 5, 0] = -0.5
     ground = in_units_of_g(np.arange(count + 1.0), coefficients)
-    assert next_piece_beyond(ground, 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * STRETCH
-    assert next_piece_beyond(ground, 7 * STRETCH + 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * STRETCH + 3
-    assert next_piece_beyond(ground, 8 * STRETCH, (-0.2, 0.2), (0.0, 0.0)) == count
+    assert next_piece_beyond(ground, 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * PIECES_PER_STRETCH
+    assert next_piece_beyond(ground, 7 * PIECES_PER_STRETCH + 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * PIECES_PER_STRETCH + 3
+    assert next_piece_beyond(ground, 8 * PIECES_PER_STRETCH, (-0.2, 0.2), (0.0, 0.0)) == count
     assert next_piece_beyond(ground, 3, (-0.6, 0.2), (0.0, 0.0)) == count
     assert next_piece_beyond(ground, 3, (-0.6, 0.05), (0.0, 0.0)) == 3
 

@@ -12,7 +12,7 @@ from oracles.exact import exact, first_above, polynomial, turning_points
 
 from rocking.kernels.arc import expand_arc
 from rocking.kernels.events import advance_to_event, apply_impact
-from rocking.kernels.state import StepOutcome, new_scratch
+from rocking.kernels.state import StepOutcome, create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -34,7 +34,7 @@ def series(draw: st.DrawFn) -> np.ndarray:
 
 
 def follow(c: np.ndarray, h: float) -> tuple[int, float, float, float, float, float]:
-    scratch = new_scratch()
+    scratch = create_scratch()
     scratch["rotation"][: len(c)] = c
     outcome, time, u, v, top, height = advance_to_event(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, QUARTER_TURN)
     return outcome, time, u, v, top, height
@@ -124,7 +124,7 @@ def test_a_fall_is_where_the_rotation_first_reaches_the_limit() -> None:
     @given(series(), st.floats(0.1, 1.5), st.floats(0.2, 3.0))
     def judge(c: np.ndarray, h: float, share: float) -> None:
         nonlocal judged
-        scratch, fallen = new_scratch(), max(share, 1.01 * float(c[0]))
+        scratch, fallen = create_scratch(), max(share, 1.01 * float(c[0]))
         scratch["rotation"][: len(c)] = c
         end = advance_to_event(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, fallen)
         free = advance_to_event(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, math.inf)
@@ -155,7 +155,7 @@ def test_a_step_after_an_impact_is_sized_by_the_arc_under_weak_and_violent_motio
     """The step reaches beyond the impact where the motion presses the block down, else to 1/p."""
     row = np.zeros(columns)
     row[0] = strength
-    ground, scratch = in_units_of_g([0.0, 9.0], [row]), new_scratch()
+    ground, scratch = in_units_of_g([0.0, 9.0], [row]), create_scratch()
     block, rules = rocking_block(alpha=(0.2, 0.2), nonlinear=nonlinear), rules_for(nonlinear=nonlinear)
     start = state_of(PLUS, 0.0, 1e-3)
     order, h, degree = expand_arc(ground, block, rules, scratch, start, 9.0)

@@ -14,7 +14,7 @@ from oracles.taylor import System, after
 from rocking.kernels import state
 from rocking.kernels.arc import evaluate_series, expand_arc
 from rocking.kernels.ground import LENGTH, Ground, join_grounds
-from rocking.kernels.lane_steps import WIDTH, step_linear, step_nonlinear, step_weighted
+from rocking.kernels.lane_steps import LANE_COUNT, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.lanes import (
     MAX_SUBSTEP,
     MAX_WEIGHTED_SUBSTEP,
@@ -27,7 +27,7 @@ from rocking.kernels.lanes import (
     write_lane,
 )
 from rocking.kernels.series import ValueAndSlope
-from rocking.kernels.state import Record, Records, new_scratch
+from rocking.kernels.state import Record, Records, create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -102,7 +102,7 @@ def stepped(
     )
     before = states.copy()
     states["piece"] = 1
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         if lane < count:
             fill_lane(pool, rules_for(nonlinear=way.nonlinear), lane, lane)
         else:
@@ -124,9 +124,9 @@ def stepped(
 
 def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: float = 1.0) -> tuple[Records, Records]:
     """A group of blocks in motion: steps from next to nothing to one over p, rotations and speeds of all sizes."""
-    blocks, states = state.new_records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
-    width = 10.0 ** random.uniform(-9.0, -1.4 if nonlinear else 0.0, WIDTH)
-    for k in range(WIDTH):
+    blocks, states = state.create_records(LANE_COUNT, state.BLOCK), state.create_states(LANE_COUNT, 0)
+    width = 10.0 ** random.uniform(-9.0, -1.4 if nonlinear else 0.0, LANE_COUNT)
+    for k in range(LANE_COUNT):
         p, alpha = width[k] / h, 10.0 ** random.uniform(-2.0, 0.0)
         block = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
         if not nonlinear:
@@ -164,7 +164,7 @@ def test_a_quiet_linear_step_is_exact(stiffness: float, late: float, rounds: flo
     for _ in range(math.ceil(rounds)):
         h = 10.0 ** random.uniform(-3.0, -1.0)
         row = (random.normal() * 0.1, random.normal() * 0.1 / h)
-        for step in stepped(*drawn(random, False, h, stiffness), row, h, late=late * h)[: int(rounds * WIDTH)]:
+        for step in stepped(*drawn(random, False, h, stiffness), row, h, late=late * h)[: int(rounds * LANE_COUNT)]:
             if not step.quiet:
                 assert step.start["u"] == step.end["u"]
                 assert step.start["v"] == step.end["v"]
@@ -187,7 +187,7 @@ def test_a_quiet_linear_step_is_exact(stiffness: float, late: float, rounds: flo
 @pytest.mark.parametrize("rounds", [5, pytest.param(25, marks=pytest.mark.thorough)])
 def test_a_quiet_nonlinear_step_is_the_full_series(substeps: int, late: float, rounds: int) -> None:
     """To a few units in the last place of the largest of rotation, way, and a fraction of the slenderness."""
-    random, quiet, scratch = np.random.default_rng(2), 0, new_scratch()
+    random, quiet, scratch = np.random.default_rng(2), 0, create_scratch()
     rules = rules_for(nonlinear=True)
     for _ in range(rounds):
         h = 10.0 ** random.uniform(-3.0, -1.0)
@@ -226,8 +226,8 @@ def weighted_cases(
     weight = (random.uniform(low, high), random.normal() * swing)
     heaviest = max(1.0, abs(weight[0]), abs(sum(weight)))
     longest = substeps * (MAX_SUBSTEP if nonlinear else MAX_WEIGHTED_SUBSTEP) / math.sqrt(heaviest)
-    blocks, states = state.new_records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
-    for k in range(WIDTH):
+    blocks, states = state.create_records(LANE_COUNT, state.BLOCK), state.create_states(LANE_COUNT, 0)
+    for k in range(LANE_COUNT):
         p, alpha = longest * 10.0 ** random.choice([0.0, random.uniform(-9.0, 0.0)]), 10.0 ** random.uniform(-2.0, 0.0)
         blocks[k] = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
         u = alpha * random.choice([1.0, 10.0 ** random.uniform(-6.0, 0.1)])  # balanced, too
@@ -250,7 +250,7 @@ def test_a_quiet_step_is_exact_while_the_weight_changes(
     for _ in range(math.ceil(rounds)):
         blocks, states, push, weight = weighted_cases(random, nonlinear, kind, substeps)
         steps = stepped(blocks, states, push, 1.0, Way(nonlinear, substeps, weight), fallen=99.0)
-        for step in steps[: int(rounds * WIDTH)]:
+        for step in steps[: int(rounds * LANE_COUNT)]:
             if not step.quiet:
                 assert (step.start["u"], step.start["v"]) == (step.end["u"], step.end["v"])
                 continue
@@ -269,8 +269,8 @@ def test_a_quiet_step_is_exact_while_the_weight_changes(
 
 def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Records, Records]:
     """Steps with turning points: down to nearly nothing and up again, up to nearly the highest and down again."""
-    blocks, states = state.new_records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
-    for k in range(WIDTH):
+    blocks, states = state.create_records(LANE_COUNT, state.BLOCK), state.create_states(LANE_COUNT, 0)
+    for k in range(LANE_COUNT):
         alpha = 0.2
         p = random.uniform(0.05, 1.0) * (0.02 if nonlinear else 1.0) / h
         blocks[k] = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
@@ -291,7 +291,7 @@ def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Reco
 @pytest.mark.parametrize("rounds", [30, pytest.param(150, marks=pytest.mark.thorough)])
 def test_a_lane_is_quiet_only_if_nothing_happens_in_its_step(nonlinear: bool, weighted: bool, rounds: int) -> None:
     """No rotation at or below zero, and none above the highest so far but one that rises to the step's end."""
-    random, scratch, quiet = np.random.default_rng(3), new_scratch(), 0
+    random, scratch, quiet = np.random.default_rng(3), create_scratch(), 0
     rules = rules_for(nonlinear=nonlinear)
     for _ in range(rounds):
         h = 10.0 ** random.uniform(-3.0, -1.0)
@@ -322,7 +322,7 @@ P, ALPHA, H = 0.5, 0.2, 0.005
 
 
 def one(u: float, v: float, peak: float, *, nonlinear: bool = False) -> tuple[Records, Records]:
-    blocks, states = state.new_records(1, state.BLOCK), state.new_states(1, 0)
+    blocks, states = state.create_records(1, state.BLOCK), state.create_states(1, 0)
     blocks[0] = rocking_block((P, P), (ALPHA, ALPHA), nonlinear=nonlinear)
     states[0] = state_of(0, u, v, peak=peak)
     return blocks, states
@@ -346,7 +346,7 @@ def is_quiet_step(way: Way, u: float, v: float, peak: float, row: tuple[float, f
 def path(way: Way, u: float, v: float, row: tuple[float, float]) -> np.ndarray:
     """Rotation throughout the step."""
     blocks, states = one(u, v, 0.0, nonlinear=way.nonlinear)
-    rules, scratch = rules_for(nonlinear=way.nonlinear), new_scratch()
+    rules, scratch = rules_for(nonlinear=way.nonlinear), create_scratch()
     order, reach, _ = expand_arc(ground_under(way, row, 0.0, 9.0), blocks[0], rules, scratch, states[0], H)
     return np.array([evaluate_series(scratch["rotation"], order, t)[0] for t in np.linspace(0.0, reach, 2001)])
 
@@ -382,7 +382,7 @@ def test_a_bulge_over_the_highest_so_far_between_two_ends_below_it_is_an_event(w
 def test_the_curvature_of_an_oscillator_may_be_largest_inside_a_step(up: float) -> None:
     """u = A cos(omega (t - h/2)) - c over a step of one radian: bulges by A (1 - cos(1/2))."""
     a, beyond = up, 1.0 - math.cos(0.5)
-    blocks, states = state.new_records(1, state.BLOCK), state.new_states(1, 0)
+    blocks, states = state.create_records(1, state.BLOCK), state.create_states(1, 0)
     for share, quiet in ((0.95, False), (1.06, True)):
         u = 1.0 if up > 0.0 else share * beyond
         pull = (a * math.cos(0.5) - u) / H**2
@@ -434,7 +434,7 @@ def test_a_nonlinear_series_whose_last_terms_still_count_is_an_event(strength: f
     """Under ever more violent motions a quiet step is still exact, and in the end there is none."""
     u, v, row = 1.0, 1e-3, (-strength, 0.0)
     blocks, states = one(u, v, 9.0, nonlinear=True)
-    scratch = new_scratch()
+    scratch = create_scratch()
     order, reach, _ = expand_arc(
         in_units_of_g([0.0, 9.0], [row]), blocks[0], rules_for(nonlinear=True), scratch, states[0], H
     )
@@ -462,7 +462,7 @@ def test_a_lane_does_the_same_whatever_its_company(way: Way) -> None:
     random, h, row = np.random.default_rng(4), 0.01, (0.05, 1.0)
     blocks, states = drawn(random, way.nonlinear, h)
     whole = stepped(blocks.copy(), states.copy(), row, h, way)
-    for k in (0, 7, WIDTH - 1):
+    for k in (0, 7, LANE_COUNT - 1):
         alone = stepped(blocks[k : k + 1].copy(), states[k : k + 1].copy(), row, h, way)[0]
         assert alone.quiet == whole[k].quiet
         assert (alone.end["u"], alone.end["v"]) == (whole[k].end["u"], whole[k].end["v"])

@@ -13,7 +13,7 @@ from numpy.testing import assert_array_equal
 from rocking.kernels import state
 from rocking.kernels.ground import Ground
 from rocking.kernels.march import march
-from rocking.kernels.state import Record, Records, new_scratch, new_states
+from rocking.kernels.state import Record, Records, create_scratch, create_states
 from rocking.kernels.trace import Trail, trace
 
 quick = settings(deadline=None, max_examples=40)
@@ -40,7 +40,7 @@ class Run(NamedTuple):
         if rows is None:
             rows = np.searchsorted(self.nodes["time"], times, side="right") - 1
         out = np.full((len(times), 3), np.nan)
-        trace(self.trail, new_scratch(), times, np.asarray(rows, dtype=np.int64), out)
+        trace(self.trail, create_scratch(), times, np.asarray(rows, dtype=np.int64), out)
         return out
 
 
@@ -58,7 +58,7 @@ def with_rows(ground: Ground, rows: np.ndarray) -> Ground:
 
 def started(rotation: float = 0.0, velocity: float = 0.0) -> Record:
     """State at time zero of a block at rest, or thrown off it."""
-    at = new_states(1, 10**6)[0]
+    at = create_states(1, 10**6)[0]
     if rotation != 0.0 or velocity != 0.0:
         sign = math.copysign(1.0, rotation if rotation != 0.0 else velocity)
         at["side"], at["u"], at["v"] = (PLUS if sign > 0.0 else MINUS), abs(rotation), sign * velocity
@@ -85,7 +85,7 @@ def run(
     if block is None:
         block = rocking_block(p, alpha, e, nonlinear=nonlinear, limit=limit)
     rules = rules_for(nonlinear=nonlinear, rest_rule=rest_rule, stop=stop, writes_tables=keep)
-    table, at, scratch = state.new_table(rows), started(rotation, velocity), new_scratch()
+    table, at, scratch = state.create_table(rows), started(rotation, velocity), create_scratch()
     ending = march(ground, block, rules, table, scratch, at)
     while ending == state.Ending.FULL and len(table) < 200_000:
         table = state.enlarge_table(table)
@@ -136,20 +136,20 @@ def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, colu
     rows = np.zeros((149, columns))
     rows[:, :2] = record(2).pieces[:-1, 2:]
     ground = with_rows(record(2), rows)
-    block, scratch = rocking_block(nonlinear=nonlinear), new_scratch()
+    block, scratch = rocking_block(nonlinear=nonlinear), create_scratch()
     rules = rules_for(nonlinear=nonlinear)
     whole = run(ground, nonlinear=nonlinear)
     assert len(whole.sequences) > 0
     assert max(whole.sequences["impacts"]) > 10
     for size in range(max(whole.at["nodes"], whole.at["impacts"]) + 6):
-        table, at = state.new_table(size + 5), started()
+        table, at = state.create_table(size + 5), started()
         table.view(np.uint8)[:] = 0xA5
         guard = table[size:].tobytes()
         ending = march(ground, block, rules, table[:size], scratch, at)
         assert table[size:].tobytes() == guard
         while ending == state.Ending.FULL:
             size *= 2
-            grown = state.new_records(max(size, 8) + 5, state.TABLE)
+            grown = state.create_records(max(size, 8) + 5, state.TABLE)
             grown.view(np.uint8)[:] = 0xA5
             grown[: len(table) - 5] = table[: len(table) - 5]
             size = max(size, 8)
@@ -167,7 +167,7 @@ def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, colu
 def test_a_march_in_slices_is_the_march_in_one(nonlinear: bool, budget: int) -> None:
     ground, block, rules = record(1), rocking_block(nonlinear=nonlinear), rules_for(nonlinear=nonlinear)
     whole = run(ground, nonlinear=nonlinear)
-    table, at, scratch, pauses = state.new_table(4096), started(), new_scratch(), 0
+    table, at, scratch, pauses = state.create_table(4096), started(), create_scratch(), 0
     at["budget"] = budget
     while march(ground, block, rules, table, scratch, at) == state.Ending.PAUSED:
         at["budget"] = budget
@@ -182,11 +182,12 @@ def test_a_march_in_slices_is_the_march_in_one(nonlinear: bool, budget: int) -> 
 def test_a_march_from_piece_to_piece_is_the_march_in_one(nonlinear: bool) -> None:
     ground, block, rules = record(1), rocking_block(nonlinear=nonlinear), rules_for(nonlinear=nonlinear)
     whole = run(ground, nonlinear=nonlinear)
-    table, at, scratch = state.new_table(4096), started(), new_scratch()
-    for until in [*range(1, len(ground.pieces)), state.TO_THE_END]:
+    table, at, scratch = state.create_table(4096), started(), create_scratch()
+    for until in [*range(1, len(ground.pieces)), state.NO_STOP_PIECE]:
         at["stop_piece"] = until
         ending = march(ground, block, rules, table, scratch, at)
-        assert ending == (state.Ending.RUNNING if until < state.TO_THE_END and at["piece"] >= until else whole.ending)
+        is_stopped = until < state.NO_STOP_PIECE and at["piece"] >= until
+        assert ending == (state.Ending.RUNNING if is_stopped else whole.ending)
         if ending != state.Ending.RUNNING:
             break
     assert_array_equal(table["impact"][: at["impacts"]], whole.impacts)

@@ -11,7 +11,7 @@ from test_kernels_march import Run, run
 from rocking.kernels import state
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.ground import Ground
-from rocking.kernels.state import Record, new_scratch
+from rocking.kernels.state import Record, create_scratch
 from rocking.kernels.uplift import find_next_uplift
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -156,7 +156,7 @@ def test_the_bracket_of_a_body_that_bounces_on_one_side_holds_its_rest(make, exa
     for e in (0.2, 0.9):
         for v in (1e-6, 1e-3, 0.05):
             found: Proof = prove_rest(
-                in_units_of_g([0.0, 1e3], [[0.0, 0.0]]), make(e), rules_for(tolerance=tolerance), new_scratch(),
+                in_units_of_g([0.0, 1e3], [[0.0, 0.0]]), make(e), rules_for(tolerance=tolerance), create_scratch(),
                 state_of(0, 0.0, v),
             )  # fmt: skip
             rest = math.fsum(exact(v * e**n) for n in range(2000))
@@ -181,4 +181,4 @@ def test_what_has_one_side_is_lifted_to_no_other() -> None:
         (one_sided(0.0, 1.0, -0.1, 0.5), in_units_of_g([0.0, 1.0], [[0.05, 0.0]])),
         (one_sided(0.0, 1.0, 1.0, 0.5), in_units_of_g([0.0, 1.0], [[0.05, 0.0]], vertical=[[-2.0, 0.0]])),
     ):
-        assert find_next_uplift(ground, body, new_scratch(), state.AT_REST, 0, 0.0, math.inf).side == 0
+        assert find_next_uplift(ground, body, create_scratch(), state.AT_REST, 0, 0.0, math.inf).side == 0

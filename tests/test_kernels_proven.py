@@ -25,7 +25,7 @@ def one_by_one(ground: Ground) -> Ground:
 
 def passed(ground: Ground, start: Record, *, rows: int = 100, left: float = 9.0, e: float = 0.9) -> Record:
     """State after the impacts that can be passed."""
-    table = state.new_table(rows)
+    table = state.create_table(rows)
     apply_proven_impacts(ground, rocking_block(e=(e, e)), rules_for(), table, start, left)
     return start
 
@@ -98,8 +98,8 @@ def test_nothing_is_passed_beyond_the_end_of_the_piece() -> None:
 def test_a_turn_passes_no_more_impacts_than_every_table_has_space_for() -> None:
     found = passed(STEADY, proven(1e-3), e=0.99)
     assert found["impacts"] == found["nodes"] == PROVEN_PER_ITERATION
-    assert not has_space(rules_for(), state.new_table(PROVEN_PER_ITERATION + 2), proven(1e-3))
-    assert has_space(rules_for(), state.new_table(PROVEN_PER_ITERATION + 3), proven(1e-3))
+    assert not has_space(rules_for(), state.create_table(PROVEN_PER_ITERATION + 2), proven(1e-3))
+    assert has_space(rules_for(), state.create_table(PROVEN_PER_ITERATION + 3), proven(1e-3))
 
 
 @long_uncompiled

@@ -21,7 +21,7 @@ from rocking.kernels.series import (
     write_angle_coefficients,
     write_linear_coefficients,
 )
-from rocking.kernels.state import ORDER, Record, new_scratch
+from rocking.kernels.state import ORDER, Record, create_scratch
 from rocking.kernels.trace import Quantity, Trail, expand_variation
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -39,7 +39,7 @@ def body(system: System) -> Record:
 
 
 def scratch_with(push: Line, weight: Line) -> Record:
-    scratch = new_scratch()
+    scratch = create_scratch()
     scratch["ground"][:2], scratch["weight"][:2] = push, weight
     return scratch
 
@@ -199,10 +199,10 @@ def test_the_variation_along_an_arc_is_the_derivative_by_what_is_changed(
         lift = random.uniform(-0.5, 0.5, degree + 1) / h ** np.arange(degree + 1.0) if weighted else np.zeros(1)
         block = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
         ground = in_units_of_g([0.0, 9.0], [push], vertical=[lift] if weighted else None)
-        trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.new_records(0, state.NODE_ROW))
-        node = state.new_record(state.NODE_ROW, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
-        work = state.new_record(state.VARIATION)
-        order = expand_variation(trail, new_scratch(), work, node, quantity, (du, dv, 0.0), h)
+        trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.create_records(0, state.NODE_ROW))
+        node = state.create_record(state.NODE_ROW, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
+        work = state.create_record(state.VARIATION)
+        order = expand_variation(trail, create_scratch(), work, node, quantity, (du, dv, 0.0), h)
         name, _, of_side = quantity.name.partition("_")
         of_this = Quantity[name] if of_side in ("", ("PLUS", "MINUS")[side]) else Quantity.NOTHING
         system = System(float(block["stiffness"][0]), alpha, nonlinear)

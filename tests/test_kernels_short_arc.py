@@ -17,7 +17,7 @@ from rocking.kernels.arc import evaluate_series, expand_arc
 from rocking.kernels.events import StepEnd, advance_to_event
 from rocking.kernels.series import ValueAndSlope
 from rocking.kernels.short_arc import short_step
-from rocking.kernels.state import Record, StepOutcome, new_scratch
+from rocking.kernels.state import Record, StepOutcome, create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -45,7 +45,7 @@ class Case:
         self.ground = in_units_of_g([0.0, 1e3], [row], vertical=lifts)
         self.block = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
         self.rules = rules_for(nonlinear=nonlinear)
-        self.scratch = new_scratch()
+        self.scratch = create_scratch()
 
     def short(self, start: Record, left: float) -> StepEnd:
         return short_step(self.ground, self.block, self.rules, start, left)

@@ -12,7 +12,7 @@ from kernel_records import MINUS, PLUS, ULP, in_units_of_g, numbers, rocking_blo
 from oracles.exact import exact, first_above, polynomial
 
 from rocking.kernels.ground import Ground
-from rocking.kernels.state import AT_REST, new_scratch
+from rocking.kernels.state import AT_REST, create_scratch
 from rocking.kernels.uplift import find_next_uplift
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -41,7 +41,7 @@ def uplift(
     """Time, side, and whether by a jump."""
     block = rocking_block()
     block["threshold"] = thresholds
-    piece, offset, side, jump = find_next_uplift(ground, block, new_scratch(), AT_REST, piece, offset, stop)
+    piece, offset, side, jump = find_next_uplift(ground, block, create_scratch(), AT_REST, piece, offset, stop)
     return ground.pieces[piece, 0] + offset if side != AT_REST else math.inf, side, jump
 
 

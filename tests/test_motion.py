@@ -262,10 +262,10 @@ def test_a_record_that_is_no_longer_linear_between_even_samples_has_no_step():
 
 def test_pieces_jump_where_their_ends_do_not_meet():
     record = Motion.from_samples([1.0, 2.0, -3.0, 0.5], 0.01).scaled(1.0 / 3.0)
-    assert not record.jumps
-    assert not pulses.sine(1.0, 1.0, cycles=3).jumps
-    assert (record + Motion.from_samples([1.0, 1.0], 0.01)).jumps
-    assert Motion([0.0, 1.0, 2.0], [[1.0], [5.0]]).jumps
+    assert not record.has_jumps
+    assert not pulses.sine(1.0, 1.0, cycles=3).has_jumps
+    assert (record + Motion.from_samples([1.0, 1.0], 0.01)).has_jumps
+    assert Motion([0.0, 1.0, 2.0], [[1.0], [5.0]]).has_jumps
 
 
 @settings(deadline=None)

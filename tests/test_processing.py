@@ -55,7 +55,7 @@ def test_jumps_survive_a_trim_and_are_not_dropped_by_what_works_on_samples():
     for options in ({"baseline": 0}, {"band_pass": (0.1, 0.5)}):
         with pytest.raises(MotionError, match="linear between samples; call processed\\(resample"):
             ended.processed(**options)
-    assert not ended.processed(resample=0.25).jumps
+    assert not ended.processed(resample=0.25).has_jumps
 
 
 @settings(deadline=None)

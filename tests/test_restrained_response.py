@@ -42,7 +42,7 @@ def test_forces_of_the_ground_and_of_restraints_turn_the_block_about_its_centre_
     vertical = response.normal_force(times)
     ground = PUSH.acceleration(times) / G, PUSH.vertical.acceleration(times) / G
     side = np.where(theta > 0, 0, np.where(theta < 0, 1, -1))
-    horizontal = body.contact((theta, rate, acceleration), ground, side, np.zeros(len(times)))[0]
+    horizontal = body.contact_law((theta, rate, acceleration), ground, side, np.zeros(len(times)))[0]
     judged = 0
     for k in np.flatnonzero(theta != 0.0):
         turned = theta[k] + lean

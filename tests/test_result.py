@@ -365,7 +365,7 @@ NOT_POOLED = {
 def test_a_dimension_that_some_numbers_lack_is_said_to_be_pooled_or_is_known_not_to_be(results, of_several):
     for name, found in (results | of_several).items():
         lacked = {d for d in found.data.dims if not all(d in each.dims for each in found.data.data_vars.values())}
-        assert lacked - {*found.POOLED} == NOT_POOLED.get(name, set()), name
+        assert lacked - {*found.AGGREGATED_DIMENSIONS} == NOT_POOLED.get(name, set()), name
 
 
 def test_a_part_has_no_numbers_of_the_whole(results, of_several):

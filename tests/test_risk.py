@@ -298,7 +298,7 @@ def test_the_figure_has_the_hazard_curve_and_the_shares_of_the_rate_on_axes_of_t
     assert (above.get_yscale(), below.get_yscale()) == ("log", "linear")
     line = below.lines[0]
     assert np.trapezoid(line.get_ydata(), np.log(line.get_xdata())) == pytest.approx(1.0, abs=2e-3)
-    assert any(risk.rates[0].in_words() in text.get_text() for text in figure.legends[0].get_texts())
+    assert any(risk.rates[0].describe_period() in text.get_text() for text in figure.legends[0].get_texts())
 
 
 def test_survival_is_what_the_rate_and_the_curve_say() -> None:
@@ -402,7 +402,7 @@ def test_a_rate_from_above_the_hazard_curve_has_a_bound_and_no_estimate() -> Non
     (rate,) = strong.annual_rate(site).rates
     assert rate.share_above_curve > 0.99
     assert rate.annual_rate < 1.5e-4
-    assert "once in > 6700 years" in rate.in_words()
+    assert "once in > 6700 years" in rate.describe_period()
     # Were every motion above the last point to exceed the limit, the rate would be this.
     assert rate.bounds[0] == pytest.approx((1.0 - rate.share_above_curve) * rate.annual_rate + 1.5e-4)
 
@@ -480,8 +480,8 @@ def test_counts_groups_and_motions_are_taken(tmp_path: Path) -> None:
     path.write_text("pgv_cm_s,overturned,trials,group\n10,1,10,a\n20,4,10,b\n40,8,10,c\n")
     found = rocking.fit_fragility(**read_observed(path, Measure("pga")))
     assert (found.measure, found.curves[0].trials.tolist()) == (Measure("pgv"), [10.0, 10.0, 10.0])
-    assert found.range == pytest.approx((0.1, 0.4))
-    assert not found.curves[0].independent
+    assert found.intensity_range == pytest.approx((0.1, 0.4))
+    assert not found.curves[0].is_independent
     path.write_text(
         "motion,scale,overturned\nel-centro-meloland-270,1,no\nel-centro-meloland-270,2,yes\n"
         "ridgecrest-clc-090,1,yes\nridgecrest-clc-360,1,no\n"

@@ -9,7 +9,7 @@ from oracles.taylor import System, angles, coefficients, mp
 
 from rocking.kernels import arc, series
 from rocking.kernels.arc import ORDER, evaluate_series, expand_arc
-from rocking.kernels.state import new_scratch
+from rocking.kernels.state import create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -54,7 +54,7 @@ def test_a_series_ends_where_what_it_leaves_out_is_nothing(nonlinear: bool, case
         alpha, u, v, push, weight = drawn(random)
         block = rocking_block((1.0, 1.0), (alpha, alpha), nonlinear=nonlinear)
         ground = in_units_of_g([0.0, 1e3], [push], vertical=[[weight[0] - 1.0, *weight[1:]]])
-        scratch, start = new_scratch(), state_of(0, u, v, peak=2.0)
+        scratch, start = create_scratch(), state_of(0, u, v, peak=2.0)
         order, h, _ = expand_arc(ground, block, rules_for(nonlinear=nonlinear), scratch, start, 1.0)
         c = coefficients(System(1.0, alpha, nonlinear), u, v, push, weight, terms)
         rates = [k * c[k] * mp.mpf(h) ** k for k in range(1, terms)]
@@ -83,7 +83,7 @@ def test_the_bound_holds_all_that_a_series_leaves_out(nonlinear: bool, order: in
             continue
         h = 10.0 ** random.uniform(-1.5, 0.0)
         c = coefficients(System(1.0, alpha, nonlinear), u, v, push, weight, terms)
-        scratch = new_scratch()
+        scratch = create_scratch()
         for name, values in (("ground", push), ("weight", weight)):
             scratch[name][: len(values)] = values
         scratch["rotation"][: order + 1] = [float(x) for x in c[: order + 1]]
@@ -110,7 +110,7 @@ def test_the_bound_of_nine_terms_is_that_of_any_number(count: int) -> None:
     """Its constants cover what feeds back, and its verdict is that of the bound it writes out."""
     random, judged, negligible = np.random.default_rng(0), 0, 0
     for number in range(count):
-        scratch = new_scratch()
+        scratch = create_scratch()
         # Every other series falls from term to term, so that what is left out may be nothing beside the first ones.
         falls = 10.0 ** -(number % 2 * random.uniform(0.5, 3.0) * np.arange(9.0))
         sizes = 10.0 ** random.uniform(-9.0, -1.0, 9) * falls

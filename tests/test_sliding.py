@@ -162,7 +162,7 @@ def test_momentum_and_energy_balance_in_every_step() -> None:
                 continue
             index = np.full(18, row)
             times = np.concatenate([[start], 0.5 * (start + end) + 0.5 * (end - start) * nodes, [end]])
-            states = response._history.states_in(times, index, columns=5)
+            states = response._history.compute_states(times, index, columns=5)
             across_force, up_force = response._contact._compute_forces_in(times, index)
             sign = 0 if side < 0 else 1 - 2 * side
             arm, alpha = case.block.sides[max(side, 0)].radius, case.block.sides[max(side, 0)].alpha
@@ -234,11 +234,11 @@ def bracket_by_kernel(case: Sequence) -> tuple[float, float] | None:
     bodies = case.block.as_bodies()
     setup = Setup(bodies, case.model, Certified(), friction=resolve_friction(case.friction))
     run = setup.prepare(None, writes_tables=True)
-    start, table = run.states[0], state.new_table(4096)
+    start, table = run.states[0], state.create_table(4096)
     start["side"], start["v"], start["direction"] = case.side, case.speed, case.direction
     start["slip_rate"], start["peak"], start["budget"] = 2.0 * case.direction, math.inf, 100_000
     start["certificate_speed"] = math.inf
-    march(prepare_ground(None, bodies.gravity), run.records[0], run.settings, table, state.new_scratch(), start)
+    march(prepare_ground(None, bodies.gravity), run.records[0], run.settings, table, state.create_scratch(), start)
     if not start["sequences"] or not table["sequence"]["upper"][0] >= 0.0:
         return None
     return float(table["sequence"]["lower"][0]), float(table["sequence"]["upper"][0])

@@ -320,7 +320,7 @@ def test_layouts_are_those_of_the_records(built):
         field, start = state.BLOCK.fields[name][:2]
         assert (start, field.itemsize) == (offset, count * field.itemsize // max(count, 1))
     offset, kind, count = layouts["table"]["fields"]["impact.speed_after"]
-    table = state.new_table(1)
+    table = state.create_table(1)
     table["impact"]["speed_after"] = 2.5
     assert (kind, count) == ("f8", 1)
     assert np.frombuffer(table.tobytes()[offset : offset + 8]) == 2.5

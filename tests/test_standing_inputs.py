@@ -16,7 +16,7 @@ from rocking import (
     Tendon,
     Thrust,
 )
-from rocking.inputs.notes import density_notes, restraint_notes
+from rocking.inputs.notes import list_density_notes, list_restraint_notes
 
 WALL = Block(width=0.5, height=4.0, mass=5e3)
 PULSE = rocking.pulses.one_sine(2.0, 1.0)
@@ -107,10 +107,10 @@ def test_units_that_may_be_mistaken_are_noted():
     assert note == "the body is 1800 m high: are its coordinates in metres?"
     (note,) = Solid.from_mesh(box(), density=2.7).notes
     assert "2.7 kg/m^3" in note and note.endswith("is it in kg/m^3?")
-    assert density_notes([2700.0, 500.0, None]) == ()
+    assert list_density_notes([2700.0, 500.0, None]) == ()
     usual = held(Tendon(2e8, prestress=1e5), Thrust(9.0, 4.0), Load(9.0, 4.0), Spring(1e6))
-    assert restraint_notes(usual) == ()
+    assert list_restraint_notes(usual) == ()
     words = "times the weight or more: are forces in N, and masses in kg?"
     for restraint in (Tendon(2e11), Tendon(2e11, strength=2e9), Spring(1e12)):
-        (note,) = restraint_notes(held(restraint))
+        (note,) = list_restraint_notes(held(restraint))
         assert words in note

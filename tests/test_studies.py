@@ -182,7 +182,7 @@ def test_parts_that_run_at_the_same_time_and_are_killed_are_completed_to_the_sam
     study = made(tmp_path)
     assert 24 <= study.status.done <= 36
     study.run()
-    assert study.status.complete and digest(tmp_path) == digest(complete)
+    assert study.status.is_complete and digest(tmp_path) == digest(complete)
 
 
 def test_what_a_crash_left_half_written_is_removed(complete, tmp_path):
@@ -410,7 +410,7 @@ def test_what_is_missing_is_never_read_as_a_result(complete, tmp_path):
     assert 0 < int(found.done.sum()) < found.done.size
     for name in ("overturned", "peak_rotation", "impacts"):
         np.testing.assert_array_equal(np.isnan(found[name].values), ~found.done.values)
-    assert not study.status.complete
+    assert not study.status.is_complete
 
 
 def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rocking.errors import RecordError
-from rocking.inputs.notes import reading_notes, vertical_notes
+from rocking.inputs.notes import list_reading_notes, list_vertical_notes
 from rocking.records.formats import channels, identify, read
 from rocking.records.named import load_motion, load_vertical
 
@@ -235,7 +235,7 @@ def test_a_missing_row_among_even_times_is_noted(tmp_path):
         path = tmp_path / name
         rows = [f"{0.01 * k:.2f},{0.1 * ((7 * k) % 5 - 2):.3f}" for k in range(40) if k not in left_out]
         path.write_text("\n".join(["time (s),a (g)", *rows]))
-        return reading_notes(read(path))
+        return list_reading_notes(read(path))
 
     (note,) = written("gap.csv", {17})
     assert note.startswith("the times go on by 0.01 s, but by 0.02 s after 0.16 s: are rows missing?")
@@ -287,12 +287,12 @@ def test_components_that_begin_apart_are_noted(tmp_path):
     both = [f"{0.01 * k:.2f},{k % 3},{0.01 * k + 0.2:.2f},{(k + 1) % 3}" for k in range(50)]
     path.write_text("t1 (s),a1 (g),t2 (s),a2 (g)\n" + "\n".join(both) + "\n")
     found = load_motion(str(path), channel="a1").with_vertical(load_vertical("a2", str(path), channel="a1"))
-    (note,) = (each for each in vertical_notes(found) if "begins" in each)
+    (note,) = (each for each in list_vertical_notes(found) if "begins" in each)
     assert "by its file the vertical motion begins 0.2 s after the horizontal one" in note
-    assert not [each for each in vertical_notes(found.delayed(0.2)) if "begins" in each]
+    assert not [each for each in list_vertical_notes(found.delayed(0.2)) if "begins" in each]
     path.write_text("t (s),a1 (g),a2 (g)\n" + "\n".join(f"{0.01 * k:.2f},{k % 3},{(k + 1) % 3}" for k in range(50)))
     found = load_motion(str(path), channel="a1").with_vertical(load_vertical("a2", str(path), channel="a1"))
-    assert vertical_notes(found) == ()
+    assert list_vertical_notes(found) == ()
 
 
 #: Periods of response spectra and ordinates, none of them negative.

@@ -13,7 +13,7 @@ from oracles.cases import wave
 import rocking
 from rocking import Motion
 from rocking.errors import MotionError, OptionError
-from rocking.inputs.notes import vertical_notes
+from rocking.inputs.notes import list_vertical_notes
 from rocking.motion.description import Origin
 from rocking.motion.motion import compute_uplift_factors, find_exceedances
 from rocking.records.named import load_motion
@@ -334,7 +334,7 @@ def test_the_figure_of_a_response_moves_the_thresholds_with_the_weight_and_shows
     assert needed != pytest.approx(block.uplift_thresholds()[1] / G, rel=1e-3)
     trace = next(line.get_xydata() for line in vertical.lines if len(line.get_xydata()) > 2)
     assert trace[:, 1] == pytest.approx(el_centro().vertical.acceleration(trace[:, 0]) / G)
-    assert set(el_centro().vertical.breakpoints[400:500]) <= set(el_centro().drawing_times(0.0, 20.0))
+    assert set(el_centro().vertical.breakpoints[400:500]) <= set(el_centro().choose_drawing_times(0.0, 20.0))
 
 
 @pytest.mark.cases(fast=1)
@@ -359,11 +359,11 @@ def test_a_vertical_component_that_looks_like_a_mistake_is_computed_with_a_note(
 
 def test_components_that_last_very_different_times_are_noted() -> None:
     part = el_centro().vertical.processed(trim=(0.0, 20.0))
-    assert vertical_notes(el_centro().with_vertical(part)) == (
+    assert list_vertical_notes(el_centro().with_vertical(part)) == (
         "the horizontal motion lasts 56.93 s, the vertical one 20 s: do both start at the same time?",
     )
     late = Motion.from_samples([0.0] * 5600 + [1.0, -1.0] * 40, 0.01)
-    assert "the horizontal motion is strong from" in vertical_notes(el_centro().with_vertical(late))[0]
+    assert "the horizontal motion is strong from" in list_vertical_notes(el_centro().with_vertical(late))[0]
 
 
 def test_a_jump_beyond_one_threshold_lifts_off_though_the_other_is_only_reached() -> None:
@@ -415,5 +415,5 @@ def test_a_vertical_record_that_is_positive_downwards_is_turned_round(channel):
     assert f"turned upwards, as its channel is called {channel!r}" in both.vertical.history
     assert horizontal.with_vertical(both.vertical).vertical is both.vertical  # not a second time
     assert np.array_equal(horizontal.with_vertical(-down).vertical.coefficients, up.coefficients)
-    assert vertical_notes(both) == ()
+    assert list_vertical_notes(both) == ()
     assert horizontal.with_vertical(up).vertical is up

@@ -109,14 +109,14 @@ class BlockUnderSine:
 
     def words(self, *names: str) -> str:
         """Parameters of these names and their values: "a = 1.03, p = 1 rad/s"."""
-        return in_words({name: value for name, value in asdict(self).items() if name in names})
+        return describe_parameters({name: value for name, value in asdict(self).items() if name in names})
 
     def symbols(self, *names: str) -> str:
         """Return the same with the symbols of a figure's title."""
         return in_symbols({name: value for name, value in asdict(self).items() if name in names})
 
 
-def in_words(parameters: Mapping[str, float]) -> str:
+def describe_parameters(parameters: Mapping[str, float]) -> str:
     """Parameters and their values: "omega = 2, eta = 0.92"."""
     return ", ".join(f"{name} = {value:.12g}{_UNITS.get(name, '')}" for name, value in parameters.items())
 

@@ -18,8 +18,8 @@ from figure import (
     PaperFigure,
     Statement,
     dense_times,
+    describe_parameters,
     in_symbols,
-    in_words,
     yes_or_no,
 )
 from histories import Ratios, chattering_figure, ratio_figure
@@ -139,7 +139,7 @@ def figure_7(*, eta: float = ETA) -> PaperFigure:
     return PaperFigure(
         7,
         "critical amplitude against frequency",
-        in_words({"eta": eta}),
+        describe_parameters({"eta": eta}),
         {"critical": {"omega": _FREQUENCIES, **critical}},
         statements,
         {
@@ -206,7 +206,7 @@ def _by_frequency(eta: float) -> Statement:
     a = 1.0 + float(f"{0.9 * least:.2g}")
     shares = np.asarray(chattering_time(a, _COMPARED, eta)) * _COMPARED / math.pi
     here = ", ".join(f"{share:.4f} at omega = {omega:g}" for share, omega in zip(shares, _COMPARED, strict=True))
-    return Statement(f"tau_ch/(T/2) at {in_words({'a': a, 'eta': eta})}", '"solely on a and eta"', here)
+    return Statement(f"tau_ch/(T/2) at {describe_parameters({'a': a, 'eta': eta})}", '"solely on a and eta"', here)
 
 
 def _over_half_period(a: Floats, case: BlockUnderSine, method: str) -> Floats:
@@ -264,7 +264,7 @@ def figure_2(
     first = chattering.impacts[0]
     resolved = int(np.sum(response.impacts["time"] <= rest))
     statements = (
-        Statement("complete chattering: at rest in finite time", "yes", yes_or_no(chattering.complete)),
+        Statement("complete chattering: at rest in finite time", "yes", yes_or_no(chattering.is_complete)),
         Statement("chattering time", '"finite"', chattering.time, digits=13),
         Statement("bracket on it narrower than 2e-12", None, yes_or_no(chattering.upper - chattering.lower < 2e-12)),
         Statement(
@@ -369,7 +369,7 @@ def _require_complete(case: BlockUnderSine, number: int) -> None:
     if math.isnan(case.rest):
         raise OptionError(
             f"Fig. {number} shows complete chattering: {{}} must be below the critical amplitude "
-            f"{case.critical:.9g} at {in_words({'omega': case.omega, 'eta': case.eta})}, not {case.a:.9g}",
+            f"{case.critical:.9g} at {describe_parameters({'omega': case.omega, 'eta': case.eta})}, not {case.a:.9g}",
             "a",
             value=case.a,
         )

@@ -53,7 +53,7 @@ class FragilityCurve:
         numbers.
     clusters : int
         Number of clusters of dependent outcomes (of motions for simulations).
-    independent : bool
+    is_independent : bool
         Whether all outcomes are independent, as required by tests without clusters.
     fitted : Probit
         Intercept and slope of P = Phi(intercept + slope ln x).
@@ -95,7 +95,7 @@ class FragilityCurve:
     covariance: Floats
     confidence: float
     clusters: int
-    independent: bool
+    is_independent: bool
     log_likelihood: float
     goodness: probit.Goodness
     region: Probit
@@ -120,7 +120,7 @@ class FragilityCurve:
         return 1.0 / float(self.fitted.slope[0])
 
     @property
-    def bounded(self) -> bool:
+    def is_bounded(self) -> bool:
         """Whether intervals can be finite, which requires three clusters if they contain several outcomes."""
         return bool(np.all(np.isfinite(self.region.intercept)))
 
@@ -221,7 +221,7 @@ def fit_curve(
             "motions nearer to it, or another measure"
         )
     cluster_count = round(float(trials.sum())) if clusters is None else int(clusters.max()) + 1
-    independent = clusters is None or (cluster_count == z.size and bool(np.all(trials <= 1.0)))
+    is_independent = clusters is None or (cluster_count == z.size and bool(np.all(trials <= 1.0)))
     return FragilityCurve(
         limit_state=name,
         limit=limit,
@@ -232,10 +232,10 @@ def fit_curve(
         covariance=probit.compute_covariance(outcomes, fitted),
         confidence=confidence,
         clusters=cluster_count,
-        independent=independent,
+        is_independent=is_independent,
         log_likelihood=float(probit.compute_log_likelihood(outcomes.as_batch(), np.column_stack(fitted))[0]),
-        goodness=probit.compute_goodness(outcomes, fitted, independent=independent),
-        region=probit.compute_confidence_region(outcomes, fitted, None if independent else clusters, confidence),
+        goodness=probit.compute_goodness(outcomes, fitted, independent=is_independent),
+        region=probit.compute_confidence_region(outcomes, fitted, None if is_independent else clusters, confidence),
     )
 
 
@@ -251,7 +251,7 @@ def create_fragility_line(curve: FragilityCurve, intensity: Floats, measure: Mea
     limit_text = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
     parameters = f"median {format_intensity(curve.median, measure)}, dispersion {curve.dispersion:.3g}"
     probability, factor = curve.probability(intensity), measure.display_factor
-    band = curve.band(intensity) if curve.bounded else (probability, probability)
+    band = curve.band(intensity) if curve.is_bounded else (probability, probability)
     label = f"{curve.limit_state}{limit_text}: {parameters}"
     return FragilityLine(label, factor * intensity, probability, *band, factor * mean_intensity, observed)
 
@@ -304,7 +304,7 @@ def _compute_log_medians(fits: Probit) -> Floats:
 
 def _compute_dispersion(slope: float) -> float:
     """Convert a slope to a dispersion: 0 for a step, infinite for a level curve."""
-    if slope >= probit.STEEP:
+    if slope >= probit.STEEPEST_SLOPE:
         return 0.0
     return 1.0 / slope if slope > 0.0 else math.inf
 

@@ -14,7 +14,7 @@ from rocking.analysis.spectrum import compute_overturned_share
 from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, variable
+from rocking.core.result import DatasetResult, create_variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import BlockError, OptionError
@@ -128,15 +128,15 @@ def response_rose(
     peak_meaning = "largest rotation over the smaller slenderness; inf: overturns, NaN: not finished"
     dataset = xr.Dataset(
         {
-            "overturned": variable(dims, overturned, "whether the body overturns in the plane of the azimuth"),
-            "peak_over_slenderness": variable(dims, peak, peak_meaning, "1"),
-            "overturned_share": variable(dims[1:], share, "share of the pairs that overturn the body", "1"),
-            "anywhere": variable("level", share_anywhere, "share that does at any azimuth", "1"),
+            "overturned": create_variable(dims, overturned, "whether the body overturns in the plane of the azimuth"),
+            "peak_over_slenderness": create_variable(dims, peak, peak_meaning, "1"),
+            "overturned_share": create_variable(dims[1:], share, "share of the pairs that overturn the body", "1"),
+            "anywhere": create_variable("level", share_anywhere, "share that does at any azimuth", "1"),
         },
         {
             "pair": [*named_pairs],
-            "level": variable("level", scales.values, f"of the {component} of both components", unit),
-            "azimuth": variable("azimuth", angles, "clockwise from north", "deg"),
+            "level": create_variable("level", scales.values, f"of the {component} of both components", unit),
+            "azimuth": create_variable("azimuth", angles, "clockwise from north", "deg"),
         },
         {"description": solid.description, "model": model, "measure": (scales.measure or FACTOR).quantity},
     )
@@ -173,7 +173,7 @@ class ResponseRose(DatasetResult):
         "shares": ("overturned_share",),
         "levels": ("anywhere",),
     }
-    POOLED = ("pair", "azimuth")
+    AGGREGATED_DIMENSIONS = ("pair", "azimuth")
 
     def _headline(self) -> str:
         data = self.data

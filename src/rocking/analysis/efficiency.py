@@ -24,7 +24,7 @@ from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
-from rocking.core.result import DatasetResult, variable
+from rocking.core.result import DatasetResult, create_variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.errors import OptionError
@@ -135,7 +135,7 @@ def compare_measures(
     factors = levels * units[-2] / values[0]  # on the motions; levels are of pga_ratio
     rows = zip(measures, values, units, strict=True)
     intensity = np.array([factors**measure.exponent * value / unit for measure, value, unit in rows])
-    families = assign_families(motions, reversed_too=bodies.is_symmetric)
+    families = assign_families(motions, include_reversed=bodies.is_symmetric)
     is_first = np.isin(np.arange(len(motions)), np.unique(families, return_index=True)[1])
     is_counted = is_first[:, None] & np.isfinite(levels)
     cluster_counts = [len(np.unique(cluster_numbers[overturns])) for overturns in is_counted[:, block_weights > 0.0].T]
@@ -179,7 +179,7 @@ class MeasureComparison(DatasetResult):
         "measures": ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"),
         "intensities": ("intensity",),
     }
-    POOLED = ("motion", "block")
+    AGGREGATED_DIMENSIONS = ("motion", "block")
 
     @property
     def _ranked_table(self) -> pd.DataFrame:
@@ -257,12 +257,12 @@ def _combine_dispersions(
     median_text = "median of the intensities at overturning, in the measure's unit"
     return xr.Dataset(
         {
-            "intensity": variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
-            "median_intensity": variable("measure", np.exp(mean), median_text),
-            "dispersion": variable("measure", dispersion, f"{spread} about each block's own mean", "1"),
-            "dispersion_low": variable("measure", low, "lower end of its interval", "1"),
-            "dispersion_high": variable("measure", high, "upper end of its interval", "1"),
-            "dispersion_of_all": variable("measure", pooled, f"{spread} about one mean of all blocks", "1"),
+            "intensity": create_variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
+            "median_intensity": create_variable("measure", np.exp(mean), median_text),
+            "dispersion": create_variable("measure", dispersion, f"{spread} about each block's own mean", "1"),
+            "dispersion_low": create_variable("measure", low, "lower end of its interval", "1"),
+            "dispersion_high": create_variable("measure", high, "upper end of its interval", "1"),
+            "dispersion_of_all": create_variable("measure", pooled, f"{spread} about one mean of all blocks", "1"),
         },
         {"measure": [item.short_name for item in measures], "unit": ("measure", [item.units for item in measures])},
     )

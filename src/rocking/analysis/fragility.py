@@ -58,7 +58,7 @@ from rocking.engine.tasks import Setup, describe_missing
 from rocking.errors import FitError, Message, OptionError
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, list_motions
-from rocking.simulation.ensemble import SIGNS, Polarity, simulate_many
+from rocking.simulation.ensemble import POLARITY_SIGNS, Polarity, simulate_many
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,7 +89,7 @@ class Fragility(Result):
         All simulations: motion, block (position), polarity, the measure (SI, for example pga_m_s2), peak_rotation_rad,
         peak_over_alpha (infinite: overturned, NaN: unfinished), overturned, unfinished, whether each limit state was
         exceeded, and the weight of the block if any. None for outcomes from other sources.
-    one_way, with_vertical, several_blocks : bool
+    is_one_way, includes_vertical, has_several_blocks : bool
         Whether unequal sides were simulated in one polarity only, vertical motions were included, and several blocks
         are pooled.
     source : str
@@ -120,9 +120,9 @@ class Fragility(Result):
     block: Body | None
     model: Model
     outcomes: pd.DataFrame | None
-    one_way: bool = False
-    with_vertical: bool = False
-    several_blocks: bool = False
+    is_one_way: bool = False
+    includes_vertical: bool = False
+    has_several_blocks: bool = False
     source: str = "motion"
     undecided: str = ""
     missing: str = ""
@@ -152,21 +152,21 @@ class Fragility(Result):
     def notes(self) -> tuple[str, ...]:
         """Limitations of the curves (small samples, poor fits, undecided outcomes), one sentence each."""
         notes = [message for message in (self.missing, self.undecided) if message]
-        if self.one_way:
+        if self.is_one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
                 + spell(Message('{} "both" counts both', ("polarity",)))
             )
-        if not self.curves[0].bounded:
+        if not self.curves[0].is_bounded:
             notes.append(f"intervals and bands go from 0 to infinity: {self._few_clusters_text}")
-        independent = self.curves[0].independent
+        is_independent = self.curves[0].is_independent
         notes += [
             f"{curve.limit_state}: intervals without an end say that the data allow a curve which does not rise with "
-            f"the intensity; more {'outcome' if independent else self.source}s are needed"
+            f"the intensity; more {'outcome' if is_independent else self.source}s are needed"
             for curve in self.curves
-            if curve.bounded and math.isinf(curve.dispersion_interval[1])
+            if curve.is_bounded and math.isinf(curve.dispersion_interval[1])
         ]
-        if not independent:
+        if not is_independent:
             reason = f"the test takes all outcomes for independent, and those of one {self.source} belong together"
             notes.append(f"no p-value of the fit: {reason}")
         elif self.curves[0].goodness.degrees_of_freedom < 1:
@@ -243,21 +243,22 @@ class Fragility(Result):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        survival = Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
-        if hazard is None or not self.several_blocks or self.outcomes is None:
+        about = (self.measure, self.description, years, confidence, hazard, rate, self.has_several_blocks)
+        survival = Survival(curve, *about)
+        if hazard is None or not self.has_several_blocks or self.outcomes is None:
             return survival
         mean, error = compute_mean_survival(self.outcomes, self.measure.column, limit_state, hazard, survival.years)
         return replace(survival, mean_probability=mean, mean_error=error)
 
     @property
-    def range(self) -> tuple[float, float]:
+    def intensity_range(self) -> tuple[float, float]:
         """Lowest and highest intensity of the data, in SI units or a block's own."""
         intensities = np.concatenate([curve.intensity for curve in self.curves])
         return float(intensities.min()), float(intensities.max())
 
     def _columns(self, table: str) -> list[Column]:
         if table == "curves":
-            x = np.linspace(0.0, self.range[1], _POINTS)
+            x = np.linspace(0.0, self.intensity_range[1], _POINTS)
             values = np.hstack([[x, curve.probability(x), *curve.band(x)] for curve in self.curves])
             limit_states = np.repeat([curve.limit_state for curve in self.curves], _POINTS)
             names = ("limit_state", self.measure.column, "probability", "lower", "upper")
@@ -305,19 +306,20 @@ class Fragility(Result):
         unit_block = self.block if block is None else block
         measure = convert_to_openquake_measure(self.measure, unit_block, self.model)
         uplift = None
-        if unit_block is not None and measure[0] == "PGA" and not self.with_vertical:
+        if unit_block is not None and measure[0] == "PGA" and not self.includes_vertical:
             uplift = min(unit_block.uplift_thresholds(self.model)) / STANDARD_GRAVITY
         options = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
-        write_text(path, format_nrml(self.curves, measure, self.range, uplift, taxonomy, self.description, **options))
+        ends = self.intensity_range
+        write_text(path, format_nrml(self.curves, measure, ends, uplift, taxonomy, self.description, **options))
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import draw_fragility
 
         first_curve = self.curves[0]
         band_label = f"band: {100 * first_curve.confidence:g} % confidence (likelihood)"
-        if not first_curve.bounded:
+        if not first_curve.is_bounded:
             band_label = f"no band: {self._few_clusters_text}"
-        intensity = np.linspace(0.0, self.range[1], _POINTS)
+        intensity = np.linspace(0.0, self.intensity_range[1], _POINTS)
         limit_state = first_curve.limit_state if len(self.curves) == 1 else "the limit state"
         verb = "" if limit_state == "overturning" else "exceeding "
         return draw_fragility(
@@ -455,7 +457,7 @@ def fragility(
         error.outcomes = outcomes
         raise
     scales = 1.0 if stripes is None else measure.find_factor(stripes[:, None, None] * units, values[:, None])
-    factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
+    factors = np.asarray(scales)[..., None] * np.array(POLARITY_SIGNS[options["polarity"]])
     setup = Setup(bodies, model, chattering_scheme(chattering), friction=resolve_friction(friction))
     kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
     text = f"{describe_pool(blocks, weights)}, {describe_sample(cluster_numbers, clusters)}, {kind}, {model} model"
@@ -468,9 +470,9 @@ def fragility(
         block=find_single_block(blocks),
         model=model,
         outcomes=outcomes,
-        one_way=polarity != "both" and not bodies.is_symmetric,
-        with_vertical="vertical" in table.coords,
-        several_blocks=bool(np.count_nonzero(block_weights) > 1),
+        is_one_way=polarity != "both" and not bodies.is_symmetric,
+        includes_vertical="vertical" in table.coords,
+        has_several_blocks=bool(np.count_nonzero(block_weights) > 1),
         source="motion" if clusters is None else "cluster",
         undecided=describe_undecided(setup, motions, factors, table.overturned.values),
         missing="; ".join(filter(None, [describe_missing(table.unfinished.values), _describe_lost(lost)])),

@@ -31,7 +31,7 @@ from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
 from rocking.core.tables import add_unit, escape_dollars, format_count, format_table, to_plain
-from rocking.engine.problem import compute_slenderness, compute_thresholds, gather_bodies, never_rests
+from rocking.engine.problem import compute_slenderness, compute_uplift_thresholds, conserves_speed, gather_bodies
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, simulate_each
 from rocking.errors import OptionError
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Number of levels per simulation.
-_CHUNK: Final = 16
+_LEVELS_PER_CHUNK: Final = 16
 
 
 def incremental_dynamic_analysis(
@@ -122,7 +122,7 @@ def incremental_dynamic_analysis(
     bodies, measure, motion_list = gather_bodies(blocks), Measure.parse(measure), list_motions(motions)
     slenderness = compute_slenderness(bodies)
     values = compute_intensities(motion_list, measure)
-    if never_rests(bodies):
+    if conserves_speed(bodies):
         reason = "because otherwise the block never comes to rest"
         raise OptionError(f"{{}} must be below 1 for an incremental dynamic analysis, {reason}", "restitution")
     relative_width = checks.between(rtol, "rtol", OptionError, 1e-15, 0.5)
@@ -190,7 +190,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         "levels": ("peak_rotation", "peak_over_alpha", "overturned"),
         "bands": ("band_motion", "band_block", "band_start", "band_end"),
     }
-    POOLED = ("motion", "level", "block", "band")
+    AGGREGATED_DIMENSIONS = ("motion", "level", "block", "band")
 
     def _table(self, name: str) -> xr.Dataset:
         part = super()._table(name)
@@ -288,7 +288,7 @@ def compute_lowest_uplift(
     blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model
 ) -> float:
     """Find the lowest level at which a motion, scaled with its vertical component, lifts a block."""
-    (thresholds, weight_thresholds), gravity = compute_thresholds(blocks, model), blocks.gravity
+    (thresholds, weight_thresholds), gravity = compute_uplift_thresholds(blocks, model), blocks.gravity
     factors = [compute_uplift_factors(motion, thresholds, gravity, weight_thresholds) for motion in motions]
     intensity = np.array(factors) ** measure.exponent * values[:, None] / compute_block_units(blocks, measure, model)
     lowest = float(np.min(intensity))
@@ -299,14 +299,14 @@ def compute_lowest_uplift(
 
 
 def _simulate_until_overturned(
-    blocks: Bodies, motions: Sequence[Motion], measure: Measure, first: float, options: dict[str, Any]
+    blocks: Bodies, motions: Sequence[Motion], measure: Measure, lowest_level: float, options: dict[str, Any]
 ) -> xr.Dataset:
     """Simulate levels in steps of 5 % up to three times the level by which every motion overturns each block."""
     import xarray as xr
 
     tables: list[xr.Dataset] = []
-    for start in range(0, 128, _CHUNK):
-        levels = first * np.power(1.05, np.arange(start, start + _CHUNK, dtype=np.float64))
+    for start in range(0, 128, _LEVELS_PER_CHUNK):
+        levels = lowest_level * np.power(1.05, np.arange(start, start + _LEVELS_PER_CHUNK, dtype=np.float64))
         tables.append(simulate_levels(blocks, motions, measure, levels, **options))
         overturned = xr.concat([chunk.overturned for chunk in tables], "level")
         last = 3.0 * overturned.level.where(overturned).min("level", skipna=True).max(skipna=False)
@@ -355,11 +355,11 @@ class _LevelDescription:
         self.scale, self.values = level.scale, level.scale * level.values
         self.unit = {"m/s^2": " g", "1": ""}.get(level.units, f" {level.units}")
         low, high = (f"{end:.5g}" for end in self.values[[0, -1]])
-        self.range = f"{low}{self.unit}" if low == high else f"{low} to {high}{self.unit}"
+        self.range_text = f"{low}{self.unit}" if low == high else f"{low} to {high}{self.unit}"
 
     def summary(self, lowest_uplift: float) -> str:
         """Describe the levels, and whether all of them are below the level (SI) at which a motion lifts a block."""
-        sentence = f"looked at: {format_count(len(self.values), 'level')}, {self.range}"
+        sentence = f"looked at: {format_count(len(self.values), 'level')}, {self.range_text}"
         if len(self.values) > 1:
             steps, ratios = np.diff(self.values), self.values[1:] / self.values[:-1]
             apart = f"up to {steps.max():.5g}{self.unit}"
@@ -376,12 +376,12 @@ class _LevelDescription:
     def describe_bands(self, bands: Sequence[tuple[float, float]]) -> str:
         """Describe the bands that overturn (SI). NaN marks unknown ends beyond the levels."""
         texts = [self._describe_band(*(self.scale * end for end in band)) for band in bands]
-        return "; ".join(texts) or f"at no level looked at, {self.range}"
+        return "; ".join(texts) or f"at no level looked at, {self.range_text}"
 
     def _describe_band(self, low: float, high: float) -> str:
         if not (math.isnan(low) or math.isnan(high)):
             return f"{low:.5g} to {high:.5g}"
         if math.isnan(low) and math.isnan(high):
-            return f"at every level looked at, {self.range}"
+            return f"at every level looked at, {self.range_text}"
         open_end = f"up to {high:.5g}{self.unit}" if math.isnan(low) else f"from {low:.5g}{self.unit} on"
         return f"at all levels looked at {open_end}"

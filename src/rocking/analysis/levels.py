@@ -212,17 +212,17 @@ def describe_sample(clusters: Integers, labels: object) -> str:
     return text if labels is None else f"{text} in {format_count(len(np.unique(clusters)), 'cluster')}"
 
 
-def assign_families(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
-    """Assign numbers to families of motions that are equal up to a factor, also a negative one if ``reversed_too``."""
+def assign_families(motions: Sequence[Motion], *, include_reversed: bool = True) -> Integers:
+    """Assign numbers to families of motions that are equal up to a factor, by choice also a negative one."""
     # Invariants of scale and sign. Only motions with equal invariants are compared in full.
     invariants, first_members = np.empty((len(motions), 2)), list[int]()
     families = np.empty(len(motions), dtype=np.int64)
     for k, motion in enumerate(motions):
         magnitudes = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
         invariants[k] = (magnitudes / magnitudes.max()).mean(), np.sqrt(((magnitudes / magnitudes.max()) ** 2).mean())
-        candidates = np.flatnonzero(np.all(np.abs(invariants[first_members] - invariants[k]) <= 1e-9, axis=1)).tolist()
-        is_alike = (is_multiple(motions[first_members[j]], motion, reversed_too=reversed_too) for j in candidates)
-        families[k] = next(compress(candidates, is_alike), len(first_members))
+        near = np.flatnonzero(np.all(np.abs(invariants[first_members] - invariants[k]) <= 1e-9, axis=1)).tolist()
+        is_alike = (is_multiple(motions[first_members[j]], motion, include_reversed=include_reversed) for j in near)
+        families[k] = next(compress(near, is_alike), len(first_members))
         if families[k] == len(first_members):
             first_members.append(k)
     return families
@@ -385,7 +385,7 @@ class Brackets:
 
 
 #: Number of simulations that take hardly longer together than one.
-_SIMULATED_TOGETHER: Final = 48
+_BATCH_SIZE: Final = 48
 
 
 def find_boundaries(
@@ -424,7 +424,7 @@ def find_boundaries(
 def _collect_midpoints(column: Integers, low: Floats, high: Floats) -> tuple[Integers, Floats]:
     """Return the columns and midpoints of brackets, and of their halves as long as there are few."""
     columns, midpoints = [column], [bisection.compute_midpoints(low, high)]
-    while sum(map(len, columns)) + 2 * len(column) < _SIMULATED_TOGETHER:
+    while sum(map(len, columns)) + 2 * len(column) < _BATCH_SIZE:
         low, high = np.append(low, midpoints[-1]), np.append(midpoints[-1], high)
         column = np.append(column, column)
         columns.append(column)

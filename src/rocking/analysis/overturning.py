@@ -19,7 +19,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, format_some_rows, variable
+from rocking.core.result import DatasetResult, create_variable, format_some_rows
 from rocking.core.tables import add_unit, columns_to_records, escape_dollars, format_cell, format_table
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import OUTCOME, Setup, simulate_each
@@ -294,7 +294,7 @@ class OverturningMap(DatasetResult):
         "modes": ("mode", "peak_rotation"),
         "boundaries": ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above"),
     }
-    POOLED = ("boundary",)
+    AGGREGATED_DIMENSIONS = ("boundary",)
 
     @staticmethod
     def _restrict(data: xr.Dataset) -> xr.Dataset:
@@ -422,17 +422,17 @@ def _combine_modes(
     lowest_meaning = f"lowest amplitude that overturns the block, {normalisation}"
     return xr.Dataset(
         {
-            "mode": variable(("amplitude", "frequency"), modes, meaning),
-            "peak_rotation": variable(("amplitude", "frequency"), peaks, "largest rotation in size", "rad"),
-            "overturning_amplitude": variable("frequency", lowest, lowest_meaning, "1"),
-            "boundary_frequency": variable("boundary", ratios[brackets.column], unit="1"),
-            "boundary_amplitude": variable("boundary", brackets.level, unit="1"),
-            "mode_below": variable("boundary", brackets.outcome_below, meaning),
-            "mode_above": variable("boundary", brackets.outcome_above, meaning),
+            "mode": create_variable(("amplitude", "frequency"), modes, meaning),
+            "peak_rotation": create_variable(("amplitude", "frequency"), peaks, "largest rotation in size", "rad"),
+            "overturning_amplitude": create_variable("frequency", lowest, lowest_meaning, "1"),
+            "boundary_frequency": create_variable("boundary", ratios[brackets.column], unit="1"),
+            "boundary_amplitude": create_variable("boundary", brackets.level, unit="1"),
+            "mode_below": create_variable("boundary", brackets.outcome_below, meaning),
+            "mode_above": create_variable("boundary", brackets.outcome_above, meaning),
         },
         {
-            "amplitude": variable("amplitude", levels, f"amplitude of the pulse {normalisation}", "1"),
-            "frequency": variable("frequency", ratios, "2 pi times the pulse's frequency, over p", "1"),
+            "amplitude": create_variable("amplitude", levels, f"amplitude of the pulse {normalisation}", "1"),
+            "frequency": create_variable("frequency", ratios, "2 pi times the pulse's frequency, over p", "1"),
         },
         attributes,
     )

@@ -20,7 +20,7 @@ _MAX_ITERATIONS: Final = 100
 
 
 #: Slope that represents a step.
-STEEP: Final = 1e9
+STEEPEST_SLOPE: Final = 1e9
 
 #: Minimum number of outcomes in a group of the test of fit, and maximum number of groups of binary outcomes (Hosmer and
 #: Lemeshow).
@@ -83,8 +83,11 @@ class Probit(NamedTuple):
 
 
 #: Level curves at 0 and 1, and steps below and above all possible intensities.
-_STEP: Final = 1000.0 * STEEP
-_WHOLE_PLANE: Final = Probit(*np.array([[-np.inf, np.inf, _STEP, -_STEP], [0.0, 0.0, STEEP, STEEP]]))
+_STEEPEST_INTERCEPT: Final = 1000.0 * STEEPEST_SLOPE
+_WHOLE_PLANE: Final = Probit(
+    np.array([-np.inf, np.inf, _STEEPEST_INTERCEPT, -_STEEPEST_INTERCEPT]),
+    np.array([0.0, 0.0, STEEPEST_SLOPE, STEEPEST_SLOPE]),
+)
 
 
 def compute_normal_scores(fits: Probit, z: Floats) -> Floats:
@@ -203,8 +206,8 @@ def fit_or_limits(data: Outcomes) -> Probit:
     max_other = np.where(exceeded < trials, z, -np.inf).max(axis=1)
     is_step = np.isfinite(max_other - min_exceeded) & (max_other <= min_exceeded + _compute_overlap(z))
     # If the best curve would fall, the limit is level: one probability, 0 or 1 if all outcomes are equal.
-    fits = Probit(ndtri(exceeded.sum(axis=1) / trials.sum(axis=1)), np.where(is_step, STEEP, 0.0))
-    fits.intercept[is_step] = -0.5 * STEEP * (max_other + min_exceeded)[is_step]
+    fits = Probit(ndtri(exceeded.sum(axis=1) / trials.sum(axis=1)), np.where(is_step, STEEPEST_SLOPE, 0.0))
+    fits.intercept[is_step] = -0.5 * STEEPEST_SLOPE * (max_other + min_exceeded)[is_step]
     if (is_regular := ~is_step & _is_rising(data)).any():
         fits.intercept[is_regular], fits.slope[is_regular] = fit(data.select(is_regular))
     return fits

@@ -73,9 +73,9 @@ class Rate:
 
     def __repr__(self) -> str:
         rate, interval_text = format_digits(self.annual_rate, self.interval, self.bounds)
-        return f"<Rate: {self.limit_state}: {rate} a year ({interval_text}), {self.in_words()}>"
+        return f"<Rate: {self.limit_state}: {rate} a year ({interval_text}), {self.describe_period()}>"
 
-    def in_words(self) -> str:
+    def describe_period(self) -> str:
         """Return the period and its interval as "once in ... years", with the significant digits."""
         period, interval_text = self._format_period()
         return f"once in {period} year{'' if period == '1' else 's'} ({interval_text})"
@@ -195,7 +195,7 @@ class Risk(Result):
         # Limit the figure to intensities that contribute to the rates.
         low, high = self.hazard.intensity[[0, -1]]
         intensity = np.geomspace(1e-2 * low, 1e2 * high, 800)
-        labels = [f"{rate.limit_state}: {rate.in_words()}" for rate in self.rates]
+        labels = [f"{rate.limit_state}: {rate.describe_period()}" for rate in self.rates]
         densities = [compute_share_density(curve.fitted, self.hazard, intensity) for curve in self.curves]
         return draw_risk(
             intensity=self.hazard.measure.display_factor * intensity,
@@ -208,7 +208,7 @@ class Risk(Result):
         )
 
     def _headline(self) -> str:
-        rates = ", ".join(f"{rate.limit_state}: {rate.in_words()}" for rate in self.rates)
+        rates = ", ".join(f"{rate.limit_state}: {rate.describe_period()}" for rate in self.rates)
         return f"{self.description}; {self.hazard.name}; {rates}"
 
 
@@ -269,7 +269,7 @@ class Survival(Result):
     ----------
     curve : FragilityCurve
         Probabilities of exceeding the limit.
-    measure, description, several_blocks : Measure, str, bool
+    measure, description, has_several_blocks : Measure, str, bool
         As for `Fragility`.
     years, confidence : float
         As for `Fragility.survival`.
@@ -305,7 +305,7 @@ class Survival(Result):
     confidence: float
     hazard: HazardCurve | None
     rate: Rate | None
-    several_blocks: bool = False
+    has_several_blocks: bool = False
     mean_probability: float = math.nan
     mean_error: float = math.nan
 
@@ -358,7 +358,7 @@ class Survival(Result):
         if self.hazard is None:
             return math.nan
         hazard, years = self.hazard, self.years
-        if self.several_blocks:
+        if self.has_several_blocks:
             _, high = compute_extremes(self.curve.region, lambda fits: compute_log_survival(fits, hazard, years))
             return math.exp(min(float(high[0]), 0.0))
         low, _ = compute_extremes(self.curve.region, lambda fits: compute_log_rate_within(fits, hazard))
@@ -392,7 +392,7 @@ class Survival(Result):
             f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
             f"most likely never {self._never_text}: one such motion would have exceeded the limit with {percent}",
             f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
-            f"exceeded with {percent}" + (", if each met another of the blocks" if self.several_blocks else ""),
+            f"exceeded with {percent}" + (", if each met another of the blocks" if self.has_several_blocks else ""),
             "",
             format_table(header, [*zip(*columns, strict=True)]),
         ]
@@ -419,7 +419,7 @@ class Survival(Result):
         chance, interval_text = format_digits(self.probability, self.interval, bounds)
         confidence, likeliest = 100.0 * self.curve.confidence, self.probability
         estimate = f"{chance} ({confidence:g} % interval {interval_text})"
-        if self.several_blocks:
+        if self.has_several_blocks:
             single = f"at most {self.max_probability:.2g} if one of the blocks has stood all the time"
             estimate = f"{single}, and {estimate} if each motion met another of them"
         if not math.isnan(self.mean_probability):

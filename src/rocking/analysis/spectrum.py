@@ -26,7 +26,7 @@ from rocking.block.friction import Friction
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.core.result import DatasetResult, format_some_rows, variable
+from rocking.core.result import DatasetResult, create_variable, format_some_rows
 from rocking.core.tables import add_unit, escape_dollars
 from rocking.engine.problem import gather_bodies
 from rocking.engine.schemes import ChatteringScheme
@@ -220,7 +220,7 @@ class RockingSpectrum(DatasetResult):
         "fractiles": ("fractile_over_alpha", "overturned_share"),
         "peaks": ("peak_rotation", "peak_over_alpha", "overturned"),
     }
-    POOLED = ("motion", "block")
+    AGGREGATED_DIMENSIONS = ("motion", "block")
 
     def summary(self) -> str:
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
@@ -307,18 +307,20 @@ def _combine_peaks(
     meaning = "peak rotation over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
-            "peak_rotation": variable(dims, peak, "peak rotation; pi/2: overturns", "rad"),
-            "peak_over_alpha": variable(dims, ratio, meaning, "1"),
+            "peak_rotation": create_variable(dims, peak, "peak rotation; pi/2: overturns", "rad"),
+            "peak_over_alpha": create_variable(dims, ratio, meaning, "1"),
             "overturned": (dims, overturned, table.overturned.attrs),
-            "fractile_over_alpha": variable(("fractile", *share_dims), fractiles, f"fractile of the {meaning}", "1"),
-            "overturned_share": variable(share_dims, share, "share of the motions that overturn the block", "1"),
+            "fractile_over_alpha": create_variable(
+                ("fractile", *share_dims), fractiles, f"fractile of the {meaning}", "1"
+            ),
+            "overturned_share": create_variable(share_dims, share, "share of the motions that overturn the block", "1"),
         },
         {
             "motion": table.motion,
             **{name: table[name] for name in ("vertical",) if name in table.coords},
-            **{name: variable(name, points, unit=_UNITS[name]) for name, points in axes.items()},
-            "period": variable("p", 2.0 * np.pi / axes["p"], "2 pi/p", "s"),
-            "size": variable("p", half_diagonal, "half diagonal of the rectangular block", "m"),
+            **{name: create_variable(name, points, unit=_UNITS[name]) for name, points in axes.items()},
+            "period": create_variable("p", 2.0 * np.pi / axes["p"], "2 pi/p", "s"),
+            "size": create_variable("p", half_diagonal, "half diagonal of the rectangular block", "m"),
         },
         {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )

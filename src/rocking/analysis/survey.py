@@ -151,7 +151,7 @@ class Survey(BlocksUnderRecords):
         return rows
 
     def summary(self) -> str:
-        limit = self.bodies[0].coordinate.limit
+        limit = self.bodies[0].coordinate.limit_name
         ratio_columns = [{f"peak_over_{limit}": float(format_ratio(response))} for response in self.responses]
         rows = [row | ratio_column for row, ratio_column in zip(self.rows(), ratio_columns, strict=True)]
         titles = self._list_label_titles()
@@ -339,7 +339,7 @@ def survey(
     named_motions = index_motions(motions)
     bodies = [*block] if isinstance(block, Sequence) else [block]
     for body in bodies:
-        if not require_body(body).coordinate.limit:
+        if not require_body(body).coordinate.limit_name:
             message = "a survey requires a Block, because only a block has an unstable equilibrium"
             raise OptionError(f"{message}; got {type(body).__name__}")
     if available_friction is not None:
@@ -410,12 +410,12 @@ def _create_row(response: Response, precision: float) -> dict[str, Any]:
         "leans": response.leans,
         "ambiguous": response.ambiguous,
         add_unit("overturn_time", "s"): response.overturn_time,
-        f"peak_over_{response.block.coordinate.limit}": response.peak_over_slenderness,
+        f"peak_over_{response.block.coordinate.limit_name}": response.peak_over_slenderness,
         add_unit("peak_rotation", "rad"): response.peak_rotation,
         add_unit("residual_rotation", "rad"): response.residual_rotation,
         add_unit("peak_time", "s"): response.peak_time,
         "impacts_resolved": len(response.impacts),
         "rests": int((response.events["kind"] == "rest").sum()),
         add_unit("time_at_rest", "s"): response.time_at_rest,
-        "required_friction": math.nan if response.block.contact is None else response.required_friction,
+        "required_friction": math.nan if response.block.contact_law is None else response.required_friction,
     }

@@ -15,7 +15,7 @@ from rocking.block import Block
 from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import VERSION
-from rocking.core.result import variable
+from rocking.core.result import create_variable
 from rocking.engine.problem import gather_bodies
 from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
@@ -87,7 +87,8 @@ def create_dataset(
     variables = dict[str, Any]()
 
     def add(dims: str, name: str, values: Any, meaning: str, unit: str) -> None:
-        variables[name] = variable((*dims.split(),), values, meaning, measure.units if unit == _INTENSITY else unit)
+        unit = measure.units if unit == _INTENSITY else unit
+        variables[name] = create_variable((*dims.split(),), values, meaning, unit)
 
     for name, values in ranks.items():
         add("block", name, values, name.replace("_", " "), "1")

@@ -171,7 +171,7 @@ def describe_object(assessment: Assessment, k: int) -> list[str]:
             statements.append(f"The rule {rule.title()} {verdict}.")
     notes = []
     if item.fragility is not None and item.curve is not None:
-        has_ends = item.curve.bounded and not math.isinf(item.curve.dispersion_interval[1])
+        has_ends = item.curve.is_bounded and not math.isinf(item.curve.dispersion_interval[1])
         notes = [item.fragility.missing, item.fragility.undecided] if has_ends else [*item.fragility.notes]
     texts = [*statements, *(f"{note}." for note in notes if note)]
     return [f"{text[0].upper()}{text[1:]}".replace("< ", "less than ").replace("> ", "more than ") for text in texts]
@@ -283,7 +283,7 @@ def _draw_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
     )
     x = np.linspace(0.0, item.levels[-1], 121)
     if item.curve is not None:
-        if item.curve.bounded:
+        if item.curve.is_bounded:
             chart.add_band(scale * x, *item.curve.band(x))
         chart.add_line(scale * x, item.curve.probability(x), "curve")
     chart.add_points(scale * item.levels, item.share.mean(axis=1))

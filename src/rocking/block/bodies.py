@@ -176,7 +176,7 @@ class Blocks:
             raise BlockError("each parameter of a grid must be a number or a sequence of at least one number")
         checks.check_grid_size({name: axis.size for name, axis in axes.items()}, BlockError)
         blocks = cls(*(column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")), gravity=gravity)
-        return blocks._fill(blocks.gravity, blocks._arrays(), axes)
+        return blocks._fill(blocks.gravity, blocks._collect_arrays(), axes)
 
     @classmethod
     def sample(
@@ -302,21 +302,21 @@ class Blocks:
         """Name of the kind of bodies."""
         return "restrained-blocks" if self.terms else "blocks"
 
-    def _arrays(self) -> dict[str, Floats]:
+    def _collect_arrays(self) -> dict[str, Floats]:
         return {"p": self.p, "alpha": self.alpha, "restitution": self.restitution, **self.terms}
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         """Return p, alpha, restitution and the terms of restrained blocks, with units, by name."""
-        return {name: (values, _UNITS.get(name, "1")) for name, values in self._arrays().items()}
+        return {name: (values, _UNITS.get(name, "1")) for name, values in self._collect_arrays().items()}
 
     def speed_thresholds(self, share: float) -> Floats:
         """Return a share of p alpha on every side, rad/s, shape (n, 2)."""
         return share * self.p * self.alpha
 
-    def kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
+    def create_kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
         """Return records for kernels (`kernels.state.BLOCK`), shape (n,)."""
         p, alpha = self.p, self.alpha
-        records = state.new_records(len(self), state.BLOCK)
+        records = state.create_records(len(self), state.BLOCK)
         stiffness, cosine = p * p, np.cos(alpha)
         records["stiffness"], records["slenderness"] = stiffness, alpha
         records["sine"], records["cosine"] = np.sin(alpha), cosine
@@ -384,7 +384,7 @@ class Blocks:
     @property
     def is_symmetric(self) -> bool:
         """Whether all blocks have two equal sides."""
-        has_equal_sides = all(np.array_equal(values[:, 0], values[:, 1]) for values in self._arrays().values())
+        has_equal_sides = all(np.array_equal(values[:, 0], values[:, 1]) for values in self._collect_arrays().values())
         return has_equal_sides and not np.any(self.terms.get("one_sided", 0.0))
 
     def __repr__(self) -> str:
@@ -433,7 +433,7 @@ class Blocks:
             requirement = f"a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} values"
             hint = "use blocks[0] for a single block"
             raise BlockError(f"select requires {requirement}, not {checks.short_repr(index)}; {hint}")
-        arrays = {name: values[rows] for name, values in self._arrays().items()}
+        arrays = {name: values[rows] for name, values in self._collect_arrays().items()}
         radii = None if self.radii is None else self.radii[rows]
         labels = {name: values[rows] for name, values in self.labels.items()}
         return Blocks.__new__(Blocks)._fill(self.gravity, arrays, radii=radii, labels=labels)

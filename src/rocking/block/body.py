@@ -20,11 +20,11 @@ class Coordinate(NamedTuple):
 
     Attributes
     ----------
-    name, rate, acceleration : str
+    name, rate_name, acceleration_name : str
         Names of the coordinate and its rates, for example "rotation", "angular_velocity" and "angular_acceleration".
     unit : str
         Unit of the coordinate.
-    limit : str
+    limit_name : str
         Name of the coordinate of the unstable balance, for example "slenderness"; empty if there is none.
 
     See Also
@@ -36,15 +36,15 @@ class Coordinate(NamedTuple):
     --------
     >>> import rocking
     >>> coordinate = rocking.Block(width=0.4, height=2.0).coordinate
-    >>> coordinate.name, coordinate.unit, coordinate.limit
+    >>> coordinate.name, coordinate.unit, coordinate.limit_name
     ('rotation', 'rad', 'slenderness')
     """
 
     name: str
-    rate: str
-    acceleration: str
+    rate_name: str
+    acceleration_name: str
     unit: str
-    limit: str = ""
+    limit_name: str = ""
 
 
 #: Ratio of the ground forces on a body to its weight, horizontal and vertical. Arguments (arrays of one shape): the
@@ -95,7 +95,7 @@ class Body(Protocol):
         """Coordinate of the ground contact on each side; the second is unused for a single side."""
 
     @property
-    def contact(self) -> ContactLaw | None:
+    def contact_law(self) -> ContactLaw | None:
         """Forces of the ground; None if they are not available."""
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
@@ -161,7 +161,7 @@ class Bodies(Protocol):
     def speed_thresholds(self, share: float) -> Floats:
         """Return a share of the characteristic speed of each side, shape (n, 2): p alpha for a block, rad/s."""
 
-    def kernel_records(self, model: Model, thresholds: Floats) -> Records:
+    def create_kernel_records(self, model: Model, thresholds: Floats) -> Records:
         """Return records for kernels (`kernels.state.BLOCK`), with thresholds of a chattering scheme, shape (n, 2)."""
 
 

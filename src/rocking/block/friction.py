@@ -77,13 +77,13 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
     base = height * bodies.alpha if is_linear else radii * np.sin(bodies.alpha)
     ratio = arm * bodies.p**2 / g
     inertia = g * arm / bodies.p**2
-    gyration_square = (
+    gyration_squared = (
         inertia[:, ::-1] - height**2 - base[:, ::-1] ** 2
     )  # of the radius of gyration, by the side entered
     static, kinetic = friction
-    _refuse(~((ratio < 1.0) & (gyration_square > 0.0)), _MISSING)
+    _raise_if_any(~((ratio < 1.0) & (gyration_squared > 0.0)), _MISSING)
     centroidal_inertia = (1.0 - ratio) / ratio
-    pivot_square = gyration_square + base[:, ::-1] ** 2
+    pivot_square = gyration_squared + base[:, ::-1] ** 2
     largest = np.minimum(
         2.0 * np.sqrt(centroidal_inertia * (1.0 + centroidal_inertia)), pivot_square / (height * base[:, ::-1])
     )
@@ -95,8 +95,8 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
             "friction",
             value=kinetic,
         )
-    gain = (inertia[:, ::-1] * bodies.restitution - height**2) ** 2 - (gyration_square + base**2) * pivot_square
-    _refuse(
+    gain = (inertia[:, ::-1] * bodies.restitution - height**2) ** 2 - (gyration_squared + base**2) * pivot_square
+    _raise_if_any(
         gain > _SIZE_TOLERANCE * pivot_square**2,
         "this restitution would gain energy in a slip, so that {} requires another one; omit the restitution",
     )
@@ -113,10 +113,10 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
 def check_friction(bodies: Bodies, model: Model, friction: tuple[float, float] | None) -> None:
     """Raise `OptionError` if bodies cannot be simulated with friction; see `add_friction`."""
     if friction is not None:
-        add_friction(bodies.kernel_records(model, np.zeros((len(bodies), 2))), bodies, model, friction)
+        add_friction(bodies.create_kernel_records(model, np.zeros((len(bodies), 2))), bodies, model, friction)
 
 
-def _refuse(is_invalid: Flags, text: str) -> None:
+def _raise_if_any(is_invalid: Flags, text: str) -> None:
     if is_invalid.any():
         index = int(np.argwhere(is_invalid)[0][0])
         raise OptionError(text + (f" of block {index}" if len(is_invalid) > 1 else ""), "friction")
@@ -125,7 +125,8 @@ def _refuse(is_invalid: Flags, text: str) -> None:
 def _find_radii(blocks: Blocks) -> Floats:
     """Return the distance of the centre of mass from each pivot, m, shape (n, 2)."""
     if blocks.radii is not None:
-        _refuse(np.isnan(blocks.radii), "the columns of a frame slip one by one, so that {} is not available; omit it")
+        message = "the columns of a frame slip one by one, so that {} is not available; omit it"
+        _raise_if_any(np.isnan(blocks.radii), message)
         radii: Floats = blocks.radii
     else:
         radii = 0.75 * blocks.gravity / blocks.p**2
@@ -134,12 +135,12 @@ def _find_radii(blocks: Blocks) -> Floats:
             return radii
         depth = np.full(len(blocks), np.inf)
         depth[differs] = compute_rigid_bodies(blocks.p[differs], blocks.alpha[differs])[1]
-        _refuse(np.isnan(depth), _MISSING)
+        _raise_if_any(np.isnan(depth), _MISSING)
         radii[differs] = blocks.gravity * depth[differs, None] / np.cos(blocks.alpha[differs])
     heights = radii * np.cos(blocks.alpha)
     squares = blocks.gravity * radii / blocks.p**2 - radii**2
     for sizes in (heights, squares):
-        _refuse(np.abs(sizes[:, 0] - sizes[:, 1]) > _SIZE_TOLERANCE * np.abs(sizes[:, 0]), _MISSING)
+        _raise_if_any(np.abs(sizes[:, 0] - sizes[:, 1]) > _SIZE_TOLERANCE * np.abs(sizes[:, 0]), _MISSING)
     return radii
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from rocking.block.body import SINGLE_BODY_TYPES, ContactLaw, Coordinate
 from rocking.block.restraints import Load, Pivot, Pivots, Restitution, Restraint, RestraintTerms, Tendon
 from rocking.block.sides import Side, check_pair, check_parameter, one_sided_restitution
-from rocking.block.single import Block, Rocking, require_block
+from rocking.block.single import Block, BlockBase, require_block
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.bisection import bisect
@@ -28,7 +28,7 @@ _ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_accelerat
 
 
 @dataclass(frozen=True, repr=False)
-class RestrainedBlock(Rocking):
+class RestrainedBlock(BlockBase):
     """Block with restraints, a lean, or a single side, such as a facade against its side walls.
 
     Parameters
@@ -172,28 +172,28 @@ class RestrainedBlock(Rocking):
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
         checks.choice(model, "model", OptionError, MODELS)
-        records = self.as_bodies().kernel_records(model, np.zeros((1, 2)))
+        records = self.as_bodies().create_kernel_records(model, np.zeros((1, 2)))
         plus, minus = (self.gravity * (records["threshold"] + records["restraint_threshold"])[0]).tolist()
         return plus, minus
 
     @property
-    def contact(self) -> ContactLaw | None:
+    def contact_law(self) -> ContactLaw | None:
         """Ratio of the ground forces to the weight, including loads that follow (see `rocking.block.body`).
 
         The support behind a one-sided block at rest pushes it to side + without friction, as little as required.
         Therefore the remaining ground force is smallest. None for a block from the arrays of `Blocks`, whose forces
         are unknown.
         """
-        return None if self.restraints is None else self._contact_forces
+        return None if self.restraints is None else self._compute_contact_forces
 
-    def _contact_forces(
+    def _compute_contact_forces(
         self,
         motion: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],
         side: Integers,
         elongation: Floats,
     ) -> tuple[Floats, Floats]:
-        horizontal, vertical = self.block.contact(motion, ground_over_g, side, elongation)
+        horizontal, vertical = self.block.contact_law(motion, ground_over_g, side, elongation)
         if self.restraints and self.block.mass is not None:
             pivots, weight = _create_pivots(self.block, self.lean, self.restraints), self.block.mass * self.gravity
             for restraint in self.restraints:

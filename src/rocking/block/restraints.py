@@ -183,7 +183,7 @@ class Tendon(Restraint):
             raise BlockError("a yielding tendon requires a {}, N/m", "stiffness")
 
     def _compute_terms(self, pivot: Pivot) -> RestraintTerms:
-        x = self._compute_lever(pivot)
+        x = self._compute_lever_arm(pivot)
         if self.strength < math.inf:
             yields, slack = (self.strength - self.prestress) / self.stiffness, -self.prestress / self.stiffness
             return RestraintTerms(
@@ -200,7 +200,7 @@ class Tendon(Restraint):
     def _compute_force(self, pivots: Pivots, rotation: Floats, side: Integers, elongation: Floats) -> Force:
         """Compute the force of the tendon, along the chord between its ends."""
         if self.strength == math.inf:
-            x = np.where(side == 1, self._compute_lever(pivots[1]), self._compute_lever(pivots[0]))
+            x = np.where(side == 1, self._compute_lever_arm(pivots[1]), self._compute_lever_arm(pivots[0]))
             elongation = 2.0 * x * np.sin(0.5 * np.abs(rotation))
         tension = np.clip(self.prestress + self.stiffness * elongation, 0.0, self.strength)
         inclination = 0.5 * rotation + pivots[0].lean
@@ -211,7 +211,7 @@ class Tendon(Restraint):
 
         ``ratios``: largest opening of the base on each side divided by the distance from the pivot.
         """
-        elongation = max(self._compute_lever(pivot) * ratio for pivot, ratio in zip(pivots, ratios, strict=True))
+        elongation = max(self._compute_lever_arm(pivot) * ratio for pivot, ratio in zip(pivots, ratios, strict=True))
         elastic = self.prestress + self.stiffness * elongation
         if elastic <= self.strength:
             return elongation, elastic, 0.0
@@ -224,7 +224,7 @@ class Tendon(Restraint):
         position = _describe_offset(self.offset) or " at the centre of mass"
         return f"tendon of {stiffness}, {prestress}{strength}{position}"
 
-    def _compute_lever(self, pivot: Pivot) -> float:
+    def _compute_lever_arm(self, pivot: Pivot) -> float:
         """Return the distance of the duct from the pivot, m."""
         x = pivot.distance - pivot.sign * self.offset
         if x < -1e-12 * pivot.distance:

@@ -270,13 +270,13 @@ def create_even_sides(
 
 
 def create_sides(
-    distances: tuple[float, float], height: float, gyration_sq: float, gravity: float, restitution: object
+    distances: tuple[float, float], height: float, gyration_squared: float, gravity: float, restitution: object
 ) -> tuple[Side, Side]:
     """Return the sides of a body, from its pivot distances, the height of its centre of mass, m, and k^2, m^2."""
     plus, minus = distances
     radii = math.hypot(plus, height), math.hypot(minus, height)
-    inertias = [gyration_sq + radius * radius for radius in radii]
-    numerator = gyration_sq + height * height - plus * minus
+    inertias = [gyration_squared + radius * radius for radius in radii]
+    numerator = gyration_squared + height * height - plus * minus
     e = choose_restitutions(restitution, (numerator / inertias[1], numerator / inertias[0]))
     first, second = (
         Side(math.sqrt(gravity * radius / inertia), math.atan2(distance, height), factor, radius)
@@ -352,14 +352,14 @@ def compute_eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
     """
     distances = np.tan(alpha)  # divided by the height of the centre of mass
     half_width, offset = 0.5 * distances.sum(axis=1), 0.5 * (distances[:, 1] - distances[:, 0])
-    gyration_square = compute_gyration_square(half_width, 1.0, offset)[:, None]
+    gyration_squared = compute_gyration_squared(half_width, 1.0, offset)[:, None]
     radius = np.hypot(distances, 1.0)
-    inertia = gyration_square + radius**2
+    inertia = gyration_squared + radius**2
     p = np.sqrt(radius / inertia * (4.0 / 3.0) * np.hypot(half_width, 1.0)[:, None])
-    numerator = gyration_square + 1.0 - np.prod(distances, axis=1, keepdims=True)
+    numerator = gyration_squared + 1.0 - np.prod(distances, axis=1, keepdims=True)
     return p, numerator / inertia[:, ::-1]
 
 
-def compute_gyration_square(half_width: Number, half_height: float, offset: Number) -> Number:
+def compute_gyration_squared(half_width: Number, half_height: float, offset: Number) -> Number:
     """Return the squared radius of gyration, m^2, of a rectangle with an offset centre of mass."""
     return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset

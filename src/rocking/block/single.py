@@ -19,7 +19,7 @@ from rocking.block.sides import (
     check_pair,
     check_parameter,
     choose_restitutions,
-    compute_gyration_square,
+    compute_gyration_squared,
     compute_rigid_bodies,
     create_even_sides,
     create_sides,
@@ -42,7 +42,7 @@ _RESTITUTION_TOLERANCE: Final = 1e-9
 _MAX_MASS_RATIO: Final = 1e12
 
 
-class Rocking:
+class BlockBase:
     """Text, labels, stops and arrays shared by free and restrained blocks."""
 
     #: Name and further facts, for example its place, which do not affect the motion.
@@ -96,7 +96,7 @@ class Rocking:
 
 
 @dataclass(frozen=True, repr=False)
-class Block(Rocking):
+class Block(BlockBase):
     """Free-standing rigid block that rocks without sliding or bouncing.
 
     The constructor creates rectangular blocks. For other blocks use `from_parameters`, `from_pivots` and `from_frame`.
@@ -184,7 +184,7 @@ class Block(Rocking):
             alpha = math.atan2(b, h)
             sides = create_even_sides(g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha))
         else:
-            sides = create_sides((b - s, b + s), h, compute_gyration_square(b, h, s), g, restitution)
+            sides = create_sides((b - s, b + s), h, compute_gyration_squared(b, h, s), g, restitution)
             description += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
         self._fill(sides, g, description, mass, (b, h, s))
 
@@ -454,29 +454,29 @@ class Block(Rocking):
     @property
     def p(self) -> float:
         """Frequency parameter, rad/s, if both sides are equal. Otherwise use `sides`."""
-        return self._get_common("p")
+        return self._require_equal_sides("p")
 
     @property
     def alpha(self) -> float:
         """Slenderness, rad, if both sides are equal. Otherwise use `sides`."""
-        return self._get_common("alpha")
+        return self._require_equal_sides("alpha")
 
     @property
     def radius(self) -> float:
         """Distance R from the pivot to the centre of mass, m, if both sides are equal. Otherwise use `sides`."""
-        return self._get_common("radius")
+        return self._require_equal_sides("radius")
 
     @property
     def restitution(self) -> float:
         """Factor on the angular speed at an impact if both sides are equal. Otherwise use `sides`."""
-        return self._get_common("restitution")
+        return self._require_equal_sides("restitution")
 
     @property
     def is_symmetric(self) -> bool:
         """Whether both sides are equal."""
         return self.sides[0] == self.sides[1]
 
-    def _get_common(self, name: str) -> float:
+    def _require_equal_sides(self, name: str) -> float:
         plus, minus = (getattr(side, name) for side in self.sides)
         if plus != minus:
             remedy = f"use block.sides[0].{name} and block.sides[1].{name}"
@@ -493,7 +493,7 @@ class Block(Rocking):
         """Rotation of the unstable balance on each side, rad: the slenderness."""
         return self.sides[0].alpha, self.sides[1].alpha
 
-    def contact(
+    def contact_law(
         self,
         motion: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],

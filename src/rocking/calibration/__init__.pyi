@@ -1,18 +1,18 @@
 from .diagnostics import BoundReached, Diagnostics, Scores
-from .history import HistoryCalibration, Measured
+from .history import FittedParameter, HistoryCalibration
 from .outcomes import Estimate, Validation
-from .validate import JudgedTest, MeanScore, ModelValidation, ShareInBin
+from .validate import MeanScore, ModelValidation, PredictedTest, ReliabilityBin
 
 __all__ = [
     "BoundReached",
     "Diagnostics",
     "Estimate",
+    "FittedParameter",
     "HistoryCalibration",
-    "JudgedTest",
     "MeanScore",
-    "Measured",
     "ModelValidation",
+    "PredictedTest",
+    "ReliabilityBin",
     "Scores",
-    "ShareInBin",
     "Validation",
 ]

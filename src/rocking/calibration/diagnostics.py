@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.calibration.search import MAX_R_HAT, RUN_COUNT, SearchResult, unpack
+from rocking.calibration.search import MAX_R_HAT, RUN_COUNT, SearchResult, split_populations
 from rocking.calibration.space import MAX_VALUES, Space, find_parameter_unit
 from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import format_count
@@ -169,7 +169,7 @@ class Diagnostics:
 def diagnose(search: SearchResult, populations: Floats) -> Diagnostics:
     """Compute the diagnostics of a search from the draws of its posterior."""
     candidates, effective = search.evidence.candidates, float(np.median(search.evidence.count_effective(populations)))
-    bounds_reached = list_bounds_reached(candidates.space, unpack(populations)[0])
+    bounds_reached = list_bounds_reached(candidates.space, split_populations(populations)[0])
     return Diagnostics(len(candidates.points), effective, search.agreement, bounds_reached)
 
 

@@ -52,14 +52,14 @@ _CLOUD_WIDTHS: Final = (6.0, 3.0, 1.5)
 
 
 #: A sensitivity below this share of the largest counts as zero.
-_INSENSITIVE: Final = 1e-7
+_INSENSITIVE_SLOPE: Final = 1e-7
 
 #: Smallest step in the logarithms for differences of simulations, which are accurate to about 1e-12.
 _MIN_STEP: Final = 1e-5
 
 
 @dataclass(frozen=True)
-class Measured:
+class FittedParameter:
     """Fitted parameter.
 
     Attributes
@@ -68,7 +68,7 @@ class Measured:
         Estimate, in the parameter's unit.
     deviation : float
         Standard error.
-    at_bound : bool
+    is_at_bound : bool
         Whether the fit reached a bound, which should then be widened.
 
     See Also
@@ -78,15 +78,15 @@ class Measured:
 
     Examples
     --------
-    >>> from rocking.calibration import Measured
-    >>> p = Measured(value=2.5, deviation=0.05, at_bound=False)
+    >>> from rocking.calibration import FittedParameter
+    >>> p = FittedParameter(value=2.5, deviation=0.05, is_at_bound=False)
     >>> f"p = {p.value:.2f} rad/s, coefficient of variation {p.deviation / p.value:.0%}"
     'p = 2.50 rad/s, coefficient of variation 2%'
     """
 
     value: float
     deviation: float
-    at_bound: bool
+    is_at_bound: bool
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -99,7 +99,7 @@ class HistoryCalibration(Result):
     ----------
     block : Block
         Fitted block.
-    estimates : mapping of str to Measured
+    estimates : mapping of str to FittedParameter
         Fitted parameters: "p" (rad/s), "alpha" (rad), "restitution" (with "_plus" and "_minus" for a two-sided block),
         "initial_rotation" (rad).
     covariance : ndarray, shape (k, k)
@@ -124,7 +124,7 @@ class HistoryCalibration(Result):
     """
 
     block: Block
-    estimates: Mapping[str, Measured]
+    estimates: Mapping[str, FittedParameter]
     covariance: Floats
     times: Floats
     residuals: Floats
@@ -138,10 +138,10 @@ class HistoryCalibration(Result):
     def summary(self) -> str:
         rows = []
         for name, fit in self.estimates.items():
-            remark = "at its bound" if fit.at_bound else ""
+            remark = "at its bound" if fit.is_at_bound else ""
             rows.append([name, fit.value, float(f"{fit.deviation:.2g}"), find_parameter_unit(name), remark])
         table = format_table(["parameter", "value", "std. error", "unit", ""], rows)
-        return f"{table}\n\n{self._misfit_text()}"
+        return f"{table}\n\n{self._format_misfit()}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -164,19 +164,19 @@ class HistoryCalibration(Result):
             residual=self.residuals,
             fitted_time=fine_times,
             fitted=self.response.rotation(fine_times),
-            title=title or escape_dollars(self._estimates_text()),
+            title=title or escape_dollars(self._format_estimates()),
             ax=ax,
             figsize=figsize,
         )
 
-    def _estimates_text(self) -> str:
+    def _format_estimates(self) -> str:
         numbers = ((name, f"{fit.value:.4g} {find_parameter_unit(name)}") for name, fit in self.estimates.items())
         return ", ".join(f"{name.replace('_', ' ')} = {number.removesuffix(' 1')}" for name, number in numbers)
 
     def _headline(self) -> str:
-        return f"{self._estimates_text()}; {self._misfit_text()}"
+        return f"{self._format_estimates()}; {self._format_misfit()}"
 
-    def _misfit_text(self) -> str:
+    def _format_misfit(self) -> str:
         return f"misfit {self.misfit:.3g} rad (root mean square) over {format_count(len(self.residuals), 'sample')}"
 
 
@@ -317,42 +317,42 @@ class _Problem:
         low, high = np.log([[unknown.low, unknown.high] for unknown in self.unknowns]).T
         return low, high
 
-    def values(self, logs: Floats) -> dict[str, float]:
+    def compute_values(self, logs: Floats) -> dict[str, float]:
         """Return all parameters by name, known and unknown."""
         fitted = {unknown.name: unknown.sign * math.exp(log) for unknown, log in zip(self.unknowns, logs, strict=True)}
         return {**self.known, **fitted}
 
-    def block(self, logs: Floats) -> Block:
-        values = self.values(logs)
+    def create_block(self, logs: Floats) -> Block:
+        values = self.compute_values(logs)
         p, alpha, restitution = (
             values[name] if name in values else [values[f"{name}_plus"], values[f"{name}_minus"]] for name in PARAMETERS
         )
         return Block.from_parameters(p, alpha, restitution)
 
-    def response(self, logs: Floats, end: float) -> Response:
-        start = self.values(logs)["initial_rotation"]
+    def simulate(self, logs: Floats, end: float) -> Response:
+        start = self.compute_values(logs)["initial_rotation"]
         options: dict[str, Any] = {"model": self.model, "duration": end, "friction": self.friction}
-        return simulate(self.block(logs), self.motion, initial_rotation=start, **options)
+        return simulate(self.create_block(logs), self.motion, initial_rotation=start, **options)
 
-    def residuals(self, logs: Floats, count: int) -> Floats:
+    def compute_residuals(self, logs: Floats, count: int) -> Floats:
         """Compute measured minus simulated rotation of the first samples, with overturned blocks at pi/2."""
         times = self.times[:count]
-        response = self.response(logs, float(times[-1]))
+        response = self.simulate(logs, float(times[-1]))
         return self.rotation[:count] - response.rotation(np.minimum(times, response.duration))
 
-    def derivatives(self, logs: Floats, count: int) -> Floats:
+    def compute_jacobian(self, logs: Floats, count: int) -> Floats:
         """Compute the Jacobian of the residuals in the logarithms, shape (count, k)."""
         times = self.times[:count]
-        response = self.response(logs, float(times[-1]))
+        response = self.simulate(logs, float(times[-1]))
         is_overturned = times > response.duration
         changes = compute_changes(response._history, times[~is_overturned], [unknown.name for unknown in self.unknowns])
         jacobian = np.zeros((count, len(logs)))
         jacobian[~is_overturned] = -np.column_stack([changes[unknown.name] for unknown in self.unknowns])
         return jacobian
 
-    def error(self, logs: Floats, count: int) -> float:
+    def compute_squared_error(self, logs: Floats, count: int) -> float:
         """Compute the sum of the squared residuals of the first samples."""
-        return float((self.residuals(logs, count) ** 2).sum())
+        return float((self.compute_residuals(logs, count) ** 2).sum())
 
 
 def _split_parameters(inputs: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[str, float], list[_Unknown]]:
@@ -386,13 +386,13 @@ def _fit(problem: _Problem, rng: np.random.Generator) -> Floats:
     with Progress("fitting", sum(survivor_count for _, survivor_count in _STAGES) + len(_CLOUD_WIDTHS)) as bar:
         for share, survivor_count in _STAGES:
             count = min(max(problem.count_samples(share), 2 * len(low)), sample_count)
-            errors = [problem.error(logs, count) for logs in survivors]
+            errors = [problem.compute_squared_error(logs, count) for logs in survivors]
             optima = []
             for logs in survivors[np.argsort(errors, kind="stable")[:survivor_count]]:
                 optima.append(_descend(problem, logs, count))
                 bar.advance(1)
             survivors = np.array(optima)
-        optimum = min(survivors, key=lambda logs: problem.error(logs, sample_count))
+        optimum = min(survivors, key=lambda logs: problem.compute_squared_error(logs, sample_count))
         for width in _CLOUD_WIDTHS:
             optimum = _search_nearby(problem, optimum, width, rng)
             bar.advance(1)
@@ -403,30 +403,34 @@ def _descend(problem: _Problem, start: Floats, count: int) -> Floats:
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
-    fit = least_squares(problem.residuals, start, problem.derivatives, (low, high), args=(count,))
+    fit = least_squares(problem.compute_residuals, start, problem.compute_jacobian, (low, high), args=(count,))
     return np.asarray(fit.x, dtype=np.float64)
 
 
 def _search_nearby(problem: _Problem, optimum: Floats, width: float, rng: np.random.Generator) -> Floats:
     """Search within `width` standard errors of an optimum, because a forced response can be rugged on that scale."""
     sample_count = len(problem.times)
-    covariance = _compute_covariance(problem, optimum, problem.residuals(optimum, sample_count))
+    covariance = _compute_covariance(problem, optimum, problem.compute_residuals(optimum, sample_count))
     offsets = rng.multivariate_normal(np.zeros(len(optimum)), covariance, _CLOUD_SIZE, method="cholesky")
     cloud = np.clip(optimum + width * offsets, *problem.bounds)
-    best = min(cloud, key=lambda logs: problem.error(logs, sample_count))
-    return min(optimum, _descend(problem, best, sample_count), key=lambda logs: problem.error(logs, sample_count))
+
+    def compute_error(logs: Floats) -> float:
+        return problem.compute_squared_error(logs, sample_count)
+
+    return min(optimum, _descend(problem, min(cloud, key=compute_error), sample_count), key=compute_error)
 
 
 def _create_calibration(problem: _Problem, logs: Floats) -> HistoryCalibration:
     count = len(problem.times)
-    residuals = problem.residuals(logs, count)
+    residuals = problem.compute_residuals(logs, count)
     covariance = _compute_covariance(problem, logs, residuals)
     estimates, bounds = {}, np.transpose(problem.bounds)
     for unknown, log, variance, ends in zip(problem.unknowns, logs, np.diag(covariance), bounds, strict=True):
-        at_bound = bool(np.abs(log - ends).min() < 1e-6)
-        estimates[unknown.name] = Measured(unknown.sign * math.exp(log), math.exp(log) * math.sqrt(variance), at_bound)
-    response = problem.response(logs, float(problem.times[-1]))
-    return HistoryCalibration(problem.block(logs), estimates, covariance, problem.times, residuals, response)
+        is_at_bound = bool(np.abs(log - ends).min() < 1e-6)
+        value, deviation = math.exp(log), math.exp(log) * math.sqrt(variance)
+        estimates[unknown.name] = FittedParameter(unknown.sign * value, deviation, is_at_bound)
+    response = problem.simulate(logs, float(problem.times[-1]))
+    return HistoryCalibration(problem.create_block(logs), estimates, covariance, problem.times, residuals, response)
 
 
 def _compute_covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
@@ -435,10 +439,10 @@ def _compute_covariance(problem: _Problem, logs: Floats, residuals: Floats) -> F
     slopes = _compute_slopes(problem, logs, math.sqrt(variance))
     norms = np.linalg.norm(slopes, axis=0)
     names = [unknown.name for unknown in problem.unknowns]
-    if undetermined := ", ".join(compress(names, norms <= _INSENSITIVE * norms.max())):
+    if undetermined := ", ".join(compress(names, norms <= _INSENSITIVE_SLOPE * norms.max())):
         raise OptionError(f"the history does not determine {undetermined}: set a value, or use a longer history")
     _, singular_values, right_vectors = np.linalg.svd(slopes / norms, full_matrices=False)
-    if singular_values[-1] <= _INSENSITIVE * singular_values[0]:
+    if singular_values[-1] <= _INSENSITIVE_SLOPE * singular_values[0]:
         raise OptionError(f"the history does not distinguish {', '.join(names)}: set the value of one")
     return np.asarray(variance * (right_vectors.T / singular_values**2) @ right_vectors / np.outer(norms, norms))
 
@@ -452,7 +456,8 @@ def _compute_slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats
         for _ in range(4):
             ahead, behind = logs.copy(), logs.copy()
             ahead[k], behind[k] = min(logs[k] + step, high[k]), max(logs[k] - step, low[k])
-            slope = (problem.residuals(ahead, count) - problem.residuals(behind, count)) / (ahead[k] - behind[k])
+            change = problem.compute_residuals(ahead, count) - problem.compute_residuals(behind, count)
+            slope = change / (ahead[k] - behind[k])
             step = float(np.clip(deviation / max(float(np.linalg.norm(slope)), 1e-300), _MIN_STEP, 0.05))
         columns.append(slope)
     return np.array(columns).T

@@ -23,7 +23,7 @@ from rocking.calibration.search import (
     resample,
     sample_posterior,
     search,
-    unpack,
+    split_populations,
     with_outliers,
 )
 from rocking.calibration.space import SIDED_PARAMETER, Space, ValueOrBounds, find_parameter_unit
@@ -424,7 +424,7 @@ def calibrate(
         blocks=space.blocks(evidence.candidates.points[selected]),
         weights=counts / max_blocks,
         estimates=_compute_estimates(space, populations),
-        draws=space.parameters_by_name(unpack(populations)[0]),
+        draws=space.parameters_by_name(split_populations(populations)[0]),
         probabilities=evidence.probabilities(populations).mean(axis=0),
         observed=observed,
         model=model,
@@ -437,9 +437,9 @@ def calibrate(
 
 
 def _compute_estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
-    centres, dispersions = unpack(populations)
+    centres, dispersions = split_populations(populations)
     sides = dispersions[:, : len(space.unknown)].copy()
-    if space.two_sided:
+    if space.is_two_sided:
         # The mean's logarithm plus or minus half the ratio's.
         sided = space.unknown.index(SIDED_PARAMETER)
         sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersions[:, -1])

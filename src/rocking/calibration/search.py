@@ -23,14 +23,14 @@ from rocking.calibration.space import Space
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisect
 from rocking.core.progress import Progress
-from rocking.core.threads import thread_count
+from rocking.core.threads import choose_thread_count
 from rocking.kernels import population as kernel
 
 #: Prior standard deviation of the logarithm of a dispersion from test to test.
 _DISPERSION_LOG_DEVIATION: Final = 0.6
 
 #: Number of populations weighted at once, which bounds the memory.
-_BATCH: Final = 64
+_BATCH_SIZE: Final = 64
 
 
 #: Factor on the dispersions of fitted populations for drawing blocks.
@@ -40,7 +40,7 @@ PROPOSAL_WIDTH: Final = 1.2
 _JEFFREYS: Final = 0.5
 
 
-def unpack(populations: Floats) -> tuple[Floats, Floats]:
+def split_populations(populations: Floats) -> tuple[Floats, Floats]:
     """Split populations into centres and dispersions, shape (c, k) each."""
     k = populations.shape[1] // 2
     return populations[:, :k], np.exp(populations[:, k:])
@@ -61,13 +61,13 @@ def compute_log_prior(space: Space, populations: Floats) -> Floats:
 
 def draw_points(populations: Floats, width: float, count: int, rng: Generator) -> Floats:
     """Draw points from populations in turn, with dispersions times `width`, shape (count, k)."""
-    centre, dispersion = unpack(populations[np.arange(count) % len(populations)])
+    centre, dispersion = split_populations(populations[np.arange(count) % len(populations)])
     return centre + width * dispersion * rng.standard_normal(centre.shape)
 
 
 def compute_log_density(populations: Floats, width: float, points: Floats) -> Floats:
     """Compute the log-density of the distribution of `draw_points` at points, shape (n,)."""
-    centre, dispersion = unpack(populations)
+    centre, dispersion = split_populations(populations)
     mean = centre.mean(axis=0)
     centre, centred = centre - mean, points - mean
     precision = (width * dispersion) ** -2
@@ -139,7 +139,7 @@ class Evidence:
 
     def mean_weights(self, populations: Floats) -> Floats:
         """Compute weights of the candidates averaged over populations, shape (n,)."""
-        batches = np.split(populations, range(_BATCH, len(populations), _BATCH))
+        batches = np.split(populations, range(_BATCH_SIZE, len(populations), _BATCH_SIZE))
         parts = [self.weights(batch).sum(axis=0, dtype=np.float64) for batch in batches]
         return np.asarray(np.sum(parts, axis=0) / len(populations))
 
@@ -171,7 +171,7 @@ class Evidence:
                 factors[start:end], powers, overturned, exponents, shares[start:end], effective[start:end]
             )
 
-        batch = max(-(-len(populations) // thread_count()), 16)
+        batch = max(-(-len(populations) // choose_thread_count()), 16)
         starts = range(0, len(populations), batch)
         with ThreadPoolExecutor(max(len(starts), 1)) as pool:
             list(pool.map(weigh, starts, (start + batch for start in starts)))
@@ -180,7 +180,7 @@ class Evidence:
 
     def _compute_factors(self, populations: Floats) -> NDArray[np.float32]:
         """Return factors, shape (c, 2 k + 1), of `_powers` in the logarithm of a candidate's weight."""
-        centre, dispersion = unpack(populations)
+        centre, dispersion = split_populations(populations)
         precision = dispersion**-2
         scaled = precision * (centre - self._centre)
         return np.hstack([scaled, -0.5 * precision, np.ones((len(centre), 1))]).astype(np.float32)
@@ -240,7 +240,7 @@ class Problem:
 
     def fill_space(self, count: int, rng: Generator) -> Candidates:
         """Simulate blocks that fill the space evenly."""
-        points = self.space.quasi_random(count, rng)
+        points = self.space.sample_quasi_randomly(count, rng)
         return Candidates(self.space, points, self.simulate(points), count)
 
     def propose(self, candidates: Candidates, exponent: float, count: int, rng: Generator) -> Candidates:
@@ -269,7 +269,7 @@ class SearchResult:
     def agreement(self) -> dict[str, float]:
         """R-hat between the runs of each parameter's centre, by name."""
         space = self.evidence.candidates.space
-        centres = [space.parameters_by_name(unpack(populations)[0]) for populations in self.posteriors]
+        centres = [space.parameters_by_name(split_populations(populations)[0]) for populations in self.posteriors]
         return {name: compute_r_hat(np.array([populations[name] for populations in centres])) for name in centres[0]}
 
 

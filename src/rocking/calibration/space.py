@@ -91,22 +91,22 @@ class Space:
         return cls(tuple(bounds), known, lower, upper, max_log_ratio)
 
     @property
-    def two_sided(self) -> bool:
+    def is_two_sided(self) -> bool:
         """Whether the sides may differ."""
         return self.max_log_ratio > 0.0
 
     @property
     def dispersions(self) -> Floats:
         """Prior median of the dispersion along each coordinate, shape (k,)."""
-        return np.full(len(self.unknown) + self.two_sided, 0.10)
+        return np.full(len(self.unknown) + self.is_two_sided, 0.10)
 
     @property
     def box(self) -> tuple[Floats, Floats]:
         """Lower and upper ends of the coordinates, shape (k,) each."""
-        ratio = [self.max_log_ratio] if self.two_sided else []
+        ratio = [self.max_log_ratio] if self.is_two_sided else []
         return np.concatenate([self.lower, np.negative(ratio)]), np.concatenate([self.upper, ratio])
 
-    def quasi_random(self, count: int, rng: np.random.Generator) -> Floats:
+    def sample_quasi_randomly(self, count: int, rng: np.random.Generator) -> Floats:
         """Return points of a scrambled Halton sequence that lie in the space, which they fill evenly."""
         from scipy.stats import qmc
 
@@ -130,15 +130,17 @@ class Space:
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """Return whether points lie in the box and each of their sides within its bounds."""
         low, high = self.box
-        logs = self._log_sides(points)
+        logs = self._compute_log_sides(points)
         inside = np.all((logs >= self.lower) & (logs <= self.upper), axis=(1, 2))
         return np.asarray(inside & np.all((points >= low) & (points <= high), axis=1))
 
     def sides(self, points: Floats) -> dict[str, Floats]:
         """Return p, alpha and restitution by name, for side + and side -, shape (n, 2) each."""
-        unknown_values = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
+        unknown_values = dict(
+            zip(self.unknown, np.moveaxis(np.exp(self._compute_log_sides(points)), 2, 0), strict=True)
+        )
         values = unknown_values | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
-        if "restitution" not in values and self.two_sided:
+        if "restitution" not in values and self.is_two_sided:
             factors, values["restitution"] = compute_eccentric_rectangles(values["alpha"])
             values["p"] = values["p"] * factors
         elif "restitution" not in values:
@@ -147,11 +149,11 @@ class Space:
 
     def parameters_by_name(self, points: Floats) -> dict[str, Floats]:
         """Return the unknown parameters by name, for each side if they differ, shape (n,) each."""
-        values = np.exp(self._log_sides(points))
+        values = np.exp(self._compute_log_sides(points))
         return {
             name + side: values[:, i, k]
             for k, name in enumerate(self.unknown)
-            for i, side in enumerate(("_plus", "_minus") if self.two_sided and name == SIDED_PARAMETER else ("",))
+            for i, side in enumerate(("_plus", "_minus") if self.is_two_sided and name == SIDED_PARAMETER else ("",))
         }
 
     def blocks(self, points: Floats) -> Blocks:
@@ -160,11 +162,11 @@ class Space:
         # exp(log(1)) may exceed 1 by one unit in the last place.
         return Blocks(sides["p"], sides["alpha"], np.minimum(sides["restitution"], 1.0))
 
-    def _log_sides(self, points: Floats) -> Floats:
+    def _compute_log_sides(self, points: Floats) -> Floats:
         """Return logarithms of the unknown parameters on each side, shape (n, 2, f)."""
         f = len(self.unknown)
         half = np.zeros((len(points), f))
-        if self.two_sided:
+        if self.is_two_sided:
             half[:, self.unknown.index(SIDED_PARAMETER)] = 0.5 * points[:, f]
         return np.stack([points[:, :f] + half, points[:, :f] - half], axis=1)
 

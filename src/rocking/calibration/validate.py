@@ -82,7 +82,7 @@ class ShakeTest:
 
 
 @dataclass(frozen=True)
-class JudgedTest:
+class PredictedTest:
     """Prediction and observed outcome of one test.
 
     Attributes
@@ -153,7 +153,7 @@ class MeanScore:
 
 
 @dataclass(frozen=True)
-class ShareInBin:
+class ReliabilityBin:
     """Observed share of overturning in a bin, and its consistency band.
 
     Attributes
@@ -199,11 +199,11 @@ class ModelValidation(Result):
 
     Attributes
     ----------
-    tests : tuple of JudgedTest
+    tests : tuple of PredictedTest
         Predictions and observations.
     brier, log_loss : MeanScore
         Mean squared difference between probability and outcome; mean of -log of the outcome's probability.
-    reliability : tuple of ShareInBin
+    reliability : tuple of ReliabilityBin
         Shares that overturned, in the nonempty bins of the predicted probability.
     reliability_chance : float
         Probability, if the predictions are correct, of a reliability term of the Brier score at least this large.
@@ -226,10 +226,10 @@ class ModelValidation(Result):
 
     TABLES = ("tests",)
 
-    tests: tuple[JudgedTest, ...]
+    tests: tuple[PredictedTest, ...]
     brier: MeanScore
     log_loss: MeanScore
-    reliability: tuple[ShareInBin, ...]
+    reliability: tuple[ReliabilityBin, ...]
     reliability_chance: float
     description: str
     model: str
@@ -405,9 +405,9 @@ def validate(
         # At most 5 % of the simulated shares are beyond each end.
         band = np.quantile(outcomes[:, in_bin].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
         shares = float(probabilities[in_bin].mean()), float(observed[in_bin].mean())
-        reliability.append(ShareInBin(k / bins, (k + 1) / bins, int(in_bin.sum()), *shares, *band))
+        reliability.append(ReliabilityBin(k / bins, (k + 1) / bins, int(in_bin.sum()), *shares, *band))
     return ModelValidation(
-        tests=tuple(JudgedTest(name, test.motion.name, test.overturned, chance) for name, test, chance in rows),
+        tests=tuple(PredictedTest(name, test.motion.name, test.overturned, chance) for name, test, chance in rows),
         brier=compute_score((probabilities - observed) ** 2, observed, lambda share: share * (1.0 - share), clusters),
         log_loss=compute_score(compute_log_losses(probabilities, observed), observed, _compute_entropy, clusters),
         reliability=tuple(reliability),

@@ -34,12 +34,12 @@ from rocking.engine.schemes import compute_critical_amplitudes
 from rocking.engine.tasks import require_finished
 from rocking.errors import OptionError, UnfinishedError
 from rocking.kernels.sine import SequenceStatus
-from rocking.kernels.sine.sequence import IMPACT as RESOLVED_IMPACT
+from rocking.kernels.sine.sequence import RESOLVED_IMPACT as RESOLVED_IMPACT
 from rocking.kernels.sine.sequence import resolve_impacts, write_rest_phases, write_semianalytical_phases
 from rocking.simulation.simulate import simulate
 
 #: Number of sequences per task of a thread.
-_CHUNK: Final = 1 << 12
+_CHUNK_SIZE: Final = 1 << 12
 
 #: Number of impacts in the paper, at this restitution.
 _PAPER_IMPACTS: Final = 60
@@ -167,7 +167,7 @@ class ChatteringSequence:
     impacts : structured array
         Fields time (since uplift), side (entered, +1 or -1; the first arc is on side -1), interval (since the previous
         impact, or since uplift), and speed_before and speed_after (|phi'|), all dimensionless.
-    complete : bool
+    is_complete : bool
         Whether the impacts accumulate within half a period.
     time, lower, upper : float
         Time of rest, and its bounds proven by the certificate from the time and speed of the last impact; NaN if
@@ -182,18 +182,18 @@ class ChatteringSequence:
     --------
     >>> from rocking import chattering
     >>> sequence = chattering.sequence(1.03, 2.0, 0.92)
-    >>> f"rest at {sequence.time:.6f}, complete: {sequence.complete}"
+    >>> f"rest at {sequence.time:.6f}, complete: {sequence.is_complete}"
     'rest at 1.125948, complete: True'
     """
 
     impacts: NDArray[np.void]
-    complete: bool
+    is_complete: bool
     time: float
     lower: float
     upper: float
 
     def __repr__(self) -> str:
-        end = f"complete, at rest at p t = {self.time:.9g}" if self.complete else "incomplete"
+        end = f"complete, at rest at p t = {self.time:.9g}" if self.is_complete else "incomplete"
         return f"<ChatteringSequence: {format_count(len(self.impacts), 'impact')} resolved; {end}>"
 
 
@@ -220,7 +220,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     Examples
     --------
     >>> chattering = sequence(1.03, 2.0, 0.92)
-    >>> chattering.complete, chattering.impacts["side"][:3].tolist()
+    >>> chattering.is_complete, chattering.impacts["side"][:3].tolist()
     (True, [1, -1, 1])
     """
     amplitude, frequency, restitution = _check_case(a, omega, eta)
@@ -320,7 +320,7 @@ def _compute_exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     rocking_indices = np.flatnonzero((amplitudes > 1.0) & (restitutions < 1.0))
 
     def compute_chunk(start: int) -> None:
-        chunk = rocking_indices[start : start + _CHUNK]
+        chunk = rocking_indices[start : start + _CHUNK_SIZE]
         phases, statuses = np.zeros(chunk.size), np.zeros(chunk.size, np.int8)
         write_rest_phases((amplitudes[chunk], frequencies[chunk], restitutions[chunk]), phases, statuses)
         phases[statuses == SequenceStatus.INCOMPLETE] = math.nan
@@ -328,7 +328,7 @@ def _compute_exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
         times[chunk] = phases / frequencies[chunk]
 
     # The compiled function holds no lock.
-    for _ in map_in_threads(compute_chunk, range(0, rocking_indices.size, _CHUNK)):
+    for _ in map_in_threads(compute_chunk, range(0, rocking_indices.size, _CHUNK_SIZE)):
         pass
     return times.reshape(shape)[()]
 

@@ -77,8 +77,8 @@ class UpliftOutcome(IntEnum):
     UNPROVEN = 5
 
     @property
-    def words(self) -> str:
-        """The outcome in words: "rests later"."""
+    def label(self) -> str:
+        """The outcome in label: "rests later"."""
         return self.name.lower().replace("_", " ")
 
 
@@ -223,7 +223,7 @@ class ChatteringMap(DatasetResult):
     def summary(self) -> str:
         values, counts = np.unique(self.data.outcome, return_counts=True)
         rows = [
-            (UpliftOutcome(value).words, f"{100 * count / self.data.outcome.size:.1f} %")
+            (UpliftOutcome(value).label, f"{100 * count / self.data.outcome.size:.1f} %")
             for value, count in zip(values, counts, strict=True)
         ]
         first, second = self.data.outcome.dims
@@ -239,7 +239,7 @@ class ChatteringMap(DatasetResult):
 
     def to_dict(self) -> dict[str, Any]:
         columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
-        return {"outcomes": {outcome.value: outcome.words for outcome in UpliftOutcome}, **columns}
+        return {"outcomes": {outcome.value: outcome.label for outcome in UpliftOutcome}, **columns}
 
     def plot(
         self,
@@ -262,7 +262,7 @@ class ChatteringMap(DatasetResult):
             x=self.data[second].values,
             y=self.data[first].values,
             outcome=self.data.outcome.values,
-            meanings=[outcome.words for outcome in UpliftOutcome],
+            meanings=[outcome.label for outcome in UpliftOutcome],
             later=self._overturns_later(),
             x_label=axis_labels.get(str(second), str(second)),
             y_label=axis_labels.get(str(first), str(first)),
@@ -329,7 +329,7 @@ def _simulate_point(point: SimulationInput) -> _MapPoint:
         # The motion must not exceed a threshold before the upper bound of the rest.
         results["first_rest"], results["rests_by_rounding"] = upper, math.isnan(upper)
         if not math.isnan(upper):
-            states, trail = state.new_states(1, 0), response.solution.trail
+            states, trail = state.create_states(1, 0), response.solution.trail
             states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, upper
             grounds, factors = join_grounds([trail.ground]), np.array([trail.ground.factor])
             blocks, index = np.array([trail.block]), np.zeros(1, dtype=np.int64)
@@ -348,7 +348,7 @@ class ChatteringEpisodes(Result):
         One row per interval of rocking that ends with complete chattering: uplift (s; 0 if already moving); proven
         (time of the impact from which completeness is proven, s); rest, lower and upper (time of rest and its bounds,
         s); duration from uplift to rest (s); impacts resolved; ground (acceleration at the rest, m/s^2).
-    shaking : tuple of float
+    shaking_span : tuple of float
         Bracketed duration: times at which the motion first exceeds a threshold of the block, and last falls below one
         or the block overturns, s; NaN if not before the end of the simulation.
     time_at_rest : float
@@ -368,7 +368,7 @@ class ChatteringEpisodes(Result):
     """
 
     episodes: NDArray[np.void]
-    shaking: tuple[float, float]
+    shaking_span: tuple[float, float]
     time_at_rest: float
 
     def _headline(self) -> str:
@@ -377,13 +377,13 @@ class ChatteringEpisodes(Result):
     @property
     def share_at_rest(self) -> float:
         """Fraction of the bracketed duration during which the block is at rest; NaN without a bracketed duration."""
-        start, end = self.shaking
+        start, end = self.shaking_span
         return self.time_at_rest / (end - start) if end > start else math.nan
 
     @property
-    def amid_shaking(self) -> NDArray[np.bool_]:
+    def ends_during_shaking(self) -> NDArray[np.bool_]:
         """Whether each episode ends before the motion exceeds a threshold for the last time."""
-        return np.asarray(self.episodes["upper"] < self.shaking[1])
+        return np.asarray(self.episodes["upper"] < self.shaking_span[1])
 
     def __str__(self) -> str:
         return self.summary()
@@ -394,7 +394,7 @@ class ChatteringEpisodes(Result):
         for uplift, _, rest, lower, upper, duration, impacts, ground in self.episodes.tolist():
             times = f"{uplift:.6f}", f"{rest:.9f}", f"{upper - lower:.1e}", f"{duration:.6f}"
             rows.append([*times, impacts, f"{ground:+.4f}"])
-        start, end = self.shaking
+        start, end = self.shaking_span
         conclusion = f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"
         if math.isnan(start):
             conclusion = "the motion never passes a threshold of the block before the simulation ends"
@@ -403,7 +403,7 @@ class ChatteringEpisodes(Result):
     def to_dict(self) -> dict[str, Any]:
         return {
             "episodes": array_to_rows(self.episodes),
-            "shaking_s": self.shaking,
+            "shaking_s": self.shaking_span,
             "time_at_rest_s": self.time_at_rest,
             "share_at_rest": self.share_at_rest,
         }

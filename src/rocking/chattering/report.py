@@ -57,7 +57,7 @@ class ChatteringReport(Result):
     """
 
     TABLES = ("impacts", "cycles")
-    _FORMAT = None
+    _FLOAT_FORMAT = None
 
     values: dict[str, Any]
     impacts: NDArray[np.void]
@@ -184,7 +184,7 @@ def chattering_report(
     if p is not None:
         p = checks.positive(p, "p", OptionError, "rad/s")
     chattering = sequence(a, omega, eta)
-    interval = speed = 0.0 if chattering.complete else math.nan
+    interval = speed = 0.0 if chattering.is_complete else math.nan
     if chattering.impacts.size:
         interval, speed = chattering.impacts[["interval", "speed_before"]][0]
     checks.integer(order, "order", OptionError, 1, MAX_ORDER)
@@ -197,7 +197,7 @@ def chattering_report(
         "a": a,
         "omega": omega,
         "eta": eta,
-        "complete": chattering.complete,
+        "complete": chattering.is_complete,
         "half_period": math.pi / omega,
         "chattering_time": {**times, "series": series},
         "order": order,

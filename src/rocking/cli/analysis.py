@@ -100,7 +100,7 @@ def spectrum(
             "p": None if p is None else read_array(p, "p"),
             "size": None if size is None else read_array(size, "size", read_length),
         }
-        settings = model.arguments()
+        settings = model.create_arguments()
         if alpha is not None:
             restitutions = None if restitution is None else read_array(restitution, "restitution")
             alphas = read_array(alpha, "alpha", read_tilt)
@@ -159,7 +159,7 @@ def map(
         slender_block = _create_slender_block(block)
         texts = {"amplitudes": amplitudes, "frequencies": frequencies}
         axes: dict[str, Any] = {name: read_array(text, name) for name, text in texts.items()}
-        result = overturning_map(slender_block, pulse, **axes, **model.arguments(), rtol=rtol, **parameters)
+        result = overturning_map(slender_block, pulse, **axes, **model.create_arguments(), rtol=rtol, **parameters)
         _write_and_print(result, "map", None, folder=folder, as_json=output.as_json)
 
 
@@ -184,12 +184,12 @@ def ida(
     rtol
         Width of the refined ends of bands, relative to the level.
     """
-    body = block.bodies(labels=("name",))  # all objects have the same friction
+    body = block.create_bodies(labels=("name",))  # all objects have the same friction
     with output.folder() as folder:
         loaded = motion.read_all(names)
         motions = [*loaded.motions.values()]
         result = incremental_dynamic_analysis(
-            body, motions, **measure.arguments(motion.component), **model.arguments(), rtol=rtol
+            body, motions, **measure.create_arguments(motion.component), **model.create_arguments(), rtol=rtol
         )
         blocks = list_block_names(result.data) if isinstance(body, Sequence) else []
         _write_and_print(result, "ida", loaded, folder=folder, as_json=output.as_json, blocks=blocks)
@@ -221,7 +221,7 @@ def measures(
     also
         Further measures, separated by commas: pgd, arias, cav, incremental_velocity, duration.
     """
-    settings = block.blocks(model)
+    settings = block.create_block_arguments(model)
     with output.folder() as folder:
         loaded = motion.read_all(names)
         settings |= {"periods": read_array(periods, "periods"), "clusters": clusters.parse_clusters()}

@@ -61,7 +61,7 @@ def assess(
         Motions as they are (+), reversed (-), or both. A symmetric object responds equally to both, which count once.
     """
     curve = risk.read_hazard(measure, motion.component)
-    settings: dict[str, Any] = measure.arguments(motion.component) | model.arguments()
+    settings: dict[str, Any] = measure.create_arguments(motion.component) | model.create_arguments()
     settings["levels"] = count if settings["levels"] is None else settings["levels"]
     if curve is not None:
         settings["measure"] = curve.measure

@@ -92,12 +92,12 @@ def calibrate(
     """
     texts = {"p": (p, read_number), "alpha": (alpha, read_tilt), "restitution": (restitution, read_number)}
     arguments: dict[str, Any] = {"model": model} | ({} if two_sided is None else {"two_sided": two_sided})
-    for name, (text, quantity) in texts.items():
+    for name, (text, reader) in texts.items():
         if text is not None:
-            arguments[name] = HOUSNER if text == HOUSNER else read_bounds(text, name, quantity)
+            arguments[name] = HOUSNER if text == HOUSNER else read_bounds(text, name, reader)
     rotation = None if initial_rotation is None else read_tilt(initial_rotation, "initial_rotation")
     with output.folder() as folder:
-        table = read_calibration(data, **file.metadata(), **file.corrections())
+        table = read_calibration(data, **file.read_metadata(), **file.read_corrections())
         conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
         if isinstance(table, MeasuredHistory):
             conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
@@ -130,8 +130,8 @@ def calibrate(
 
 def _read_motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
     """Read records and pulses and reject options of motions if there are none."""
-    motions = {name: file.motion(name) for name in records} | file.pulses()
-    for name in {} if motions else file.supplied("scale", "pga", "pgv", "sa", "vertical"):
+    motions = {name: file.read_motion(name) for name in records} | file.create_pulses()
+    for name in {} if motions else file.supplied_texts("scale", "pga", "pgv", "sa", "vertical"):
         raise OptionError("{} requires a motion; add one with {} or {}, or omit it", name, option, "pulse")
     return motions
 
@@ -181,9 +181,9 @@ def validate(
         Seed of the simulations for bands and probabilities.
     """
     with output.folder() as folder:
-        rows = read_tests(tests, **file.metadata(), **file.corrections())
+        rows = read_tests(tests, **file.read_metadata(), **file.read_corrections())
         options: dict[str, Any] = {"outlier_probability": outlier_probability, "bins": bins, "seed": seed}
-        validation = run_validation(rows, **block.blocks(model), **options)
+        validation = run_validation(rows, **block.create_block_arguments(model), **options)
         result = validation.to_dict()
         if folder is not None:
             write_tables(folder, validation)

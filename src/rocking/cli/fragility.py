@@ -86,13 +86,13 @@ def fragility(
             "records": names, "levels": measure.levels, "ensemble": block.ensemble, "clusters": risk.clusters,
             "larger": larger, "limit_states": limit_states != "overturning",
             "polarity": polarity != "+", "model": model.equation,
-            "chattering": model.chattering != "certified", **block.supplied(),
-            **motion.supplied("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
+            "chattering": model.chattering != "certified", **block.supplied_texts(),
+            **motion.supplied_texts("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
         }  # fmt: skip
         for option in [option for option, value in conflicting.items() if value]:
             message = "{} are observed, for their own block and motions: omit {}"
             raise OptionError(message, "outcomes", option)
-    bodies = {} if outcomes is not None else block.blocks(model)
+    bodies = {} if outcomes is not None else block.create_block_arguments(model)
     curve = risk.read_hazard(measure, motion.component)
     states, intensity_measure = parse_limit_states(limit_states), measure.create_measure(motion.component)
     if output.out is not None:
@@ -104,12 +104,13 @@ def fragility(
     with output.folder() as folder:
         records: dict[str, Any] = {}
         if outcomes is not None:
-            observed = read_observed(outcomes, intensity_measure, **motion.metadata(), **motion.corrections())
+            observed = read_observed(outcomes, intensity_measure, **motion.read_metadata(), **motion.read_corrections())
             fitted = fit_fragility(**observed, confidence=risk.confidence)
         else:
             check_measure(curve, intensity_measure)  # before the simulations
             loaded = motion.read_all(names)
-            records, settings = loaded.to_dict(), measure.arguments(motion.component) | model.arguments() | bodies
+            records, settings = loaded.to_dict(), measure.create_arguments(motion.component)
+            settings |= model.create_arguments() | bodies
             settings |= {
                 "polarity": polarity,
                 "clusters": risk.parse_clusters(),

@@ -13,7 +13,7 @@ from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_result
 from rocking.core.progress import note
 from rocking.core.tables import format_table, write_csv
 from rocking.errors import OptionError
-from rocking.inputs.notes import block_notes
+from rocking.inputs.notes import list_block_notes
 from rocking.inputs.quantities import read_array, read_densities, read_length, read_number, read_sides
 from rocking.solid.solid import Solid
 
@@ -96,7 +96,7 @@ def mesh(
 
 def _create_block_row(azimuth: float, block: Block) -> dict[str, float]:
     """Create a table row with a block's pivots and the parameters of both sides, with notes on the block."""
-    for sentence in block_notes(block):
+    for sentence in list_block_notes(block):
         note(f"azimuth {azimuth:g}: {sentence}")
     plus, minus = block.sides
     row = {

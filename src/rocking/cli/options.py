@@ -19,7 +19,7 @@ from rocking.errors import BlockError, MotionError, OptionError, RecordError, jo
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, read_noted_acceleration
 from rocking.inputs.inventory import read_labelled
-from rocking.inputs.notes import hazard_notes, motion_notes, vertical_notes
+from rocking.inputs.notes import list_hazard_notes, list_motion_notes, list_vertical_notes
 from rocking.inputs.pulses import named_pulse
 from rocking.inputs.quantities import (
     NumberReader,
@@ -84,7 +84,7 @@ INTEGER: Final = Parameter(converter=_convert_integer)
 class InputOptions:
     """Options that are texts of inputs."""
 
-    def supplied(self, *names: str) -> dict[str, Any]:
+    def supplied_texts(self, *names: str) -> dict[str, Any]:
         """Return the texts that were supplied, or the named ones."""
         texts = {field.name: getattr(self, field.name) for field in fields(self)}
         return {
@@ -93,7 +93,7 @@ class InputOptions:
 
     def read_values(self, *names: str) -> dict[str, Any]:
         """Return the values of the supplied texts, or of the named ones."""
-        return {name: INPUTS[name].read(text) for name, text in self.supplied(*names).items() if name in INPUTS}
+        return {name: INPUTS[name].read(text) for name, text in self.supplied_texts(*names).items() if name in INPUTS}
 
 
 #: Types and defaults of options that are not a text.
@@ -117,28 +117,28 @@ def _with_inputs(*names: str) -> Callable[[type[OptionsClass]], type[OptionsClas
     return add_fields
 
 
-@_with_inputs(*(name for name in declared.BLOCK if name != "mass"))
+@_with_inputs(*(name for name in declared.BLOCK_INPUTS if name != "mass"))
 class BlockOptions(InputOptions):
     """Block described by its sizes, parameters, or pivots."""
 
     def read_uncertain(self, *names: str) -> dict[str, Any]:
         """Return the values of supplied texts, some of which may be distributions."""
-        return {name: INPUTS[name].read_uncertain(text) for name, text in self.supplied(*names).items()}
+        return {name: INPUTS[name].read_uncertain(text) for name, text in self.supplied_texts(*names).items()}
 
-    def block(self) -> Block:
+    def create_block(self) -> Block:
         """Return the block, with notes on likely mistakes."""
-        block = bodies.create_block(self.read_uncertain(*declared.BLOCK))
+        block = bodies.create_block(self.read_uncertain(*declared.BLOCK_INPUTS))
         bodies.note_likely_mistakes([block])
         return block
 
 
-@_with_inputs("mass", *declared.SUPPORTS)
+@_with_inputs("mass", *declared.SUPPORT_INPUTS)
 class RestrainedOptions(BlockOptions):
     """Block with restraints."""
 
-    def body(self) -> Body:
+    def create_body(self) -> Body:
         """Return the block, with its restraints if any."""
-        texts = self.supplied()
+        texts = self.supplied_texts()
         block, body = bodies.create_restrained(bodies.read_values(texts), bodies.read_forces(texts))
         bodies.note_likely_mistakes([block], [body])
         return body
@@ -153,11 +153,11 @@ class _InventoryOptions(BlockOptions):
 
     inventory: Annotated[Path | None, Parameter(help=_INVENTORY_HELP)] = None
 
-    def objects(self, create: Callable[[], Body], labels: Sequence[str]) -> Any:
+    def create_objects(self, create: Callable[[], Body], labels: Sequence[str]) -> Any:
         """Return the objects of the table with labels that have a meaning, or the block that a function creates."""
         if self.inventory is None:
             return create()
-        if conflicting := [name for name in self.supplied() if name != "inventory"]:
+        if conflicting := [name for name in self.supplied_texts() if name != "inventory"]:
             message = f"{{}} replaces the block: omit {join_placeholders(conflicting)}"
             raise BlockError(message, "inventory", *conflicting)
         inventory = read_labelled(self.inventory, expected=labels)
@@ -168,18 +168,18 @@ class _InventoryOptions(BlockOptions):
 class FreeObjectOptions(_InventoryOptions):
     """Block without restraints, or objects from a table."""
 
-    def blocks(self) -> Any:
+    def create_blocks(self) -> Any:
         """Return the block, or the objects."""
-        return self.objects(self.block, ("name", "friction"))
+        return self.create_objects(self.create_block, ("name", "friction"))
 
 
 @dataclass(frozen=True)
 class ObjectOptions(RestrainedOptions, _InventoryOptions):
     """Block, or objects from a table."""
 
-    def bodies(self, labels: Sequence[str] = ("name", "friction")) -> Any:
+    def create_bodies(self, labels: Sequence[str] = ("name", "friction")) -> Any:
         """Return the block, or the objects with labels that have a meaning."""
-        return self.objects(self.body, labels)
+        return self.create_objects(self.create_body, labels)
 
 
 _SAMPLES: Final = 100
@@ -198,20 +198,20 @@ class EnsembleOptions(RestrainedOptions):
     samples: Annotated[int | None, INTEGER, Parameter(help=_SAMPLES_HELP)] = None
     seed: Annotated[int | None, INTEGER, Parameter(help="Seed of the samples, 0 by default.")] = None
 
-    def blocks(self, model: ModelOptions) -> dict[str, Any]:
+    def create_block_arguments(self, model: ModelOptions) -> dict[str, Any]:
         """Return blocks, weights and equation of motion as arguments."""
         if self.ensemble is None:
-            values = self.read_uncertain(*declared.BLOCK, "one_sided", "lean")
+            values = self.read_uncertain(*declared.BLOCK_INPUTS, "one_sided", "lean")
             if bodies.find_uncertain(values):
                 blocks = bodies.sample_bodies(
-                    values, self.samples or _SAMPLES, self.seed or 0, bodies.read_forces(self.supplied())
+                    values, self.samples or _SAMPLES, self.seed or 0, bodies.read_forces(self.supplied_texts())
                 )
                 return {"blocks": blocks, "model": model.model}
-            for name in self.supplied("samples", "seed"):
+            for name in self.supplied_texts("samples", "seed"):
                 message = "{} requires an uncertain size or parameter, as in {} '0.30 +- 0.02'"
                 raise OptionError(message, name, "width")
-            return {"blocks": self.body(), "model": model.model}
-        if conflicting := [name for name in self.supplied() if name != "ensemble"]:
+            return {"blocks": self.create_body(), "model": model.model}
+        if conflicting := [name for name in self.supplied_texts() if name != "ensemble"]:
             message = f"{{}} replaces the block: omit {join_placeholders(conflicting)}"
             raise BlockError(message, "ensemble", *conflicting)
         return read_ensemble_arguments(self.ensemble, model)
@@ -233,58 +233,59 @@ _FILE_OPTIONS: Final = {name: write_option_name(name) for name in ("channel", "d
 class FileOptions(InputOptions):
     """Metadata that a record file lacks, and corrections of its numbers."""
 
-    def metadata(self) -> dict[str, Any]:
+    def read_metadata(self) -> dict[str, Any]:
         """Return channel, step and units as arguments."""
         return dict.fromkeys(_FILE_OPTIONS) | self.read_values(*_FILE_OPTIONS)
 
-    def corrections(self) -> dict[str, Any]:
+    def read_corrections(self) -> dict[str, Any]:
         """Return baseline and corner frequency as arguments."""
         return self.read_values("baseline", "highpass")
 
-    def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
+    def read_motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
         """Return the scaled motion of a record or pulse, with notes."""
-        vertical = self.supplied().get("vertical")
-        target = self._target()  # mistakes in the options are reported before a long file is read
+        vertical = self.supplied_texts().get("vertical")
+        target = self._read_target()  # mistakes in the options are reported before a long file is read
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
-                motion = motion.with_vertical(load_vertical(vertical, name, **self.metadata(), **self.corrections()))
+                options = self.read_metadata() | self.read_corrections()
+                motion = motion.with_vertical(load_vertical(vertical, name, **options))
         else:
-            options = self.metadata() | self.corrections()
+            options = self.read_metadata() | self.read_corrections()
             motion = load_motion(name, **options, vertical=vertical, several=several)
-        return self._scale(name, motion, target)
+        return self._scale_motion(name, motion, target)
 
-    def _target(self) -> tuple[float, Measure] | None:
+    def _read_target(self) -> tuple[float, Measure] | None:
         """Return the level and the measure to which motions are scaled, if any."""
-        texts = {name: text for name, text in self.supplied().items() if name in declared.SCALINGS}
+        texts = {name: text for name, text in self.supplied_texts().items() if name in declared.SCALINGS}
         return read_scaling(texts, read_positive_acceleration)
 
-    def _scale(self, name: str, motion: Motion, target: tuple[float, Measure] | None) -> Motion:
+    def _scale_motion(self, name: str, motion: Motion, target: tuple[float, Measure] | None) -> Motion:
         """Return the scaled motion, with notes."""
-        notes = motion_notes(motion)
-        for sentence in (*notes, *vertical_notes(motion)):
+        notes = list_motion_notes(motion)
+        for sentence in (*notes, *list_vertical_notes(motion)):
             note(f"{name}: {sentence}")
         if target is None:
             return motion
         scaled = motion.scaled_to(*target)
-        for sentence in motion_notes(scaled):
+        for sentence in list_motion_notes(scaled):
             if sentence not in notes:
                 note(f"{name}, scaled: {sentence}")
         return scaled
 
-    def pulses(self) -> dict[str, Motion]:
+    def create_pulses(self) -> dict[str, Motion]:
         """Return the pulses by their texts."""
-        return {text: self.motion(text, is_pulse=True) for text in self.supplied().get("pulse", ())}
+        return {text: self.read_motion(text, is_pulse=True) for text in self.supplied_texts().get("pulse", ())}
 
-    def stochastic_motions(self) -> dict[str, Motion]:
+    def create_stochastic_motions(self) -> dict[str, Motion]:
         """Return the stochastic motions by distinct names."""
-        motions: list[Motion] = []
-        for text in self.supplied().get("stochastic", ()):
-            values = bodies.read_pairs(text, "stochastic", lambda name: bodies.STOCHASTIC.get(name, read_number))
+        motions, readers = list[Motion](), bodies.STOCHASTIC_READERS
+        for text in self.supplied_texts().get("stochastic", ()):
+            values = bodies.read_pairs(text, "stochastic", lambda name: readers.get(name, read_number))
             with bodies.add_option_to_errors("stochastic"):
                 motions += bodies.create_stochastic(values, "{}", "stochastic")
         named = zip(list_motion_names(motions), motions, strict=True)
-        return {name: self._scale(name, motion, self._target()) for name, motion in named}
+        return {name: self._scale_motion(name, motion, self._read_target()) for name, motion in named}
 
 
 @_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse")
@@ -354,16 +355,16 @@ class _RecordOptions(FileOptions):
 
     def read_all(self, names: Sequence[str], *, with_pairs: bool = False) -> LoadedRecords:
         """Return the motions by name, with pairs those of all horizontal components."""
-        records, pulses = expand_record_names(names), self.supplied().get("pulse", ())
-        stochastic = self.stochastic_motions()
+        records, pulses = expand_record_names(names), self.supplied_texts().get("pulse", ())
+        stochastic = self.create_stochastic_motions()
         if not (records or pulses or stochastic):
             message = "at least one record is required: file, folder, or name of a shipped record, or {} or {}"
             raise OptionError(message, "pulse", "stochastic")
-        names_channels = "channel" in self.supplied() or self.supplied().get("vertical", OWN) != OWN
+        names_channels = "channel" in self.supplied_texts() or self.supplied_texts().get("vertical", OWN) != OWN
         if self.component != "own" or (with_pairs and records and not names_channels and STANDARD_INPUT not in records):
             return self._load_pairs(records, [*pulses, *stochastic], names_channels=names_channels)
-        pulse_motions = self.pulses()
-        read = functools.partial(self.motion, several=len(records) > 1)
+        pulse_motions = self.create_pulses()
+        read = functools.partial(self.read_motion, several=len(records) > 1)
         motions, skipped = read_records(records, read, keep_going=self.keep_going)
         messages = [*skipped.values()]
         if records and not motions:
@@ -380,16 +381,17 @@ class _RecordOptions(FileOptions):
         if not is_own and (others or names_channels):
             message = f"{{}} {self.component} requires records: omit {{}}, {{}} and {{}}, and use {{}} {OWN} or omit it"
             raise OptionError(message, "component", "pulse", "stochastic", "channel", "vertical")
-        target = self._target()
+        target = self._read_target()
         if target is not None and target[1].name != "factor":
             target = target[0], replace(target[1], component=self.component)
-        options = self.read_values("dt", "units") | self.corrections() | {"singles": is_own}
-        with_vertical = "vertical" in self.supplied()
+        options = self.read_values("dt", "units") | self.read_corrections() | {"singles": is_own}
+        with_vertical = "vertical" in self.supplied_texts()
         pairs, skipped = collect_pairs(records, vertical=with_vertical, keep_going=self.keep_going, **options)
         note_skipped(skipped)
         motion_names = name_components(pairs) if is_own else list_motion_names(pairs)
-        motions = {name: self._scale(name, motion, target) for name, motion in zip(motion_names, pairs, strict=True)}
-        motions |= {**self.pulses(), **self.stochastic_motions()} if others else {}
+        named = zip(motion_names, pairs, strict=True)
+        motions = {name: self._scale_motion(name, motion, target) for name, motion in named}
+        motions |= {**self.create_pulses(), **self.create_stochastic_motions()} if others else {}
         return LoadedRecords(self._add_reversed(motions), skipped, False)
 
     def _add_reversed(self, motions: dict[str, Motion]) -> dict[str, Motion]:
@@ -447,7 +449,7 @@ class MeasureOptions(IntensityOptions):
 
     levels: Annotated[str | None, Parameter(help=_LEVELS_HELP, allow_leading_hyphen=True)] = None
 
-    def arguments(self, component: ComponentName = "own") -> dict[str, Any]:
+    def create_arguments(self, component: ComponentName = "own") -> dict[str, Any]:
         """Return measure and levels as arguments."""
         measure, acceleration = self.create_measure(component), cast(NumberReader, read_positive_acceleration)
         readers = {"m/s^2": acceleration, "m/s": read_velocity, "m": read_length, "s": read_duration}
@@ -504,7 +506,7 @@ class RiskOptions(ClusterOptions):
             return None
         period: Any = measure.periods
         curve = HazardCurve.read(self.hazard, site=self.site, period=period, component=component)
-        for sentence in hazard_notes(curve.intensity, curve.measure):
+        for sentence in list_hazard_notes(curve.intensity, curve.measure):
             note(f"{self.hazard}: {sentence}")
         return curve
 
@@ -527,7 +529,7 @@ class SchemeOptions(ModelOptions):
 
     chattering: Annotated[str, Parameter(help=INPUTS["chattering"].help)] = "certified"
 
-    def arguments(self) -> dict[str, Any]:
+    def create_arguments(self) -> dict[str, Any]:
         """Return model and scheme as arguments."""
         from rocking.engine.schemes import chattering_scheme
 
@@ -554,7 +556,7 @@ class SlipOptions(ModelOptions):
 
     friction: Annotated[str | None, Parameter(help=_FRICTION_HELP)] = None
 
-    def arguments(self) -> dict[str, Any]:
+    def create_arguments(self) -> dict[str, Any]:
         """Return model and friction as arguments."""
         return {"model": self.model, **read_friction(self.friction)}
 
@@ -565,9 +567,9 @@ class SlipSchemeOptions(SchemeOptions):
 
     friction: Annotated[str | None, Parameter(help=_FRICTION_HELP)] = None
 
-    def arguments(self) -> dict[str, Any]:
+    def create_arguments(self) -> dict[str, Any]:
         """Return model, scheme and friction as arguments."""
-        return super().arguments() | read_friction(self.friction)
+        return super().create_arguments() | read_friction(self.friction)
 
 
 @_with_inputs("duration", "initial_rotation", "initial_velocity")

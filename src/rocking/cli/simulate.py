@@ -37,7 +37,7 @@ from rocking.cli.output import (
 from rocking.core.progress import note
 from rocking.core.tables import format_table, list_some, to_json
 from rocking.errors import OptionError, RecordError
-from rocking.inputs.notes import reading_notes
+from rocking.inputs.notes import list_reading_notes
 from rocking.inputs.pulses import FAMILIES, PulseFamily
 from rocking.records.named import (
     STANDARD_INPUT,
@@ -98,8 +98,8 @@ def simulate(
         check_available_friction(start.available_friction)  # checked before the simulation
     choose_steps(start.precision)
     summary_options: dict[str, Any] = {name: getattr(start, name) for name in ("available_friction", "precision")}
-    body = block.bodies()
-    options: dict[str, Any] = {**model.arguments(), **start.read_values()}
+    body = block.create_bodies()
+    options: dict[str, Any] = {**model.create_arguments(), **start.read_values()}
     for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
         raise OptionError("{} writes files; set their folder with {}", name, "out")
     with output.folder() as folder:
@@ -163,11 +163,11 @@ def check(
     rules
         Some of west,ishiyama,housner,asce_43_05,priestley. By default all.
     """
-    body = block.blocks()
+    body = block.create_blocks()
     rule_names = None if rules is None else [name.strip() for name in rules.split(",")]
     with output.folder() as folder:
         loaded = motion.read_all(names)
-        comparison = compare_rules(body, loaded.motions, rules=rule_names, **model.arguments())
+        comparison = compare_rules(body, loaded.motions, rules=rule_names, **model.create_arguments())
         comparison = replace(comparison, skipped=loaded.skipped)
         result = comparison.to_dict()
         if folder is not None:
@@ -202,12 +202,12 @@ def records(
 def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:
     if is_shipped(name):
         if not several:
-            reject_redundant_arguments(name, **file.metadata())
+            reject_redundant_arguments(name, **file.read_metadata())
         return shipped(name)
     source = sys.stdin.buffer if name == STANDARD_INPUT else name
-    listing = contents(source, **file.metadata(), **file.corrections(), several=several)
+    listing = contents(source, **file.read_metadata(), **file.read_corrections(), several=several)
     for motion, entry in zip(listing.motions, listing.entries, strict=True):
-        for sentence in (*reading_notes(motion), *motion.history):
+        for sentence in (*list_reading_notes(motion), *motion.history):
             note(f"{name}, channel {entry['channel']}: {sentence}")
     return listing
 

@@ -34,7 +34,7 @@ def is_wide(low: Floats, high: Floats, tolerance: Floats | float) -> Flags:
     return np.asarray((high - low > tolerance * high) & (midpoints > low) & (midpoints < high))
 
 
-def halve(low: Floats, high: Floats, in_upper: Flags, in_lower: Flags) -> tuple[Floats, Floats]:
+def halve(low: Floats, high: Floats, is_in_upper: Flags, is_in_lower: Flags) -> tuple[Floats, Floats]:
     """Return brackets cut at their middle, on the side that contains the change if known."""
     midpoints = compute_midpoints(low, high)
-    return np.where(in_upper, midpoints, low), np.where(in_lower, midpoints, high)
+    return np.where(is_in_upper, midpoints, low), np.where(is_in_lower, midpoints, high)

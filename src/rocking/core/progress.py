@@ -12,7 +12,7 @@ from datetime import timedelta
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from rocking.core.threads import progress_option, set_options
+from rocking.core.threads import read_progress_option, set_options
 from rocking.errors import Message, OutsideFitWarning, Spelling
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Progress:
 
     def __init__(self, description: str, total: int, *, done: int = 0) -> None:
         self.description, self.total = description, total
-        show = progress_option()
+        show = read_progress_option()
         self._show = (_listener.audience != "nobody" and sys.stderr.isatty()) if show is None else show
         self._start = time.monotonic()
         self._initially_done = self.done = done

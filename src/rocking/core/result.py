@@ -108,7 +108,7 @@ class Result(ABC):
     TABLES: ClassVar[Collection[str]] = ()
 
     #: Format of numbers in CSV files.
-    _FORMAT: ClassVar[str | None] = "%.15g"
+    _FLOAT_FORMAT: ClassVar[str | None] = "%.15g"
 
     @abstractmethod
     def summary(self) -> str:
@@ -141,7 +141,7 @@ class Result(ABC):
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
         """Write a table of `to_dataframe` to a CSV file, with "inf" for infinity, like `to_json`."""
-        write_csv(path, self.to_dataframe(table), float_format=self._FORMAT)
+        write_csv(path, self.to_dataframe(table), float_format=self._FLOAT_FORMAT)
 
     def to_excel(self, path: str | Path) -> None:
         """Write all tables as sheets of a workbook (.xlsx), like `to_json`.
@@ -196,7 +196,7 @@ class DatasetResult(Result):
         All numbers, with units and meaning of each variable.
     TABLES : mapping of str to tuple of str
         Tables, the default one first, and the variables of each.
-    POOLED : tuple of str
+    AGGREGATED_DIMENSIONS : tuple of str
         Dimensions over which some numbers are aggregated. These numbers do not apply to a part of a dimension.
 
     See Also
@@ -214,7 +214,7 @@ class DatasetResult(Result):
     """
 
     TABLES: ClassVar[Mapping[str, tuple[str, ...]]]
-    POOLED: ClassVar[tuple[str, ...]] = ()
+    AGGREGATED_DIMENSIONS: ClassVar[tuple[str, ...]] = ()
 
     data: xr.Dataset
 
@@ -237,7 +237,7 @@ class DatasetResult(Result):
         OptionError
             If a dimension or label does not exist, or the result contains numbers aggregated over that dimension.
         """
-        for name in labels.keys() & {*self.POOLED}:
+        for name in labels.keys() & {*self.AGGREGATED_DIMENSIONS}:
             message = f"this result contains numbers aggregated over {name}; repeat the analysis for a part, or select"
             raise OptionError(f"{message} from `data`", value=labels)
         selection = {name: np.atleast_1d(values) for name, values in labels.items()}
@@ -277,7 +277,7 @@ class DatasetResult(Result):
         return f"<p><b>{type(self).__name__}</b>: {escape(self._headline())}</p>{html}"
 
 
-def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: str = "") -> tuple[Any, Any, Any]:
+def create_variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: str = "") -> tuple[Any, ...]:
     """Return a variable of a dataset: dimensions, values, and optional unit and meaning."""
     return dims, values, {name: text for name, text in (("units", unit), ("long_name", meaning)) if text}
 

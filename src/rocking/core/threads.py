@@ -81,12 +81,12 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
         _options.reset(self._token)
 
 
-def thread_count() -> int:
+def choose_thread_count() -> int:
     """Return the number of threads of long computations."""
     return _options.get(_DEFAULT).threads or count_cores()
 
 
-def progress_option() -> bool | None:
+def read_progress_option() -> bool | None:
     """Return whether to draw progress bars, or None by default."""
     return _options.get(_DEFAULT).progress
 
@@ -105,7 +105,7 @@ def map_in_threads(
     error. On an early exit, for example an interrupt, `cancelled` is set, running work is awaited, and other work is
     discarded.
     """
-    count = min(thread_count(), len(items) if isinstance(items, Sized) else 2**16)
+    count = min(choose_thread_count(), len(items) if isinstance(items, Sized) else 2**16)
     if count < 2:
         yield from map(function, items)
         return

@@ -1,6 +1,6 @@
 from .basin_maps import Basins, basins
 from .bifurcation import BifurcationDiagram, LyapunovExponents, bifurcation_diagram, lyapunov_exponents
-from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum, Law, LinearBodies, Response, simulate
+from .bodies import BouncingBall, EquationOfMotion, ImpactOscillator, InvertedPendulum, LinearBodies, Response, simulate
 from .branches import Bifurcation, Branch
 from .continuation import continue_orbit
 from .maps import PeriodOutcome, StroboscopicMap, stroboscopic_map
@@ -12,9 +12,9 @@ __all__ = [
     "BifurcationDiagram",
     "BouncingBall",
     "Branch",
+    "EquationOfMotion",
     "ImpactOscillator",
     "InvertedPendulum",
-    "Law",
     "LinearBodies",
     "LyapunovExponents",
     "PeriodOutcome",

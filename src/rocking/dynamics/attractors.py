@@ -106,7 +106,7 @@ def _find_fixed_point(strobe: StroboscopicMap, point: Floats, period: int, size:
 def _create_trap(
     strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats
 ) -> Floats | None:
-    """Find an invariant neighbourhood of a point of an attractor, as a row for `kernels.periodic.iterate`."""
+    """Find an invariant neighbourhood of a point of an attractor, as a row for `kernels.periodic.iterate_periods`."""
     side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
     if side < 0:  # at rest, whatever the previous state
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -14,7 +14,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, variable
+from rocking.core.result import DatasetResult, create_variable
 from rocking.core.tables import escape_dollars, format_count, format_table
 from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.maps import StroboscopicMap, check_magnitudes, compute_scale, describe_input
@@ -69,7 +69,7 @@ class Basins(DatasetResult):
         "outcomes": ("outcome", "periods"),
         "orbits": ("orbit_coordinate", "orbit_velocity"),
     }
-    POOLED = ("velocity", "position", "angular_velocity", "rotation", "attractor", "phase")
+    AGGREGATED_DIMENSIONS = ("velocity", "position", "angular_velocity", "rotation", "attractor", "phase")
 
     def summary(self) -> str:
         data = self.data
@@ -252,25 +252,25 @@ class _BasinGrid:
             points[k, : known.period] = known.states
         error = np.sqrt(share * (1.0 - share) / total)
         coordinate = self.strobe.body.coordinate
-        name, rate, unit = coordinate.name, coordinate.rate, coordinate.unit
+        name, rate, unit = coordinate.name, coordinate.rate_name, coordinate.unit
         dims, orbit_dims, shape = (rate, name), ("attractor", "phase"), (len(self.v), len(self.x))
         outcome, period_counts = index_of_code[self.outcome].reshape(shape), self.period_counts.reshape(shape)
         return xr.Dataset(
             {
-                "outcome": variable(dims, outcome, "number of the attractor"),
-                "periods": variable(dims, period_counts, "periods until the outcome was known"),
-                "share": variable("attractor", share, "share of the cells", "1"),
-                "standard_error": variable("attractor", error, "of the share, as of random states", "1"),
-                "period": variable("attractor", period, "periods of the motion"),
-                "impacts": variable("attractor", impacts, "impacts in a period of the orbit"),
-                "rests": variable("attractor", rests, "has a rest"),
-                "multiplier": variable("attractor", multiplier, "largest multiplier in size", "1"),
-                "orbit_coordinate": variable(orbit_dims, points[..., 0], f"{name} on the orbit", unit),
-                "orbit_velocity": variable(orbit_dims, points[..., 1], "rate on the orbit", f"{unit}/s"),
+                "outcome": create_variable(dims, outcome, "number of the attractor"),
+                "periods": create_variable(dims, period_counts, "periods until the outcome was known"),
+                "share": create_variable("attractor", share, "share of the cells", "1"),
+                "standard_error": create_variable("attractor", error, "of the share, as of random states", "1"),
+                "period": create_variable("attractor", period, "periods of the motion"),
+                "impacts": create_variable("attractor", impacts, "impacts in a period of the orbit"),
+                "rests": create_variable("attractor", rests, "has a rest"),
+                "multiplier": create_variable("attractor", multiplier, "largest multiplier in size", "1"),
+                "orbit_coordinate": create_variable(orbit_dims, points[..., 0], f"{name} on the orbit", unit),
+                "orbit_velocity": create_variable(orbit_dims, points[..., 1], "rate on the orbit", f"{unit}/s"),
             },
             {
-                rate: variable(rate, self.v, "velocity at the start of a period", f"{unit}/s"),
-                name: variable(name, self.x, f"{name} at the start of a period", unit),
+                rate: create_variable(rate, self.v, "velocity at the start of a period", f"{unit}/s"),
+                name: create_variable(name, self.x, f"{name} at the start of a period", unit),
                 "attractor": _distinguish_names(names),
             },
             {

@@ -15,7 +15,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, Result, format_some_rows, variable
+from rocking.core.result import DatasetResult, Result, create_variable, format_some_rows
 from rocking.core.tables import escape_dollars, format_count
 from rocking.core.threads import map_in_threads
 from rocking.dynamics.attractors import RETURN_TOLERANCE
@@ -47,7 +47,7 @@ OVERTURNED: Final = -1
 NOT_FOLLOWED: Final = -2
 
 #: Number of values per update of the progress bar.
-_CHUNK: Final = 10
+_VALUES_PER_CHUNK: Final = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -257,8 +257,8 @@ def bifurcation_diagram(
     for strobe in end_maps:
         strobe._check_starts(initial_states, "starts")  # raises an error for a start behind a stop
     with Progress("bifurcation diagram", len(directions) * parameters.size) as bar:
-        for start in range(0, parameters.size, _CHUNK):
-            chunks = [(d, order[start : start + _CHUNK]) for d, order in indices.items()]
+        for start in range(0, parameters.size, _VALUES_PER_CHUNK):
+            chunks = [(d, order[start : start + _VALUES_PER_CHUNK]) for d, order in indices.items()]
             for count in map_in_threads(follow_values, [(0, [k]) for k in chunks[0][1]] if is_afresh else chunks):
                 bar.advance(count)
 
@@ -272,14 +272,14 @@ def bifurcation_diagram(
     meaning_of_impacts = "impacts in one period of the orbit, infinite: chattering, -1: not known"
     dataset = xr.Dataset(
         {
-            "coordinate": variable(state_dimensions, states[..., 0], coordinate.name, coordinate.unit),
-            "velocity": variable(state_dimensions, states[..., 1], coordinate.rate, f"{coordinate.unit}/s"),
-            "period": variable(orbit_dimensions, periods, meaning_of_period),
-            "impacts": variable(orbit_dimensions, impacts, meaning_of_impacts),
-            "start_coordinate": variable("start", initial_states[:, 0], "initial state", coordinate.unit),
-            "start_velocity": variable("start", initial_states[:, 1], "initial state", f"{coordinate.unit}/s"),
+            "coordinate": create_variable(state_dimensions, states[..., 0], coordinate.name, coordinate.unit),
+            "velocity": create_variable(state_dimensions, states[..., 1], coordinate.rate_name, f"{coordinate.unit}/s"),
+            "period": create_variable(orbit_dimensions, periods, meaning_of_period),
+            "impacts": create_variable(orbit_dimensions, impacts, meaning_of_impacts),
+            "start_coordinate": create_variable("start", initial_states[:, 0], "initial state", coordinate.unit),
+            "start_velocity": create_variable("start", initial_states[:, 1], "initial state", f"{coordinate.unit}/s"),
         },
-        {"direction": list(directions), "value": variable("value", parameters, parameter_name, "1")},
+        {"direction": list(directions), "value": create_variable("value", parameters, parameter_name, "1")},
         {
             "program": f"rocking {VERSION}",
             "parameter": parameter_name,
@@ -380,7 +380,7 @@ class LyapunovExponents(Result):
         Period of the motion, s, and number of averaged periods.
     impacts : float
         Number of impacts per period.
-    resting : float
+    share_at_rest : float
         Fraction of the known periods in which the body comes to rest or is at rest; NaN if no period is known.
     outcome : PeriodOutcome
         Final condition of the body.
@@ -406,7 +406,7 @@ class LyapunovExponents(Result):
     forcing_period: float
     n_periods: int
     impacts: float
-    resting: float
+    share_at_rest: float
     outcome: PeriodOutcome
     stretches: Floats
 
@@ -415,7 +415,7 @@ class LyapunovExponents(Result):
         if np.isnan(self.largest):
             return f"no Lyapunov exponents: the body overturns or cannot be followed {averaging}"
         if np.isneginf(self.largest):
-            rests = f"the body comes to rest in {100.0 * self.resting:.3g} % of the periods"
+            rests = f"the body comes to rest in {100.0 * self.share_at_rest:.3g} % of the periods"
             return f"Lyapunov exponents: minus infinity; {rests}, {averaging}"
         exponents = f"{self.largest:.6g} and {self.smallest:.6g} per period (standard error {self.standard_error:.1g})"
         return f"Lyapunov exponents: {exponents}, {averaging}, {self.impacts:.4g} impacts in each"
@@ -428,7 +428,7 @@ class LyapunovExponents(Result):
             "period_s": self.forcing_period,
             "periods": self.n_periods,
             "impacts_per_period": self.impacts,
-            "share_of_periods_with_rest": self.resting,
+            "share_of_periods_with_rest": self.share_at_rest,
             "outcome": self.outcome.name,
         }
 
@@ -529,7 +529,7 @@ def lyapunov_exponents(
         forcing_period=strobe.forcing_period,
         n_periods=count,
         impacts=impacts / count,
-        resting=float(np.mean(rests[known])) if known.any() else float("nan"),
+        share_at_rest=float(np.mean(rests[known])) if known.any() else float("nan"),
         outcome=outcome,
         stretches=logs,
     )

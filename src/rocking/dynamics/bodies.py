@@ -20,7 +20,7 @@ from rocking.block.body import BODIES_TYPES, Coordinate
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
-from rocking.engine.problem import never_rests
+from rocking.engine.problem import conserves_speed
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import BlockError, OptionError
 from rocking.kernels import state
@@ -29,7 +29,7 @@ from rocking.records.named import check_motion
 from rocking.simulation.simulate import compute_response
 
 
-class Law(NamedTuple):
+class EquationOfMotion(NamedTuple):
     """Equation of motion: stiffness (1/s^2), damping (1/s), pull (m/s^2) and stops (m; the second may be infinite).
 
     See Also
@@ -40,8 +40,8 @@ class Law(NamedTuple):
     Examples
     --------
     >>> from rocking import dynamics
-    >>> dynamics.BouncingBall(0.8, gravity=10.0).law
-    Law(stiffness=0.0, damping=0.0, pull=10.0, low=0.0, high=inf)
+    >>> dynamics.BouncingBall(0.8, gravity=10.0).equation
+    EquationOfMotion(stiffness=0.0, damping=0.0, pull=10.0, low=0.0, high=inf)
     """
 
     stiffness: float
@@ -57,13 +57,13 @@ class LinearBody(ABC):
 
     coordinate: ClassVar[Coordinate] = Coordinate("position", "velocity", "acceleration", "m")
     balance: ClassVar[tuple[float, float]] = (math.inf, math.inf)
-    contact: ClassVar[None] = None
+    contact_law: ClassVar[None] = None
     kind: ClassVar[str]
     units: ClassVar[Mapping[str, str]]
 
     @property
     @abstractmethod
-    def law(self) -> Law:
+    def equation(self) -> EquationOfMotion:
         """Equation of motion."""
 
     @property
@@ -86,13 +86,13 @@ class LinearBody(ABC):
     @property
     def stops(self) -> tuple[float, float]:
         """Positions of the stops, m; with a single stop, its position twice."""
-        low, high = self.law.low, self.law.high
+        low, high = self.equation.low, self.equation.high
         return low, (high if math.isfinite(high) else low)
 
     def uplift_thresholds(self, model: Model = "linear") -> tuple[float, float]:
         """Accelerations (m/s^2) that lift the body off its stops: -a for the first, a for the second; or inf."""
         _require_linear_model(model)
-        stiffness, _, pull, low, high = self.law
+        stiffness, _, pull, low, high = self.equation
         return pull - stiffness * low, stiffness * high - pull if math.isfinite(high) else math.inf
 
     def as_bodies(self) -> LinearBodies:
@@ -167,7 +167,8 @@ class LinearBodies:
     @property
     def is_symmetric(self) -> bool:
         """Whether every body is between two stops at equal distances, without a pull."""
-        return all(law.pull == 0.0 and law.low == -law.high for law in (body.law for body in self.members))
+        equations = [body.equation for body in self.members]
+        return all(equation.pull == 0.0 and equation.low == -equation.high for equation in equations)
 
     def __len__(self) -> int:
         return len(self.members)
@@ -188,20 +189,20 @@ class LinearBodies:
     def speed_thresholds(self, share: float) -> Floats:
         return np.full((len(self), 2), share)  # these bodies have no natural speed
 
-    def kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
+    def create_kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
         _require_linear_model(model)
-        records = state.new_records(len(self), state.BLOCK)
-        laws = np.array([body.law for body in self.members])
-        two_stops = np.isfinite(laws[:, 4])
-        records["stiffness"] = laws[:, :1]
-        records["damping"] = laws[:, 1:2]
-        records["restrained"] = laws[:, 1] > 0.0
+        records = state.create_records(len(self), state.BLOCK)
+        equations = np.array([body.equation for body in self.members])
+        two_stops = np.isfinite(equations[:, 4])
+        records["stiffness"] = equations[:, :1]
+        records["damping"] = equations[:, 1:2]
+        records["restrained"] = equations[:, 1] > 0.0
         records["threshold_slope"] = self.gravity
         records["threshold"] = np.array([body.uplift_thresholds() for body in self.members]) / self.gravity
         records["restitution"] = self.restitution
         records["two_stops"] = two_stops
         records["next_side"][:, 1] = two_stops
-        records["overturn_angle"] = laws[:, 4] - laws[:, 3]
+        records["overturn_angle"] = equations[:, 4] - equations[:, 3]
         records["rest_limit"] = thresholds
         return records
 
@@ -261,9 +262,9 @@ class BouncingBall(LinearBody):
         self._check_parameters("gravity")
 
     @property
-    def law(self) -> Law:
+    def equation(self) -> EquationOfMotion:
         """Equation of motion: gravity alone."""
-        return Law(0.0, 0.0, self.gravity, 0.0, math.inf)
+        return EquationOfMotion(0.0, 0.0, self.gravity, 0.0, math.inf)
 
 
 @dataclass(frozen=True)
@@ -327,11 +328,11 @@ class ImpactOscillator(LinearBody):
             raise BlockError(message, "second_stop", "stop", value=second_stop)
 
     @property
-    def law(self) -> Law:
+    def equation(self) -> EquationOfMotion:
         """Equation of motion: a spring and a damper."""
         w = 2.0 * math.pi * self.frequency
         high = math.inf if self.second_stop is None else self.second_stop
-        return Law(-w * w, 2.0 * self.damping_ratio * w, 0.0, -self.stop, high)
+        return EquationOfMotion(-w * w, 2.0 * self.damping_ratio * w, 0.0, -self.stop, high)
 
 
 @dataclass(frozen=True)
@@ -378,9 +379,9 @@ class InvertedPendulum(LinearBody):
         self._check_parameters("p", "gap")
 
     @property
-    def law(self) -> Law:
+    def equation(self) -> EquationOfMotion:
         """Equation of motion: the pendulum falls away from the upright position."""
-        return Law(self.p * self.p, 0.0, 0.0, -self.gap, self.gap)
+        return EquationOfMotion(self.p * self.p, 0.0, 0.0, -self.gap, self.gap)
 
 
 class _BodyFactory(NamedTuple):
@@ -498,7 +499,7 @@ def simulate(
     """
     body, motion = _require_linear_body(body), check_motion(motion)
     end_time = _choose_duration(body, motion, duration)
-    position = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
+    position = min(max(0.0, body.equation.low), body.equation.high) if initial_position is None else initial_position
     start = position, initial_velocity
     return convert_to_positions(compute_response(body, motion, "linear", chattering, end_time, start))
 
@@ -526,7 +527,7 @@ def _choose_duration(body: LinearBody, motion: Motion | None, duration: float | 
         if motion is None:
             raise OptionError("this body is not pressed against a stop and may never rest; specify {}", "duration")
         return motion.end
-    if never_rests(body.as_bodies()):
+    if conserves_speed(body.as_bodies()):
         message = f"a body with {{}} 1, as this {body.description}, never comes to rest; specify {{}}"
         raise OptionError(message, "restitution", "duration")
     return None

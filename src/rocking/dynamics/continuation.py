@@ -360,7 +360,7 @@ class _BranchWalk:
                 kind_beyond = self.equations.determine_kind(beyond + step * self.tangent)
             except RockingError:
                 continue
-            if kind_beyond.unknown:
+            if kind_beyond.is_unknown:
                 return branches.END_LOST
             if kind_beyond.overturns:
                 return branches.OVERTURNING

@@ -22,7 +22,13 @@ from rocking.engine.tasks import Setup
 from rocking.errors import BlockError, MotionError, OptionError
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, build_ground
-from rocking.kernels.periodic import TRAP_COLUMNS, PeriodicProblem, build_step_rows, differentiate, iterate
+from rocking.kernels.periodic import (
+    TRAP_COLUMNS,
+    PeriodicProblem,
+    build_step_rows,
+    differentiate_periods,
+    iterate_periods,
+)
 from rocking.kernels.periodic import PeriodOutcome as PeriodOutcome
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
@@ -87,12 +93,12 @@ class PeriodicallyForcedBody:
 
     def _create_problem(self) -> PeriodicProblem:
         settings = self._copy_settings(stores_nodes=False)
-        return PeriodicProblem(self._ground, self._body_records[0], settings, state.new_table(0), self._steps)
+        return PeriodicProblem(self._ground, self._body_records[0], settings, state.create_table(0), self._steps)
 
     def _create_derivative_arguments(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
         """Create the problem and the workspace of the derivative kernels."""
         trail = Trail(self._ground, self._body_records[0], self._copy_settings(stores_nodes=True), NO_NODES)
-        return trail, state.new_scratch(), state.new_record(state.VARIATION), state.new_table(512)
+        return trail, state.create_scratch(), state.create_record(state.VARIATION), state.create_table(512)
 
     def _check_starts(self, starts: ArrayLike, name: str) -> Floats:
         """Return initial states, shape (n, 2), after checking that they are finite and in front of the stops."""
@@ -116,7 +122,7 @@ class PeriodicallyForcedBody:
                 message = f"{{}} must not point into a stop; got {v:g} m/s at {x:g} m"
                 correction = "change its sign, or begin in front of the stop"
                 raise OptionError(f"{message}; {correction}", velocities or name, value=v)
-        records = state.new_states(len(flat), 0)
+        records = state.create_states(len(flat), 0)
         set_start(records, self._body_records, self.bodies, coordinate, velocity, name)
         records["peak"] = self._initial_peak
         return pairs, records
@@ -300,7 +306,7 @@ class StroboscopicMap(PeriodicallyForcedBody):
         for _ in range(checks.integer(n_periods, "n_periods", OptionError, minimum=1)):
             signs, initial_states = _compute_signs(records["side"]), records.copy()
             self._iterate(records)
-            differentiate(*self._create_derivative_arguments(), state.expose_fields(initial_states), change)
+            differentiate_periods(*self._create_derivative_arguments(), state.expose_fields(initial_states), change)
             ended |= np.isin(records["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))
             product = (signs * _compute_signs(records["side"]))[:, None, None] * change @ product
         final_states = self._to_coordinates(records["u"], records["v"], records["side"])
@@ -317,7 +323,7 @@ class StroboscopicMap(PeriodicallyForcedBody):
         """
         pairs = self._check_pairs(impacts, "impacts", "phase in s")
         flat = pairs.reshape(-1, 2)
-        records = state.new_states(len(flat), 0)
+        records = state.create_states(len(flat), 0)
         phase = np.mod(np.where(np.isfinite(flat[:, 0]), flat[:, 0], np.nan), self.forcing_period)
         starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
         records["piece"] = np.searchsorted(starts, phase, side="right") - 1
@@ -340,7 +346,7 @@ class StroboscopicMap(PeriodicallyForcedBody):
 
         def advance_part(part: slice) -> None:
             outputs = reached[part], counts[part]
-            iterate(problem, state.new_scratch(), records[part], n_periods, orbits[part], traps, *outputs)
+            iterate_periods(problem, state.create_scratch(), records[part], n_periods, orbits[part], traps, *outputs)
 
         for _ in map_in_threads(advance_part, split_states(len(records), n_periods)):
             pass

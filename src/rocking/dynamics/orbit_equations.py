@@ -37,7 +37,7 @@ from rocking.response import Response
 _CROSSING_POINT_COUNT: Final = 4
 
 #: Residual of a point, relative to the scale and the size of the derivative, and its absolute maximum.
-_RESIDUAL: Final = 1e-12
+_RESIDUAL_TOLERANCE: Final = 1e-12
 _MAX_RESIDUAL: Final = 1e-6
 
 #: Largest step of differences by the parameter, relative to its range.
@@ -59,7 +59,7 @@ class OrbitKind(NamedTuple):
     #: Whether the body overturns.
     overturns: bool
     #: Whether the response is unknown because it requires too many steps.
-    unknown: bool
+    is_unknown: bool
 
 
 class TestFunctions(NamedTuple):
@@ -125,7 +125,7 @@ class OrbitEquations:
             raise OptionError(message, "family", "value", value=value)
         sizes, kind = np.array([*scale, bounds[1] - bounds[0]]), determine_kind(strobe, orbit.state, orbit.period)
         equations = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, bounds)  # type: ignore[arg-type]
-        equations.uses_half_map = orbit.symmetric and not orbit.rests and equations.is_mirrored_throughout(value)
+        equations.uses_half_map = orbit.is_symmetric and not orbit.rests and equations.is_mirrored_throughout(value)
         return equations
 
     def _create_map(self, value: float) -> StroboscopicMap:
@@ -185,7 +185,7 @@ class OrbitEquations:
             residual, jacobian = self.compute_residual(z)
             if not np.all(np.isfinite(jacobian)):
                 return None
-            tolerance = _RESIDUAL * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
+            tolerance = _RESIDUAL_TOLERANCE * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
             is_accurate = np.max(np.abs(residual)) < min(tolerance, _MAX_RESIDUAL)
             try:
                 step = np.linalg.solve(np.vstack([jacobian, normal]), -np.append(residual, normal @ (z - guess)))

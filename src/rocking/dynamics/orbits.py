@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 MAX_ORBIT_DISTANCE: Final = 1e-7
 
 #: Rounding error of a multiplier near 1 or of the product of two, and of two nearly equal multipliers.
-_NEUTRAL: Final = 1e-9
+_NEUTRAL_TOLERANCE: Final = 1e-9
 _NEUTRAL_PAIR: Final = 1e-6
 
 #: Number of periods after which states of every `_LATER_STRIDE`-th start are further starts, close to attractors.
@@ -59,7 +59,7 @@ class PeriodicOrbit(Result):
     multipliers : ndarray of complex, shape (2,)
         Floquet multipliers, the largest first (eigenvalues of the derivative of the map over the period). They are
         exactly zero with a proven rest, and one at rest without energy loss, because neighbouring states never rest.
-    symmetric, rests : bool
+    is_symmetric, rests : bool
         Whether the orbit equals its mirror image half a period later, and whether every period contains a rest.
 
     See Also
@@ -86,7 +86,7 @@ class PeriodicOrbit(Result):
     period: int
     impacts: float
     multipliers: NDArray[np.complex128]
-    symmetric: bool
+    is_symmetric: bool
     rests: bool
 
     @property
@@ -123,7 +123,7 @@ class PeriodicOrbit(Result):
             events = "with complete chattering"
         else:
             events = f"with {format_count(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
-        symmetric = " symmetric" if self.symmetric else ""
+        symmetric = " symmetric" if self.is_symmetric else ""
         return f"{stable}{symmetric} orbit of {format_count(self.period, 'period')} {events}"
 
     @property
@@ -165,7 +165,7 @@ class PeriodicOrbit(Result):
             "impacts": to_plain(self.impacts),
             "complete_chattering": math.isinf(self.impacts),
             "rests": self.rests,
-            "symmetric": self.symmetric,
+            "symmetric": self.is_symmetric,
             "stable": self.is_stable,
             "multipliers": [[float(multiplier.real), float(multiplier.imag)] for multiplier in self.multipliers],
         }
@@ -244,7 +244,7 @@ def create_orbit(strobe: StroboscopicMap, state: Floats, period: int) -> Periodi
 def count_orbit_impacts(strobe: StroboscopicMap, state: Floats, period: int, derivative: Floats) -> float:
     """Count the impacts over a number of periods; infinity with complete chattering."""
     impacts = float(strobe.advance(state, period)[2])
-    chatters = impacts > 0.0 and strobe.chattering.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
+    chatters = impacts > 0.0 and strobe.chattering.bracket_width > 0.0 and np.max(strobe.bodies.restitution) > 0.0
     return math.inf if chatters and not np.any(derivative) else impacts
 
 
@@ -266,8 +266,8 @@ def compute_multipliers(strobe: StroboscopicMap, derivative: Floats) -> NDArray[
 def compute_moduli(multipliers: NDArray[np.complex128]) -> Floats:
     """Compute absolute multipliers (pairs along the last axis), exactly 1 within rounding error."""
     sizes = np.abs(multipliers)
-    is_pair = np.abs(np.prod(sizes, axis=-1, keepdims=True) - 1.0) < _NEUTRAL
-    return np.where(np.abs(sizes - 1.0) < np.where(is_pair, _NEUTRAL_PAIR, _NEUTRAL), 1.0, sizes)
+    is_pair = np.abs(np.prod(sizes, axis=-1, keepdims=True) - 1.0) < _NEUTRAL_TOLERANCE
+    return np.where(np.abs(sizes - 1.0) < np.where(is_pair, _NEUTRAL_PAIR, _NEUTRAL_TOLERANCE), 1.0, sizes)
 
 
 def periodic_orbits(

@@ -97,9 +97,9 @@ def compute_slenderness(bodies: Bodies) -> Floats:
     return np.asarray(parameter[0].min(axis=1))
 
 
-def compute_thresholds(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
+def compute_uplift_thresholds(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
     """Return uplift accelerations of each body and side, and the parts due to its own weight, m/s^2, shape (n, 2)."""
-    records = bodies.kernel_records(model, np.zeros((len(bodies), 2)))
+    records = bodies.create_kernel_records(model, np.zeros((len(bodies), 2)))
     weight_part = bodies.gravity * records["threshold"]
     return weight_part + bodies.gravity * records["restraint_threshold"], weight_part
 
@@ -197,7 +197,7 @@ def _check_start(
         raise OptionError(f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", label, value=coordinate)
 
 
-def never_rests(bodies: Bodies) -> bool:
+def conserves_speed(bodies: Bodies) -> bool:
     """Whether two successive impacts of one of the bodies lose no speed at all."""
     e = bodies.restitution
     return bool(np.count_nonzero(e[:, 0] * e[:, 1] == 1.0))
@@ -209,14 +209,14 @@ def build_settings(
     """Check and return the settings of a simulation; a duration is required if nothing comes to rest."""
     checks.choice(model, "model", OptionError, MODELS)
     if duration is None:
-        if never_rests(bodies):
+        if conserves_speed(bodies):
             raise OptionError(
                 "a block with {} 1 never comes to rest; give {} to limit the simulation", "restitution", "duration"
             )
     else:
         duration = checks.positive(duration, "duration", OptionError, "s")
     stop = math.inf if duration is None else duration
-    fields = (model == "nonlinear", scheme.code, scheme.bracket, stop, duration is None, writes_tables)
+    fields = (model == "nonlinear", scheme.code, scheme.bracket_width, stop, duration is None, writes_tables)
     return state.expose_fields(np.array([fields], dtype=state.SETTINGS))[0]
 
 

@@ -19,7 +19,7 @@ from rocking.errors import OptionError, OutsideFitWarning
 from rocking.kernels import state
 from rocking.motion.motion import Motion
 
-Critical = Literal["eq76", "eq77", "exact"]
+CriticalMethod = Literal["eq76", "eq77", "exact"]
 
 #: Ranges of frequency and restitution in which the paper fitted Eqs 76 and 77.
 FITTED_FREQUENCIES: Final = (0.5, 8.0)
@@ -76,7 +76,7 @@ class ChatteringScheme(ABC):
         return f"{self.name}{''.join(values)}{' s' if self.unit == 's' else ''}"
 
     @property
-    def bracket(self) -> float:
+    def bracket_width(self) -> float:
         """Required width of the bracket of the time of rest, s; 0 without a proof."""
         return 0.0
 
@@ -153,10 +153,10 @@ class AsymptoticTime(ChatteringScheme):
     code: ClassVar[int] = state.RestRule.TIME
     unit: ClassVar[str] = ""
 
-    critical: Critical = "eq76"
+    critical: CriticalMethod = "eq76"
 
     def __post_init__(self) -> None:
-        checks.choice(self.critical, "critical", OptionError, get_args(Critical))
+        checks.choice(self.critical, "critical", OptionError, get_args(CriticalMethod))
 
     @property
     def label(self) -> str:
@@ -219,7 +219,7 @@ class Certified(ChatteringScheme):
     tolerance: float = 1e-12
 
     @property
-    def bracket(self) -> float:
+    def bracket_width(self) -> float:
         """The tolerance."""
         return self.tolerance
 

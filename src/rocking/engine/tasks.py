@@ -17,7 +17,7 @@ from rocking.block.single import ROTATION
 from rocking.core.arrays import Flags, Floats, Integers, split_range
 from rocking.core.constants import Model
 from rocking.core.tables import format_count
-from rocking.core.threads import map_in_threads, thread_count
+from rocking.core.threads import choose_thread_count, map_in_threads
 from rocking.engine.problem import (
     GroundGroup,
     build_settings,
@@ -30,7 +30,7 @@ from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import MotionError, UnfinishedError
 from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, Grounds, max_absolute_weights, select_ground
-from rocking.kernels.lane_steps import WIDTH
+from rocking.kernels.lane_steps import LANE_COUNT
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import write_completeness
@@ -58,12 +58,12 @@ BUDGET: Final = 3_000_000
 BUDGET_PER_PIECE: Final = 4
 
 #: Steps per call of a kernel, for one body and for each of many: milliseconds until an interrupt.
-SLICE: Final = 50_000
-_FIRST_SLICE: Final = 5_000
+STEPS_PER_SLICE: Final = 50_000
+_STEPS_OF_FIRST_SLICE: Final = 5_000
 
 #: Number of simulations in a call of a kernel, and of their pieces in lanes, where it is larger. A call takes at most
 #: about half a second; the last simulations of a call do not fill the lanes.
-_CALL_SIZE: Final = 16 * WIDTH
+_CALL_SIZE: Final = 16 * LANE_COUNT
 _CALL_PIECES: Final = 20_000_000
 
 #: Largest number of steps of all simulations in one task, enough to amortise the call and few enough to stop soon after
@@ -98,12 +98,13 @@ class Setup:
         bodies = self.bodies
         check_components(bodies, motion)
         settings = build_settings(bodies, self.model, self.chattering, self.duration, writes_tables=writes_tables)
-        records = bodies.kernel_records(self.model, self.chattering.thresholds(bodies, motion, self.model, factor))
+        thresholds = self.chattering.thresholds(bodies, motion, self.model, factor)
+        records = bodies.create_kernel_records(self.model, thresholds)
         if self.friction is not None:
             add_friction(records, bodies, self.model, self.friction)
         if ground is None:
             ground = prepare_ground(motion, bodies.gravity)._replace(factor=float(factor))
-        states = state.new_states(len(bodies), 0)
+        states = state.create_states(len(bodies), 0)
         set_start(states, records, bodies, *self.start, name)
         return KernelArguments(ground, records, settings, states)
 
@@ -148,7 +149,7 @@ def split_simulations(motions: Sequence[Motion], counts: Integers) -> Iterator[s
     A range contains either part of the simulations under one motion, or all of those under some.
     """
     pieces = np.array([len(motion.coefficients) for motion in motions])
-    max_steps = max(1, min(_TASK_STEPS, int(pieces @ counts) // (2 * thread_count())))
+    max_steps = max(1, min(_TASK_STEPS, int(pieces @ counts) // (2 * choose_thread_count())))
     start = stop = steps = motion_pieces = 0
     for length, count in zip(pieces.tolist(), counts.tolist(), strict=True):
         if stop > start and (steps + length * count > max_steps or motion_pieces + length > _TASK_PIECES):
@@ -217,12 +218,12 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
     motion_indices = np.zeros(len(bodies), dtype=np.int64) if task.motion_indices is None else task.motion_indices
     factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(bodies)).copy()
     settings = build_settings(bodies, setup.model, setup.chattering, setup.duration, writes_tables=False)
-    records = bodies.kernel_records(
+    records = bodies.create_kernel_records(
         setup.model, _compute_thresholds(setup, bodies, task.motions, motion_indices, factors)
     )
     if setup.friction is not None:
         add_friction(records, bodies, setup.model, setup.friction)
-    states = state.new_states(len(bodies), 0)
+    states = state.create_states(len(bodies), 0)
     set_start(states, records, bodies, *setup.start)
     complete = np.empty(len(bodies), dtype=bool)
     for group in prepare_grounds(task.motions, bodies.gravity):
@@ -232,7 +233,8 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
             index = np.searchsorted(group.indices, motion_indices[indices])
             # `take` copies records 20 times as fast as indexing, which copies field by field.
             batch = _Batch(group.grounds, index, factors[indices], records.take(indices), states.take(indices))
-            batch.states["budget"] = _FIRST_SLICE + BUDGET_PER_PIECE * np.diff(group.grounds.first_pieces)[index]
+            piece_counts = np.diff(group.grounds.first_pieces)[index]
+            batch.states["budget"] = _STEPS_OF_FIRST_SLICE + BUDGET_PER_PIECE * piece_counts
             _march_together(settings, batch, substeps)
             _resume_marches(settings, batch, cancelled)
             state.replace_records(states, indices, batch.states)
@@ -306,23 +308,23 @@ def _march_together(settings: Record, batch: _Batch, substeps: int) -> None:
     count = max(substeps, 0) if settings["nonlinear"] else 0
     pool = lanes.build_pool(*batch, float(settings["stop"]), count)
     if substeps < 0:
-        lanes.march_blocks(settings, state.new_scratch(), pool)
+        lanes.march_blocks(settings, state.create_scratch(), pool)
     else:
-        lanes.run_lanes(settings, state.new_scratch(), pool, substeps)
+        lanes.run_lanes(settings, state.create_scratch(), pool, substeps)
 
 
 def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event | None) -> None:
     """Continue simulations that have used up their first slice of steps, up to their budget."""
-    empty_table, scratch = state.new_table(0), state.new_scratch()
+    empty_table, scratch = state.create_table(0), state.create_scratch()
     ending = batch.states["ending"]
     for k in np.flatnonzero((ending == state.Ending.RUNNING) | (ending == state.Ending.PAUSED)):
         body_state = batch.states[k]
         ground = select_ground(batch.grounds, batch.motion_indices[k], float(batch.factors[k]))
-        body_state["stop_piece"] = state.TO_THE_END
+        body_state["stop_piece"] = state.NO_STOP_PIECE
         for _ in range(count_slices(ground)):
             if cancelled is not None and cancelled.is_set():
                 return
-            body_state["budget"] = SLICE
+            body_state["budget"] = STEPS_PER_SLICE
             body_state["ending"] = march(ground, batch.records[k], settings, empty_table, scratch, body_state)
             if int(body_state["ending"]) != state.Ending.PAUSED:
                 break
@@ -332,7 +334,7 @@ def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event 
 
 def count_slices(ground: Ground) -> int:
     """Return the number of slices in the budget of a simulation."""
-    return math.ceil((BUDGET + BUDGET_PER_PIECE * len(ground.pieces)) / SLICE)
+    return math.ceil((BUDGET + BUDGET_PER_PIECE * len(ground.pieces)) / STEPS_PER_SLICE)
 
 
 def detect_complete_chattering(
@@ -340,7 +342,7 @@ def detect_complete_chattering(
 ) -> Flags:
     """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
-    write_completeness(grounds, motion_indices, factors, records, states, state.new_scratch(), complete)
+    write_completeness(grounds, motion_indices, factors, records, states, state.create_scratch(), complete)
     return complete
 
 

@@ -117,7 +117,7 @@ def describe_assessment(assessed: AssessedCase) -> Payload:
     item, names = result.objects[0], ("overturned", "undecided", "peak_over_alpha", "stands_up_to", "overturns_at")
     intensities = np.linspace(0.0, item.levels[-1], 121)
     curve = {} if item.curve is None else {"at": intensities, "probability": item.curve.probability(intensities)}
-    if item.curve is not None and item.curve.bounded:
+    if item.curve is not None and item.curve.is_bounded:
         curve["lower"], curve["upper"] = item.curve.band(intensities)
     header = {
         "measure": result.measure.name,

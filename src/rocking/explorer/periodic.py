@@ -23,7 +23,7 @@ from rocking.explorer.parameters import Texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.declared import SCALINGS
 from rocking.motion.motion import Motion
-from rocking.response.figure import compute_course
+from rocking.response.figure import sample_interval
 
 #: Parameters of diagrams, and the parameter of the sine that each varies.
 SWEPT: Final = {"a": "amplitude", "omega": "frequency"}
@@ -148,7 +148,7 @@ def describe_orbit(case: Case) -> Payload:
         key = "orbit.overturns" if response.overturned else "orbit.given_up"
         sentence = phrase(key, after=math.ceil(response.duration * sine.frequency))
     first = max(0.0, response.duration - max(period, _DRAWN_PERIODS) / sine.frequency)
-    course = compute_course(response, first, response.duration)
+    course = sample_interval(response, first, response.duration)
     is_beyond = np.abs(course.rotation) > _MAX_ROTATION
     count = int(np.argmax(is_beyond)) if is_beyond.any() else len(is_beyond)
     normalised = normalise_states(case, states)

@@ -17,11 +17,11 @@ from rocking.engine.schemes import Certified
 from rocking.errors import OptionError
 from rocking.explorer.inputs import Case
 from rocking.explorer.payload import Payload
-from rocking.inputs.notes import block_notes, motion_notes
+from rocking.inputs.notes import list_block_notes, list_motion_notes
 from rocking.inputs.quantities import read_duration
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.response.figure import compute_active_span, compute_boundary, compute_course, find_event_times
+from rocking.response.figure import compute_active_span, compute_boundary, find_event_times, sample_interval
 from rocking.response.summary import format_outcome, round_ratio
 
 #: Evaluation times of a rotation in a window, and points of a line in a payload.
@@ -104,7 +104,7 @@ def find_unresolved(response: Response, start: float, end: float) -> list[float]
 def has_drift(motion: Motion) -> bool:
     """Whether a motion has the displacement of a record, which can be filtered."""
     long_enough = motion.dt is not None and motion.duration > 2.0 * MAX_DRAWN_PERIOD > 20.0 * motion.dt
-    return long_enough and motion.coefficients.shape[1] == 2 and not motion.jumps
+    return long_enough and motion.coefficients.shape[1] == 2 and not motion.has_jumps
 
 
 def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> Payload:
@@ -122,7 +122,7 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
             "thresholds_g": [threshold / STANDARD_GRAVITY for threshold in thresholds],
             "gravity_g": block.gravity / STANDARD_GRAVITY,
             "outline": _describe_outline(block, shown.outline),
-            "notes": [*map(str, block_notes(block)), *(case.body.solid.notes if case.body else ())],
+            "notes": [*map(str, list_block_notes(block)), *(case.body.solid.notes if case.body else ())],
             "body": None if case.body is None else case.body.plane(case.azimuth),
         },
         "motion": None if motion is None else _describe_motion(motion),
@@ -161,7 +161,7 @@ def describe_details(shown: SimulatedCase, window: tuple[float, float] | None) -
     """Return the phase plane, the energy and the ground displacement in a window (s); times count from its start."""
     start, end = shown.choose_window(window)
     response = shown.select_response(start, end)
-    course = compute_course(response, start, end)
+    course = sample_interval(response, start, end)
     x, y = compute_boundary(response)
     times = np.linspace(start, end, MAX_POINTS // 4)
     ground = shown.ground
@@ -208,7 +208,7 @@ def _describe_motion(motion: Motion) -> dict[str, Any]:
         "duration": motion.duration,
         "pga_g": motion.pga / STANDARD_GRAVITY,
         "vertical": motion.vertical and {"name": motion.vertical.name, "pga_g": motion.vertical.pga / STANDARD_GRAVITY},
-        "notes": list(motion_notes(motion)),
+        "notes": list(list_motion_notes(motion)),
     }
 
 
@@ -274,7 +274,7 @@ def _sample_ground_acceleration(case: Case, start: float, end: float, points: in
     if motion is None:
         return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
     motion_end = motion.duration if motion.vertical is None else max(motion.duration, motion.vertical.duration)
-    corners = motion.drawing_times(start, min(end, max(start, motion_end)))
+    corners = motion.choose_drawing_times(start, min(end, max(start, motion_end)))
     acceleration = clear_rounding(motion.acceleration(corners), motion.pga) / STANDARD_GRAVITY
     if motion.vertical is None:
         indices = thin_line(acceleration, points)

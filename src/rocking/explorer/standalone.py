@@ -26,7 +26,7 @@ from rocking.block import Block
 from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, VERSION
 from rocking.engine.schemes import Certified, VelocityThreshold
-from rocking.engine.tasks import BUDGET, BUDGET_PER_PIECE, SLICE, Setup
+from rocking.engine.tasks import BUDGET, BUDGET_PER_PIECE, STEPS_PER_SLICE, Setup
 from rocking.errors import KernelsError, OptionError, RockingError, escape_braces
 from rocking.explorer.inputs import read_case
 from rocking.explorer.simulated import MAX_DRAWN_PERIOD
@@ -161,8 +161,8 @@ def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
         "templates": _build_templates(),
         "endings": _list_codes(state.Ending),
         "events": _list_codes(state.EventKind),
-        "ground": {"first": sample.first, "stretch": ground.STRETCH, "unit": sample.unit},
-        "budget": {"slice": SLICE, "total": BUDGET, "per_piece": BUDGET_PER_PIECE},
+        "ground": {"first": sample.first, "stretch": ground.PIECES_PER_STRETCH, "unit": sample.unit},
+        "budget": {"slice": STEPS_PER_SLICE, "total": BUDGET, "per_piece": BUDGET_PER_PIECE},
         "pulses": {name: _describe_pulse(getattr(pulses, name.replace("-", "_"))(1.0, 1.0)) for name in PULSES},
         "records": {name: _describe_record(name) for name in names},
     }  # fmt: skip
@@ -199,7 +199,7 @@ def _read_webassembly() -> bytes:
 def _describe_call(kernel: str) -> dict[str, str]:
     """Return the symbol of a kernel, and the format of each of its packed arguments: q (integer, address) or d."""
     entry = library.read_manifest()["kernels"][kernel]
-    return {"symbol": entry["symbol"], "slots": "".join(map(library._struct_format, entry["arguments"]))}
+    return {"symbol": entry["symbol"], "slots": "".join(map(library._write_struct_format, entry["arguments"]))}
 
 
 def _describe_layout(kind: np.dtype[np.void], prefix: str = "", start: int = 0) -> dict[str, Any]:
@@ -216,7 +216,7 @@ def _describe_layout(kind: np.dtype[np.void], prefix: str = "", start: int = 0) 
 
 def _build_templates() -> dict[str, str]:
     """Return the bytes of records as the package prepares them, for the page to change: hexadecimal."""
-    templates = {"state": _write_bytes(state.new_states(1, 0))}
+    templates = {"state": _write_bytes(state.create_states(1, 0))}
     for model, scheme, is_recorded in product(MODELS, (Certified(), VelocityThreshold(1.0)), (False, True)):
         run = Setup(Block(width=0.4, height=2.0).as_bodies(), model, scheme).prepare(None, writes_tables=is_recorded)
         key = f"{model} {scheme.name}"

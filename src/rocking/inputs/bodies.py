@@ -15,8 +15,16 @@ from rocking.core.distributions import Distribution
 from rocking.core.progress import note
 from rocking.errors import BlockError, OptionError, RockingError, escape_braces, join_placeholders
 from rocking.inputs import texts
-from rocking.inputs.declared import BLOCK, BLOCK_DESCRIPTIONS, COUPLES, FORCES, INPUTS, READERS, BlockDescription
-from rocking.inputs.notes import block_notes, restraint_notes
+from rocking.inputs.declared import (
+    BLOCK_DESCRIPTIONS,
+    BLOCK_INPUTS,
+    FORCE_RESTRAINTS,
+    INPUTS,
+    MOMENT_RESTRAINTS,
+    READERS,
+    BlockDescription,
+)
+from rocking.inputs.notes import list_block_notes, list_restraint_notes
 from rocking.inputs.quantities import NumberReader
 from rocking.motion.motion import Motion
 from rocking.motion.stochastic import synthesize_motions
@@ -38,7 +46,7 @@ def find_description(
     names: Iterable[str], descriptions: Sequence[BlockDescription] = BLOCK_DESCRIPTIONS
 ) -> BlockDescription:
     """Return the description that contains the named inputs, or raise `BlockError` if there is not exactly one."""
-    provided = [name for name in BLOCK if name in {*names} and name != "restitution"]
+    provided = [name for name in BLOCK_INPUTS if name in {*names} and name != "restitution"]
     for description in descriptions:
         if {*description.needed} <= {*provided} <= {*description.needed, *description.optional}:
             return description
@@ -66,7 +74,7 @@ def create_block(values: Mapping[str, Any], descriptions: Sequence[BlockDescript
     >>> create_block({"width": 0.24, "height": 1.1}).half_width, write_block_call({"p": 2.0, "alpha": 0.2})
     (0.12, 'Block.from_parameters(p=2.0, alpha=0.2)')
     """
-    block_values = {name: value for name, value in values.items() if name in BLOCK or name == "gravity"}
+    block_values = {name: value for name, value in values.items() if name in BLOCK_INPUTS or name == "gravity"}
     if uncertain := find_uncertain(values):
         message = f"this analysis requires one number for {join_placeholders(uncertain)}; omit the standard deviation"
         raise BlockError(message, *uncertain)
@@ -111,23 +119,26 @@ def create_body(
 
 def read_values(texts: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of inputs from their texts, without forces; uncertain values are distributions."""
-    return {
-        name: INPUTS[name].read_uncertain(text) for name, text in texts.items() if name in INPUTS and name not in FORCES
-    }
+    names = [name for name in texts if name in INPUTS and name not in FORCE_RESTRAINTS]
+    return {name: INPUTS[name].read_uncertain(texts[name]) for name in names}
 
 
 def read_forces(texts: Mapping[str, Any]) -> list[Restraint]:
-    """Create the restraints and loads from texts of inputs, of which those of `FORCES` are sequences."""
-    forces = [create_from_pairs(FORCES[name], text, name) for name in FORCES for text in texts.get(name, ())]
-    for name in (name for name in COUPLES if name in texts):
+    """Create the restraints and loads from texts of inputs, of which those of `FORCE_RESTRAINTS` are sequences."""
+    forces = [
+        create_from_pairs(restraint, text, name)
+        for name, restraint in FORCE_RESTRAINTS.items()
+        for text in texts.get(name, ())
+    ]
+    for name in (name for name in MOMENT_RESTRAINTS if name in texts):
         with add_option_to_errors(name):
-            forces.append(COUPLES[name](INPUTS[name].read(texts[name])))
+            forces.append(MOMENT_RESTRAINTS[name](INPUTS[name].read(texts[name])))
     return forces
 
 
 def create_restrained(values: Mapping[str, Any], forces: Sequence[Restraint]) -> tuple[Block, Block | RestrainedBlock]:
     """Create a block without and with its restraints."""
-    block = create_block({name: value for name, value in values.items() if name in BLOCK})
+    block = create_block({name: value for name, value in values.items() if name in BLOCK_INPUTS})
     try:
         return block, create_body(block, values, forces)
     except BlockError as error:
@@ -138,9 +149,9 @@ def create_restrained(values: Mapping[str, Any], forces: Sequence[Restraint]) ->
 
 def note_likely_mistakes(blocks: Sequence[Block], bodies: Sequence[Body] = ()) -> None:
     """Issue a note on each likely mistake in the first of some blocks, or in their restraints, without repetition."""
-    notes = [sentence for block in blocks[:_MAX_CHECKED] for sentence in block_notes(block)]
+    notes = [sentence for block in blocks[:_MAX_CHECKED] for sentence in list_block_notes(block)]
     for body in bodies[:_MAX_CHECKED]:
-        notes += restraint_notes(body) if isinstance(body, RestrainedBlock) else ()
+        notes += list_restraint_notes(body) if isinstance(body, RestrainedBlock) else ()
     for sentence in dict.fromkeys(notes):
         note(sentence)
 
@@ -152,7 +163,7 @@ def find_reader(parameter: str) -> NumberReader:
 
 
 #: Readers of parameters of stochastic motions.
-STOCHASTIC: Final[Mapping[str, NumberReader]] = {
+STOCHASTIC_READERS: Final[Mapping[str, NumberReader]] = {
     "arias_intensity": READERS["velocity"][0],
     **dict.fromkeys(("duration", "middle_time", "dt"), READERS["duration"][0]),
     **dict.fromkeys(("frequency", "highpass"), READERS["frequency"][0]),

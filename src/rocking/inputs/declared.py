@@ -10,7 +10,7 @@ from rocking.block import Block, Damper, Load, Restraint, Spring, Tendon, Thrust
 from rocking.core.progress import note
 from rocking.errors import OptionError
 from rocking.inputs import quantities
-from rocking.inputs.notes import level_notes
+from rocking.inputs.notes import list_level_notes
 from rocking.records.units import normalise_spelling
 
 #: Reader of a number of each kind, and its SI unit.
@@ -31,7 +31,7 @@ READERS: Final[Mapping[str, tuple[quantities.NumberReader, str]]] = {
 def read_noted_acceleration(text: str, name: str) -> float:
     """Return an acceleration, m/s^2, with a note if a number without a unit is probably in g."""
     value = quantities.read_acceleration(text, name)
-    for sentence in level_notes(text, value, name):
+    for sentence in list_level_notes(text, value, name):
         note(sentence)
     return value
 
@@ -102,7 +102,7 @@ class Input:
             return self.read(text)
         return quantities.read_uncertain(text, self.name, READERS[self.kind][0])
 
-    def axis(self, value: Any) -> list[Any]:
+    def read_axis(self, value: Any) -> list[Any]:
         """Return the values of an entry of a study file: a number, a list, or a range (for pivots, of pairs)."""
         if self.kind not in READERS:
             return [value]
@@ -257,12 +257,12 @@ BLOCK_DESCRIPTIONS: Final = (
     BlockDescription("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
 )
 
-BLOCK: Final = (
+BLOCK_INPUTS: Final = (
     *dict.fromkeys(name for shape in BLOCK_DESCRIPTIONS for name in (*shape.needed, *shape.optional)),
     "restitution",
 )
 
 #: Restraints by the names of their inputs. Couples are numbers, the others have parameters.
-COUPLES: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}
-FORCES: Final[Mapping[str, Callable[..., Restraint]]] = {"tendon": Tendon, "thrust": Thrust, "load": Load}
-SUPPORTS: Final = ("one_sided", "lean", "tendon", "spring", "damper", "thrust", "load")
+MOMENT_RESTRAINTS: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}
+FORCE_RESTRAINTS: Final[Mapping[str, Callable[..., Restraint]]] = {"tendon": Tendon, "thrust": Thrust, "load": Load}
+SUPPORT_INPUTS: Final = ("one_sided", "lean", "tendon", "spring", "damper", "thrust", "load")

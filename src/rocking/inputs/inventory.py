@@ -23,7 +23,7 @@ from rocking.inputs.bodies import (
     read_values,
     sample_bodies,
 )
-from rocking.inputs.declared import BLOCK, FORCES, INPUTS, READERS, SUPPORTS
+from rocking.inputs.declared import BLOCK_INPUTS, FORCE_RESTRAINTS, INPUTS, READERS, SUPPORT_INPUTS
 from rocking.inputs.quantities import UNITS, read_array
 from rocking.records.formats.source import read_text
 from rocking.records.named import make_names_unique
@@ -31,7 +31,7 @@ from rocking.records.units import normalise_spelling
 
 #: Suffixes of headings: parameters of the two sides, and standard deviations.
 SIDE_SUFFIXES: Final = ("_plus", "_minus")
-_DEVIATION: Final = "_sd"
+_DEVIATION_SUFFIX: Final = "_sd"
 
 #: Other headings of some labels, used if no column has the label itself.
 _SYNONYMS: Final = {
@@ -40,9 +40,13 @@ _SYNONYMS: Final = {
 }
 
 #: Inputs by the names that headings may have.
-_KNOWN: Final = {name + suffix: name for name in (*BLOCK, *SUPPORTS) for suffix in ("", *SIDE_SUFFIXES, _DEVIATION)}
+_INPUTS_BY_HEADING: Final = {
+    name + suffix: name
+    for name in (*BLOCK_INPUTS, *SUPPORT_INPUTS)
+    for suffix in ("", *SIDE_SUFFIXES, _DEVIATION_SUFFIX)
+}
 
-_YES: Final = {"yes": True, "true": True, "1": True, "no": False, "false": False, "0": False, "": False}
+_TRUTH_VALUES: Final = {"yes": True, "true": True, "1": True, "no": False, "false": False, "0": False, "": False}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,7 +191,7 @@ def read_labelled(file: Path, *, keep_going: bool = False, expected: Collection[
                 raise
             failures[f"{labels.get('name') or 'object'} (line {line})"] = error.text()
             continue
-        deviations = {f"{name}{_DEVIATION}": spread.second for name, spread in spreads.items()}
+        deviations = {f"{name}{_DEVIATION_SUFFIX}": spread.second for name, spread in spreads.items()}
         entries.append(_Entry(body.with_labels(**labels, **deviations), block, values, restraints, line))
     if not entries:
         reason = f"; the first failure: {next(iter(failures.values()))}" if failures else ""
@@ -249,14 +253,14 @@ def _read_rows(file: Path, expected: Collection[str]) -> tuple[list[_Heading], l
 
 def _read_heading(cell: str) -> _Heading:
     """Interpret a heading: the name of an input and its unit, or a label."""
-    text = cell.lower().replace("±", f" {_DEVIATION} ").replace("+-", f" {_DEVIATION} ").replace("²", "2")
+    text = cell.lower().replace("±", f" {_DEVIATION_SUFFIX} ").replace("+-", f" {_DEVIATION_SUFFIX} ").replace("²", "2")
     plain = re.sub(r"[^\w°]+|_+", "_", text).strip("_")
-    for name in sorted(_KNOWN, key=len, reverse=True):
+    for name in sorted(_INPUTS_BY_HEADING, key=len, reverse=True):
         if plain == name or plain.startswith(f"{name}_"):
-            declared_input, unit = INPUTS[_KNOWN[name]], normalise_spelling(plain[len(name) + 1 :])
+            declared_input, unit = INPUTS[_INPUTS_BY_HEADING[name]], normalise_spelling(plain[len(name) + 1 :])
             kind = "angle" if declared_input.kind == "tilt" else declared_input.kind
             if unit in UNITS.get(kind, {"": None}):
-                return _Heading(name, _KNOWN[name], unit)
+                return _Heading(name, _INPUTS_BY_HEADING[name], unit)
     return _Heading(plain or "column")
 
 
@@ -264,7 +268,7 @@ def _note_labels(file: Path, columns: Sequence[tuple[_Heading, str]]) -> None:
     """Report columns that do not affect the blocks, and whether their names resemble inputs."""
     texts = []
     for heading, cell in columns:
-        hint = checks.suggest(heading.name, [*_KNOWN], "", 0.8)
+        hint = checks.suggest(heading.name, [*_INPUTS_BY_HEADING], "", 0.8)
         if cell and not heading.input:
             texts.append(f"{cell} ({hint})" if hint else cell)
     if texts:
@@ -276,8 +280,8 @@ def _read_row(headings: Sequence[_Heading], cells: Sequence[str]) -> dict[str, A
     columns = [(heading, cell) for heading, cell in zip(headings, cells, strict=True) if heading.input and cell]
     units = {heading.name: heading.unit for heading, _ in columns}
     texts = {heading.name: _add_unit(cell, heading) for heading, cell in columns}
-    for name in [name for name in texts if name.endswith(_DEVIATION)]:
-        size, heading = name.removesuffix(_DEVIATION), _Heading(name, _KNOWN[name], units[name])
+    for name in [name for name in texts if name.endswith(_DEVIATION_SUFFIX)]:
+        size, heading = name.removesuffix(_DEVIATION_SUFFIX), _Heading(name, _INPUTS_BY_HEADING[name], units[name])
         deviation = _add_unit(texts.pop(name), replace(heading, unit=heading.unit or units.get(size, "")))
         if size not in texts:
             raise OptionError("a standard deviation of {} is given, but no value", size)
@@ -285,18 +289,18 @@ def _read_row(headings: Sequence[_Heading], cells: Sequence[str]) -> dict[str, A
             unit = READERS[INPUTS[size].kind][1]  # otherwise the unit of the deviation would be read
             texts[size] = f"{_add_unit(texts[size], _Heading(size, size, unit))} +- {deviation}"
     values = dict[str, Any]()
-    for name in (*BLOCK, *SUPPORTS):
+    for name in (*BLOCK_INPUTS, *SUPPORT_INPUTS):
         sides = [texts[name + suffix] for suffix in SIDE_SUFFIXES if name + suffix in texts]
         if text := texts.get(name, ",".join(sides)):
-            values[name] = [text] if name in FORCES else text
-    if (flag := str(values.pop("one_sided", "no")).lower()) not in _YES:
+            values[name] = [text] if name in FORCE_RESTRAINTS else text
+    if (flag := str(values.pop("one_sided", "no")).lower()) not in _TRUTH_VALUES:
         raise OptionError(f"{{}} must be yes or no; got {flag!r}", "one_sided", value=flag)
-    return values | ({"one_sided": True} if _YES[flag] else {})
+    return values | ({"one_sided": True} if _TRUTH_VALUES[flag] else {})
 
 
 def _add_unit(text: str, heading: _Heading) -> str:
     """Add the unit of the heading to each number without a unit, and replace a decimal comma."""
-    if INPUTS[heading.input].value_count == "one" and heading.input not in FORCES:
+    if INPUTS[heading.input].value_count == "one" and heading.input not in FORCE_RESTRAINTS:
         text = re.sub(r"(?<![\d,])(\d+),(\d+)(?![\d,])", r"\1.\2", text)
     if not heading.unit:
         return text

@@ -55,27 +55,27 @@ _HORIZONTAL: Final = re.compile(
 _MIN_DURATION_RATIO: Final = 0.75
 
 
-def motion_notes(motion: Motion) -> tuple[str, ...]:
+def list_motion_notes(motion: Motion) -> tuple[str, ...]:
     """Return likely mistakes in a ground motion; empty if there are none.
 
     See Also
     --------
-    rocking.inputs.notes.block_notes : Return likely mistakes in a block.
+    rocking.inputs.notes.list_block_notes : Return likely mistakes in a block.
     rocking.read : Read a motion from a record file.
 
     Examples
     --------
     >>> import rocking
-    >>> from rocking.inputs.notes import motion_notes
+    >>> from rocking.inputs.notes import list_motion_notes
     >>> motion = rocking.Motion.from_samples([0.0, 80.0, -60.0, 0.0], dt=0.01)
-    >>> motion_notes(motion)
+    >>> list_motion_notes(motion)
     ('the peak acceleration is 8.16 g, more than any ground motion has: are the units right?',)
     """
-    notes = reading_notes(motion)
+    notes = list_reading_notes(motion)
     if is_vertical(motion):
         direction = _find_origin(motion).channel
         notes += (f"the channel {direction!r} looks vertical, but it is taken for a horizontal motion",)
-    return notes + vertical_notes(motion)
+    return notes + list_vertical_notes(motion)
 
 
 def is_vertical(motion: Motion) -> bool:
@@ -83,14 +83,14 @@ def is_vertical(motion: Motion) -> bool:
     return _VERTICAL.fullmatch(_find_origin(motion).channel) is not None
 
 
-def vertical_notes(motion: Motion) -> tuple[str, ...]:
+def list_vertical_notes(motion: Motion) -> tuple[str, ...]:
     """Return likely mistakes in the vertical component of a motion; empty if there are none."""
     vertical = motion.vertical
     if vertical is None:
         return ()
     if is_multiple(motion.with_vertical(None), vertical):
         return ("the vertical motion is the horizontal one itself: name its own channel or file",)
-    notes = [f"the vertical motion: {sentence}" for sentence in reading_notes(vertical)]
+    notes = [f"the vertical motion: {sentence}" for sentence in list_reading_notes(vertical)]
     direction = _find_origin(vertical).channel
     if _HORIZONTAL.fullmatch(direction) and not _VERTICAL.fullmatch(direction):
         notes.append(f"the channel {direction!r} looks horizontal, but it is taken for the vertical motion")
@@ -98,24 +98,24 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
         upward, level = (getattr(_find_origin(c), attribute) for c in (vertical, motion))
         if upward and level and _normalise(upward) != _normalise(level):
             notes.append(f"the vertical motion is of the {attribute} {upward!r}, the horizontal one of {level!r}")
-    return (*notes, *_timing_notes(motion, vertical))
+    return (*notes, *_list_timing_notes(motion, vertical))
 
 
-def reading_notes(motion: Motion) -> tuple[str, ...]:
+def list_reading_notes(motion: Motion) -> tuple[str, ...]:
     """Return likely mistakes in the units or the step with which a motion was read."""
-    notes = [*_strength_notes(motion)]
+    notes = [*_list_strength_notes(motion)]
     step = motion.dt or motion.duration / len(motion.coefficients)
     if motion.description.family.endswith("record") and step > _MAX_STEP:
         notes.append(f"the sampling step is {step:.3g} s, too coarse for a record: are the times in seconds?")
     if motion.dt is None and motion.description.family.endswith("record"):
-        notes += _gap_notes(motion)
+        notes += _list_gap_notes(motion)
     origin = _find_origin(motion)
     if origin.heading_units and origin.heading_units != origin.units:
         notes.append(f"the file's heading says {origin.heading_units}, but the numbers are taken for {origin.units}")
     return tuple(notes)
 
 
-def _gap_notes(motion: Motion) -> list[str]:
+def _list_gap_notes(motion: Motion) -> list[str]:
     """Return notes on times of a record that skip one or more of its even steps."""
     steps = np.diff(motion.breakpoints)
     step = float(np.median(steps))
@@ -129,7 +129,7 @@ def _gap_notes(motion: Motion) -> list[str]:
     return [f"the times go on by {step:g} s, but {gap_text}: are rows missing? A straight line joins the samples"]
 
 
-def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
+def list_level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
     """Return likely mistakes in an acceleration (m/s^2) that was read from a text; empty if there are none."""
     if _UNITLESS.fullmatch(text.strip()) is None or not 0.0 < value <= _MAX_AMBIGUOUS_LEVEL:
         return ()
@@ -137,7 +137,7 @@ def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
     return (Message(sentence, (name,)),)
 
 
-def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
+def list_hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
     """Return likely mistakes in the units of the intensities of a hazard curve; empty if there are none."""
     weakest, strongest = float(intensity[0]), float(intensity[-1])
     is_acceleration = measure.units == "m/s^2"
@@ -148,19 +148,19 @@ def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
     return (f"even the {kind} motions of the hazard curve have {measure.format_value(value)}: are its units right?",)
 
 
-def block_notes(block: Block) -> tuple[str, ...]:
+def list_block_notes(block: Block) -> tuple[str, ...]:
     """Return likely mistakes in the dimensions of a block; empty if there are none.
 
     See Also
     --------
-    rocking.inputs.notes.motion_notes : Return likely mistakes in a ground motion.
+    rocking.inputs.notes.list_motion_notes : Return likely mistakes in a ground motion.
     rocking.Block : Create a block.
 
     Examples
     --------
     >>> import rocking
-    >>> from rocking.inputs.notes import block_notes
-    >>> block_notes(rocking.Block(width=2.0, height=1.0, restitution=0.9))
+    >>> from rocking.inputs.notes import list_block_notes
+    >>> list_block_notes(rocking.Block(width=2.0, height=1.0, restitution=0.9))
     ('the block is wider, 2 m, than it is high, 1 m: are the sizes swapped?',)
     """
     notes = []
@@ -180,13 +180,13 @@ def block_notes(block: Block) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def height_notes(height: float) -> tuple[str, ...]:
+def list_height_notes(height: float) -> tuple[str, ...]:
     """Return likely mistakes in the height, m, of a body from a mesh; empty if there are none."""
     sentence = f"the body is {height:.4g} m high: are its coordinates in metres?"
     return () if _MIN_HEIGHT <= height <= _MAX_LENGTH else (sentence,)
 
 
-def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
+def list_density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
     """Return likely mistakes in densities, kg/m^3, of parts of a body; empty if there are none."""
     for density in densities:
         if density is not None and not _MIN_DENSITY <= density <= _MAX_DENSITY:
@@ -194,7 +194,7 @@ def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
     return ()
 
 
-def restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
+def list_restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
     """Return likely mistakes in the restraints of a block; empty if there are none."""
     strongest = max(max(*map(abs, terms[:4]), terms.stiffness * terms.lever_arm) for terms in body._terms)
     if strongest <= _MAX_MOMENT:
@@ -202,7 +202,7 @@ def restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
     return (f"what a restraint does is {strongest:.2g} times the weight or more: are forces in N, and masses in kg?",)
 
 
-def _strength_notes(motion: Motion) -> Iterator[str]:
+def _list_strength_notes(motion: Motion) -> Iterator[str]:
     """Yield notes on accelerations and velocities of another order of magnitude than in ground motions."""
     pga = motion.pga / STANDARD_GRAVITY
     if pga == 0.0:
@@ -218,7 +218,7 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
         )
 
 
-def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
+def _list_timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
     """Yield notes on components that seem to start at different times."""
     if later := compute_start_delay(motion.description, vertical.description, motion.dt):
         yield (
@@ -239,8 +239,8 @@ def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
         )
 
 
-def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> bool:
-    """Whether two motions differ only by a factor, within rounding error; with `reversed_too` also a negative one."""
+def is_multiple(motion: Motion, other: Motion, *, include_reversed: bool = True) -> bool:
+    """Whether two motions differ only by a factor, within rounding error, by choice also a negative one."""
     parts = [[part for part in (component, component.vertical) if part is not None] for component in (motion, other)]
     if [part.coefficients.shape for part in parts[0]] != [part.coefficients.shape for part in parts[1]]:
         return False
@@ -250,7 +250,8 @@ def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> 
     if not peak > 0.0 < other_peak or not np.allclose(times, other_times, rtol=1e-9, atol=0.0):
         return False
     signs = np.where(np.arange(values.size) < motion.coefficients.size, -1.0, 1.0)
-    differences = [others / other_peak - factor * values / peak for factor in ([1.0, signs] if reversed_too else [1.0])]
+    factors = [1.0, signs] if include_reversed else [1.0]
+    differences = [others / other_peak - factor * values / peak for factor in factors]
     return any(bool(np.abs(difference).max() <= 1e-9) for difference in differences)
 
 

@@ -74,7 +74,7 @@ class PulseFamily:
         """Return the SI unit of a parameter; empty without a unit."""
         return READERS.get(self.parameter(parameter).kind, (None, ""))[1]
 
-    def quantity(self, parameter: str) -> quantities.NumberReader | None:
+    def find_reader(self, parameter: str) -> quantities.NumberReader | None:
         """Return the reader of a parameter; None for a word."""
         return READERS.get(self.parameter(parameter).kind, (None, ""))[0]
 
@@ -165,11 +165,11 @@ def split_pulse(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
 
 
 def _read_value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:
-    quantity = family.quantity(parameter)
+    reader = family.find_reader(parameter)
     label = f"the {parameter} of a {family.name} pulse"
     if len(texts) > 1 and not (family.make is pulses.n_lobe and parameter == "amplitude"):
         raise OptionError(f"{label} must be one value, not {', '.join(texts)}")
-    values = texts if quantity is None else [quantity(text, label) for text in texts]
+    values = texts if reader is None else [reader(text, label) for text in texts]
     return values if len(values) > 1 else values[0]
 
 

@@ -108,20 +108,20 @@ def read_tilt(text: str, name: str) -> float:
     raise OptionError(message, name, value=text)
 
 
-def read_sides(text: str, name: str, quantity: NumberReader = read_number) -> float | list[float]:
+def read_sides(text: str, name: str, reader: NumberReader = read_number) -> float | list[float]:
     """Return one number, or a list of two: side + and side -."""
-    return _read_one_or_two(text, name, quantity, "a number, or two numbers separated by a comma (side +, side -)")
+    return _read_one_or_two(text, name, reader, "a number, or two numbers separated by a comma (side +, side -)")
 
 
-def read_bounds(text: str, name: str, quantity: NumberReader = read_number) -> float | tuple[float, ...]:
+def read_bounds(text: str, name: str, reader: NumberReader = read_number) -> float | tuple[float, ...]:
     """Return one known number, or two: the lowest and highest plausible values."""
     expected = "a known number, or the lowest and the highest plausible number, separated by a comma"
-    numbers = _read_one_or_two(text, name, quantity, expected)
+    numbers = _read_one_or_two(text, name, reader, expected)
     return tuple(numbers) if isinstance(numbers, list) else numbers
 
 
-def _read_one_or_two(text: str, name: str, quantity: NumberReader, expected: str) -> float | list[float]:
-    numbers = [quantity(part, name) for part in text.split(",")]
+def _read_one_or_two(text: str, name: str, reader: NumberReader, expected: str) -> float | list[float]:
+    numbers = [reader(part, name) for part in text.split(",")]
     if len(numbers) > 2:
         raise OptionError(f"{{}} must be {expected}, not {text!r}", name, value=text)
     return numbers[0] if len(numbers) == 1 else numbers
@@ -131,33 +131,33 @@ def _read_one_or_two(text: str, name: str, quantity: NumberReader, expected: str
 PLUS_MINUS: Final = re.compile(r"\+-|±|\+/-")
 
 
-def read_uncertain(text: str, name: str, quantity: NumberReader = read_number) -> Distribution:
+def read_uncertain(text: str, name: str, reader: NumberReader = read_number) -> Distribution:
     """Return the normal distribution of "0.30 +- 0.02" (mean and standard deviation) or "30 +- 2 cm"."""
     mean, deviation = PLUS_MINUS.split(text, maxsplit=1)
     unit = "" if _split_unit(mean)[1] else _split_unit(deviation)[1]
     try:
-        return normal(quantity(mean + unit, name), quantity(deviation, name))
+        return normal(reader(mean + unit, name), reader(deviation, name))
     except OptionError:
         message = "{} must be a mean and a positive standard deviation, as 0.30 +- 0.02 or 30 +- 2 cm, not "
         raise OptionError(message + escape_braces(repr(text.strip())), name, value=text) from None
 
 
-def read_axis(value: Any, name: str, quantity: NumberReader = read_number) -> Floats:
+def read_axis(value: Any, name: str, reader: NumberReader = read_number) -> Floats:
     """Return the numbers of an entry of a study file: one, a list, or a range."""
     if isinstance(value, str):
-        return read_array(value, name, quantity)
+        return read_array(value, name, reader)
     entries = value if isinstance(value, list) else [value]
-    return np.array([quantity(entry if isinstance(entry, str) else repr(entry), name) for entry in entries])
+    return np.array([reader(entry if isinstance(entry, str) else repr(entry), name) for entry in entries])
 
 
-def read_array(text: str, name: str, quantity: NumberReader = read_number) -> Floats:
+def read_array(text: str, name: str, reader: NumberReader = read_number) -> Floats:
     """Return numbers from "1,2,5" or from "START:STOP:COUNT", with ":log" at the end for equal ratios."""
     parts = text.split(":")
     if len(parts) == 1:
-        return np.array([quantity(part, name) for part in text.split(",")])
+        return np.array([reader(part, name) for part in text.split(",")])
     requirement, is_logarithmic = "numbers, as 1,2,5, or a range START:STOP:COUNT[:log]", parts[3:] == ["log"]
     if len(parts) in (3, 4) and parts[2].strip().isdecimal() and (len(parts) == 3 or is_logarithmic):
-        start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
+        start, stop, count = reader(parts[0], name), reader(parts[1], name), int(parts[2])
         if not 2 <= count <= _MAX_COUNT:
             requirement = f"a range START:STOP:COUNT with a COUNT from 2 to {_MAX_COUNT}"
         elif not math.isfinite(stop - start):
@@ -170,16 +170,16 @@ def read_array(text: str, name: str, quantity: NumberReader = read_number) -> Fl
     raise OptionError(f"{{}} must be {requirement}, not {text!r}", name, value=text)
 
 
-def read_level_at_period(text: str, name: str, quantity: NumberReader = read_acceleration) -> tuple[float, float]:
+def read_level_at_period(text: str, name: str, reader: NumberReader = read_acceleration) -> tuple[float, float]:
     """Return an acceleration, m/s^2, and a period, s, from "0.4g@1.0"."""
     level, at, period = text.partition("@")
     if not at:
         raise OptionError(f"{{}} must be an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
-    return quantity(level, name), read_duration(period, name)
+    return reader(level, name), read_duration(period, name)
 
 
 def read_scaling(
-    texts: Mapping[str, str | float | None], quantity: NumberReader = read_acceleration
+    texts: Mapping[str, str | float | None], reader: NumberReader = read_acceleration
 ) -> tuple[float, Measure] | None:
     """Return the level to which a motion is scaled and its measure, or None without a level."""
     options = {name: value for name, value in texts.items() if value is not None}
@@ -189,9 +189,9 @@ def read_scaling(
         raise OptionError(f"{join_placeholders(options)} scale the same motion; use only one of them", *options)
     ((name, value),) = options.items()
     if name == "pga":
-        return checks.finite(quantity(str(value), name), name, OptionError), Measure("pga")
+        return checks.finite(reader(str(value), name), name, OptionError), Measure("pga")
     if name == "sa":
-        numbers = read_level_at_period(str(value), name, quantity)
+        numbers = read_level_at_period(str(value), name, reader)
         level, period = (checks.finite(number, name, OptionError) for number in numbers)
         return level, Measure("sa", period)
     read = read_number if name == "scale" else read_velocity

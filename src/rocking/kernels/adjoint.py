@@ -55,13 +55,15 @@ class AdjointEnd(IntEnum):
 
 
 @kernel
-def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, change: Floats, out: Floats) -> int:
+def adjoint(
+    trail: Trail, scratch: Record, variation: Record, row: int, time: float, change: Floats, out: Floats
+) -> int:
     """Propagate ``change``, the derivatives of a number, back to the start of the response; return the `AdjointEnd`.
 
     The derivatives are by u, v and plastic elongation at ``time`` after the node of a row; if infinite, at the end of
     its step, before an impact there. On return they refer to the start, and are 0 if the body has come to rest.
-    Derivatives by the coefficients of piece k (units of g, horizontal first) are added to row k of ``out``. ``work`` is
-    scratch space (`state.VARIATION`). For two more numbers in ``change``, see `add_rounding`.
+    Derivatives by the coefficients of piece k (units of g, horizontal first) are added to row k of ``out``, and
+    ``variation`` is scratch space (`state.VARIATION`). For two more numbers in ``change``, see `add_rounding`.
     """
     block, nodes = trail.block, trail.nodes
     number = count_impacts(nodes, row)
@@ -89,7 +91,7 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
         if t > 0.0:
             if change.shape[0] > _STATE_DERIVATIVES:
                 add_rounding(trail, scratch, k, order, t, change)
-            propagate_through_arc(trail, scratch, work, node, (order, degree), t, change, out)
+            propagate_through_arc(trail, scratch, variation, node, (order, degree), t, change, out)
     change[0] += plastic_by_start(trail) * change[2]
     return AdjointEnd.START
 
@@ -255,7 +257,7 @@ def count_impacts(nodes: Records, row: int) -> int:
 def propagate_through_arc(
     trail: Trail,
     scratch: Record,
-    work: Record,
+    variation: Record,
     node: Record,
     orders: tuple[int, int],
     t: float,
@@ -264,23 +266,23 @@ def propagate_through_arc(
 ) -> None:
     """Propagate ``change`` back through a time t of the arc from a node, for the given order and degree."""
     order, degree = orders
-    x = work.change
-    expand_unforced(trail, scratch, work, node.side, degree, order)
+    x = variation.change
+    expand_unforced(trail, scratch, variation, node.side, degree, order)
     drag = trail.block.damping[node.side]
     x[0], x[1] = 1.0, 0.0
-    write_variation_coefficients(work, drag, order)
+    write_variation_coefficients(variation, drag, order)
     u_by_u, v_by_u, _ = evaluate_series(x, order, t)
     x[0], x[1] = 0.0, 1.0
-    write_variation_coefficients(work, drag, order)
+    write_variation_coefficients(variation, drag, order)
     u_by_v, v_by_v, _ = evaluate_series(x, order, t)
     change[0], change[1] = change[0] * u_by_u + change[1] * v_by_u, change[0] * u_by_v + change[1] * v_by_v
     ground, block = trail.ground, trail.block
     if change.shape[0] > _STATE_DERIVATIVES and not block.yielding:  # only the rounding is required
         return
     x[0], x[1] = change[1], drag * change[1] - change[0]
-    write_variation_coefficients(work, -drag, order)
+    write_variation_coefficients(variation, -drag, order)
     lam, gain, threshold = block.stiffness[node.side], block.threshold_slope[node.side], block.threshold[node.side]
-    m = work.forcing
+    m = variation.forcing
     for k in range(order - 1):  # times d u'' / d A, for the horizontal motion in the frame of the side
         m[k] = -gain * x[k]
         if trail.settings.nonlinear:

@@ -33,7 +33,7 @@ from rocking.kernels.ground import (
 )
 from rocking.kernels.remaining import ImpactSide, Pair, bound_restoring_error, estimate_remaining_time, refine_bracket
 from rocking.kernels.restraints import may_tendon_law_change_below
-from rocking.kernels.sliding import least_sticking_friction, slip_factor, slip_restoring, slip_stiffness
+from rocking.kernels.sliding import min_sticking_friction, slip_factor, slip_restoring, slip_stiffness
 from rocking.kernels.state import Record
 
 #: Window of the proof divided by the first estimate of the remaining time.
@@ -45,7 +45,7 @@ _MAX_SPEED_RATIO = 1.5
 _MAX_ENERGY_RATIO = 2.25
 
 
-class Bounds(NamedTuple):
+class RestoringBounds(NamedTuple):
     """Bounds on the restoring acceleration of one side at zero rotation during a window."""
 
     stiffness: float  # largest change per unit of rotation
@@ -57,7 +57,9 @@ class Bounds(NamedTuple):
 
 
 @inlined
-def bracket_geometrically(v: float, first: Bounds, second: Bounds, e: Pair, min_e: Pair) -> tuple[float, float]:
+def bracket_geometrically(
+    v: float, first: RestoringBounds, second: RestoringBounds, e: Pair, min_e: Pair
+) -> tuple[float, float]:
     """Compute a lower and an upper bound on the time to rest if the bounds hold that long; NaN, NaN: no proof.
 
     ``first`` bounds the side entered, ``second`` the other. ``e`` and ``min_e`` are the largest and the smallest
@@ -78,7 +80,7 @@ def bracket_geometrically(v: float, first: Bounds, second: Bounds, e: Pair, min_
 
 
 @inlined
-def bound_impact_speed(v: float, first: Bounds, second: Bounds, e_i: float) -> float:
+def bound_impact_speed(v: float, first: RestoringBounds, second: RestoringBounds, e_i: float) -> float:
     """Bound all impact speeds until a rest that `bracket_geometrically` proves."""
     max_speed = math.sqrt(1.0 + bound_arc(v, first)[0]) * v
     next_speed = e_i * max_speed * math.sqrt(1.0 + bound_arc(e_i * max_speed, second)[0])
@@ -92,7 +94,7 @@ def with_restitution(side: ImpactSide, e: float) -> ImpactSide:
 
 
 @inlined
-def bound_arc(v: float, bounds: Bounds) -> tuple[float, float, float]:
+def bound_arc(v: float, bounds: RestoringBounds) -> tuple[float, float, float]:
     """Bound an arc of initial speed v: |w^2/v^2 - 1| for its impact speed w, and its shortest and longest duration.
 
     The durations (2/sqrt(k)) atan(x), atanh(x), with the stiffness k and x = sqrt(k) v/M and sqrt(k) v/m, are
@@ -201,7 +203,7 @@ def sticks_until_rest(block: Record, settings: Record, motion: MotionBounds, hei
         ratio = block.arm[side] * block.stiffness[side]
         # Change of the forces by a finite size of the arcs.
         change = block.arm[side] * (2.0 * block.stiffness[side] * strength * height + square)
-        if not least_sticking_friction(block, side) <= mu:
+        if not min_sticking_friction(block, side) <= mu:
             return False
         s, c = block.slenderness[side], 1.0
         if settings.nonlinear:
@@ -287,7 +289,7 @@ def bound_sliding_side(
     slip: tuple[float, float],
     vertical: AccelerationBounds,
     limits: tuple[float, float],
-) -> Bounds:
+) -> RestoringBounds:
     """Compute bounds on a side while slipping; NaN without a proof.
 
     ``slip``: direction in the frame of the side and restoring acceleration; ``limits``: on rotations and speeds. The
@@ -303,9 +305,9 @@ def bound_sliding_side(
         stiffness *= norm * (divisor + block.inertia_ratio[side] * norm) / (divisor * divisor)
         inertia = block.arm[side] * speed * speed
         if not (divisor > 0.0 and 2.0 * (g + stiffness * height) * block.arm[side] * height <= 0.1):
-            return Bounds(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
+            return RestoringBounds(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
     gain = 1.2 * (g + stiffness * height) * (1.0 + ROUNDING)
-    return Bounds(
+    return RestoringBounds(
         stiffness * high * (1.0 + ROUNDING),
         g * (low - inertia) * (1.0 - ROUNDING),
         g * high * (1.0 + ROUNDING),
@@ -348,13 +350,13 @@ class Horizon(NamedTuple):
 
 
 @inlined
-def widen_for_drag(bounds: Bounds, drag: float) -> Bounds:
+def widen_for_drag(bounds: RestoringBounds, drag: float) -> RestoringBounds:
     """Widen bounds on a side for an acceleration that differs by at most ``drag`` at any time and in either direction.
 
     On the way up and down, this takes as much energy as a motion that changes by twice as much.
     """
     k, m, M, change, rate, jumps = bounds
-    return Bounds(k, m - drag, M + drag, change + 2.0 * drag, rate, jumps + 2.0 * drag)
+    return RestoringBounds(k, m - drag, M + drag, change + 2.0 * drag, rate, jumps + 2.0 * drag)
 
 
 @inlined
@@ -448,7 +450,7 @@ def euclidean_norm(a: float, b: float) -> float:
 
 
 @inlined
-def bound_side(block: Record, settings: Record, j: int, motion: MotionBounds) -> Bounds:
+def bound_side(block: Record, settings: Record, j: int, motion: MotionBounds) -> RestoringBounds:
     """Compute bounds on side j, rounding included, from bounds on the motion."""
     horizontal, vertical = motion
     sign, threshold = side_sign(j), block.threshold[j]
@@ -465,7 +467,7 @@ def bound_side(block: Record, settings: Record, j: int, motion: MotionBounds) ->
     stiffness = (abs(block.stiffness[j]) * max_stiffness_factor + spring) * (1.0 + ROUNDING)
     per_push = (block.stiffness[j] if settings.nonlinear else block.threshold_slope[j]) * (1.0 + ROUNDING)
     per_weight = block.threshold_slope[j] * threshold * (1.0 + ROUNDING)  # largest at zero rotation: see `prove_rest`
-    return Bounds(
+    return RestoringBounds(
         stiffness,
         block.threshold_slope[j]
         * (from_weight[0] + block.restraint_threshold[j] + min(from_push[0], from_push[1]) - rounding),

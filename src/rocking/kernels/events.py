@@ -92,7 +92,7 @@ def evaluate_deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float
 
 
 @not_inlined
-def find_first_passing(d: Floats, degree: int, h: float) -> float:
+def find_first_negative_beyond_rounding(d: Floats, degree: int, h: float) -> float:
     """Find the first time in [0, h) from which a polynomial is negative beyond rounding; inf if never.
 
     It is not negative before. A root without a change of sign is divided out, and the search continues. Changes ``d``.

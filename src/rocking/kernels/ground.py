@@ -18,7 +18,7 @@ from rocking.kernels.compiled import inlined, kernel, not_inlined
 ROUNDING = 2.0**-48
 
 #: Pieces per stretch: `next_piece_beyond` and `bound_window` skip whole stretches.
-STRETCH = 16
+PIECES_PER_STRETCH = 16
 
 #: Largest number of pieces and whole stretches in a window.
 _MAX_WINDOW = 128
@@ -71,7 +71,7 @@ def build_ground(
     components = [coefficients] if vertical is None else [coefficients, vertical]
     columns = max(2, *(component.shape[1] for component in components))
     pieces = np.zeros((len(coefficients) + 1, FIRST + columns * len(components)))
-    stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), 4))
+    stretches = np.zeros((-(-len(pieces) // PIECES_PER_STRETCH), len(components), 4))
     ground = Ground(pieces, stretches, error, columns, FIRST, 1.0, 1.0)
     for k, component in enumerate(components):
         write_pieces(breakpoints, component, ground._replace(first=FIRST + k * columns), np.zeros(columns))
@@ -134,7 +134,7 @@ def write_pieces(breakpoints: Floats, coefficients: Floats, ground: Ground, A: F
     pieces[count, LENGTH] = np.inf
     for stretch in range(ground.stretches.shape[0]):
         low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
-        for k in range(stretch * STRETCH, min((stretch + 1) * STRETCH, count + 1)):
+        for k in range(stretch * PIECES_PER_STRETCH, min((stretch + 1) * PIECES_PER_STRETCH, count + 1)):
             piece = bound_piece(ground, k, 0.0, pieces[k, LENGTH], A)
             low, high, steepest = min(low, piece.low), max(high, piece.high), max(steepest, piece.slope)
             # A factor changes jumps by its rounding, which has the same bound as the rounding of the piece.
@@ -310,9 +310,9 @@ def bound_window(
     low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
     for _ in range(_MAX_WINDOW):
         if spans_stretch(ground, piece, offset, duration):
-            next_piece = piece + STRETCH
+            next_piece = piece + PIECES_PER_STRETCH
             remaining = piece_start(ground, next_piece) - piece_start(ground, piece)
-            bounds = bound_stretch(ground, piece // STRETCH)
+            bounds = bound_stretch(ground, piece // PIECES_PER_STRETCH)
         else:
             next_piece = piece + 1
             remaining = piece_length(ground, piece) - offset
@@ -333,9 +333,9 @@ def bound_window(
 @inlined
 def spans_stretch(ground: Ground, piece: int, offset: float, duration: float) -> bool:
     """Return whether a stretch starts at the offset and ends within the duration."""
-    if piece % STRETCH != 0 or offset > 0.0 or piece + STRETCH > last_piece(ground):
+    if piece % PIECES_PER_STRETCH != 0 or offset > 0.0 or piece + PIECES_PER_STRETCH > last_piece(ground):
         return False
-    return bool(piece_start(ground, piece + STRETCH) - piece_start(ground, piece) < duration)
+    return bool(piece_start(ground, piece + PIECES_PER_STRETCH) - piece_start(ground, piece) < duration)
 
 
 @inlined
@@ -352,10 +352,10 @@ def next_piece_beyond(ground: Ground, piece: int, limits: tuple[float, float], r
     """
     below, above = limits
     while piece < last_piece(ground):
-        stretch = piece // STRETCH
+        stretch = piece // PIECES_PER_STRETCH
         weight = 1.0 + (bound_stretch(vertical_component(ground), stretch).low if has_vertical(ground) else 0.0)
         bounds = bound_stretch(ground, stretch)
         if bounds.low < below * weight + restraint[0] or bounds.high > above * weight + restraint[1]:
             return piece
-        piece = (stretch + 1) * STRETCH
+        piece = (stretch + 1) * PIECES_PER_STRETCH
     return last_piece(ground)

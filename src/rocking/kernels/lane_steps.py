@@ -15,9 +15,9 @@ from rocking.kernels.series import (
 from rocking.kernels.state import Record, define_record
 
 #: Number of lanes that step together, a constant so that their loops have a fixed length.
-WIDTH = 32
+LANE_COUNT = 32
 
-_LANES = ("f8", (WIDTH,))
+_LANES = ("f8", (LANE_COUNT,))
 _SIDES = ("f8", (2,))
 
 #: Group of lanes: index of the simulation (-1: none); row of its sample, and first row that lanes do not step;
@@ -30,11 +30,11 @@ _SIDES = ("f8", (2,))
 GROUP = define_record(
     **dict.fromkeys(
         ("simulation", "row", "end_row", "increment", "has_event", "has_substep_event", "is_truncated", "is_pending"),
-        ("i8", (WIDTH,)),
+        ("i8", (LANE_COUNT,)),
     ),
     **dict.fromkeys(
         (
-            "length", "push_start", "push_slope", "lift_start", "lift_slope",
+            "length", "push_start", "push_slope", "vertical_start", "vertical_slope",
             "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine", "stiffness", "pull",
             "push_gain", "stumpff_1", "stumpff_2", "stumpff_3", "curvature_factor", "peak", "overturn_angle", "h",
             "factor", "sticking_push", "sticking_slope",
@@ -68,7 +68,7 @@ def push_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
 def weight_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
     """Return the weight at the start of a sample, divided by the weight at rest, and its slope."""
     factor = abs(group.factor[lane])
-    return 1.0 + (group.lift_start[lane] * factor) * unit, (group.lift_slope[lane] * factor) * unit
+    return 1.0 + (group.vertical_start[lane] * factor) * unit, (group.vertical_slope[lane] * factor) * unit
 
 
 @inlined
@@ -100,7 +100,7 @@ def step_linear(group: Record, unit: float) -> int:
     ``curvature_factor``). Rounding of sample times makes some samples longer or shorter than h.
     """
     events = 0
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         h = group.h[lane]
         start, slope = push_line(group, lane, unit)
         end = start + slope * h
@@ -134,14 +134,14 @@ def step_linear(group: Record, unit: float) -> int:
 @inlined
 def begin_step(group: Record) -> None:
     """Declare the step of every lane as still to be taken."""
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         group.has_event[lane] = group.is_pending[lane] = 1
 
 
 @inlined
 def copy_states(group: Record, substeps: int, scaled: bool) -> None:
     """Copy the state of all lanes; if ``scaled``, with the velocity per substep."""
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         group.next_u[lane] = group.u[lane]
         group.next_v[lane] = group.v[lane] * (group.length[lane] / substeps) if scaled else group.v[lane]
         group.next_sine[lane] = group.sine[lane]
@@ -153,7 +153,7 @@ def copy_states(group: Record, substeps: int, scaled: bool) -> None:
 def accept_states(group: Record, substeps: int, scaled: bool) -> tuple[int, int]:
     """Copy the new states of lanes without an event; return the numbers of other lanes, and of those to be repeated."""
     events = retries = 0
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         is_free = (group.is_pending[lane] != 0) & (group.has_substep_event[lane] == 0)
         rate = 1.0 / (group.length[lane] / substeps) if scaled else 1.0
         group.u[lane] = group.next_u[lane] if is_free else group.u[lane]
@@ -185,7 +185,7 @@ def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> 
     With z = h^2 (lam u - pull), r' = weight z - h^2 push. A term contributes to the second next and, as the weight
     changes, to the third. Therefore the last terms bound the truncation.
     """
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         h = group.length[lane] / substeps
         square, rate = h * h, 1.0 / h
         side_push = line_during(push_line(group, lane, unit), k, h)
@@ -258,7 +258,7 @@ def take_nonlinear_substep(
     Its length is a ``fraction`` of that for which the lanes have constants. The addition theorem gives the sine and
     cosine of alpha - u.
     """
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         span = group.length[lane] / count
         scale = (group.length[lane] / group.h[lane] * fraction) ** 2
         u, r1 = group.next_u[lane], group.next_v[lane]

@@ -19,8 +19,8 @@ from rocking.kernels.events import raise_peak
 from rocking.kernels.ground import FIRST, LENGTH, START, Grounds, select_ground
 from rocking.kernels.lane_steps import (
     GROUP,
+    LANE_COUNT,
     STEP_CONSTANTS,
-    WIDTH,
     push_line,
     step_linear,
     step_nonlinear,
@@ -28,15 +28,15 @@ from rocking.kernels.lane_steps import (
 )
 from rocking.kernels.march import march
 from rocking.kernels.state import (
-    TO_THE_END,
+    NO_STOP_PIECE,
     Ending,
     Record,
     Records,
+    create_record,
+    create_records,
+    create_table,
     define_record,
     expose_fields,
-    new_record,
-    new_records,
-    new_table,
 )
 
 #: Largest sqrt(|lam W|) h in lanes, where W is the weight divided by the weight at rest: of a step, of a substep of the
@@ -75,8 +75,8 @@ def build_pool(
     breakpoints = (grounds.pieces[start + 1 : end + 1, START] for start, end in zip(first, last, strict=True))
     ends = np.array([np.searchsorted(times, stop, "right") for times in breakpoints], dtype=np.int64)
     steps = compute_step_constants(blocks, grounds.pieces[first, LENGTH][motions], substeps)
-    groups, counts = _allocate_aligned(1, GROUP), new_record(COUNTS, active=WIDTH)
-    return Pool(grounds, motions, factors, blocks, states, steps, ends, groups, counts, new_table(0))
+    groups, counts = _allocate_aligned(1, GROUP), create_record(COUNTS, active=LANE_COUNT)
+    return Pool(grounds, motions, factors, blocks, states, steps, ends, groups, counts, create_table(0))
 
 
 def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Records:
@@ -89,7 +89,7 @@ def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Records:
 
 def compute_step_constants(blocks: Records, lengths: Floats, substeps: int) -> Records:
     """Compute the constants of a step of each length for every block (`STEP_CONSTANTS`)."""
-    steps = new_records(len(blocks), STEP_CONSTANTS)
+    steps = create_records(len(blocks), STEP_CONSTANTS)
     lam, h = blocks["stiffness"], lengths[:, None]
     sign = np.array([1.0, -1.0])
     if substeps > 0:
@@ -192,7 +192,7 @@ def run_lanes(settings: Record, scratch: Record, pool: Pool, substeps: int) -> N
     ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``ending`` of every state is an
     `Ending`; PAUSED states can be continued individually.
     """
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         start_simulation(settings, scratch, pool, lane)
     group = pool.groups[0]
     while pool.counts.active > 0:
@@ -221,16 +221,16 @@ def march_blocks(settings: Record, scratch: Record, pool: Pool) -> None:
 def load_samples(pool: Pool) -> None:
     """Copy the sample of every lane from its motion; NaN beyond the last, which no step accepts."""
     group, pieces = pool.groups[0], pool.grounds.pieces
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         row = group.row[lane]
         group.length[lane] = pieces[row, LENGTH]
         group.push_start[lane] = pieces[row, FIRST] if row < group.end_row[lane] else np.nan
         group.push_slope[lane] = pieces[row, FIRST + 1]
-    if has_lift(pool):
-        for lane in range(WIDTH):
+    if has_vertical_motion(pool):
+        for lane in range(LANE_COUNT):
             row = group.row[lane]
-            group.lift_start[lane] = pieces[row, FIRST + 2]
-            group.lift_slope[lane] = pieces[row, FIRST + 3]
+            group.vertical_start[lane] = pieces[row, FIRST + 2]
+            group.vertical_slope[lane] = pieces[row, FIRST + 3]
 
 
 @inlined
@@ -241,11 +241,11 @@ def mark_slips(group: Record, unit: float, substeps: int) -> None:
     slenderness are events of all lanes with friction.
     """
     if substeps == 0:
-        for lane in range(WIDTH):
+        for lane in range(LANE_COUNT):
             sticks = largest_push(group, lane, unit) <= group.sticking_push[lane]
             group.overturn_angle[lane] = group.overturn_angle[lane] if sticks else -np.inf
         return
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         largest = largest_push(group, lane, unit)
         max_change = -2.0 * group.stiffness[lane] * (substeps * substeps) / group.length[lane]
         speed = abs(group.v[lane]) + max_change * (1.0 + largest)
@@ -261,7 +261,7 @@ def largest_push(group: Record, lane: int, unit: float) -> float:
 
 
 @inlined
-def has_lift(pool: Pool) -> bool:
+def has_vertical_motion(pool: Pool) -> bool:
     """Return whether the motions have a vertical component."""
     return pool.grounds.stretches.shape[1] > 1
 
@@ -271,10 +271,10 @@ def step_group(settings: Record, pool: Pool, substeps: int) -> int:
     """Step all lanes through their samples and return the number of those with possible events."""
     group, unit = pool.groups[0], pool.grounds.unit
     if settings.nonlinear:
-        if has_lift(pool):
+        if has_vertical_motion(pool):
             return step_nonlinear(group, (1.0, 0.0), unit, substeps)
         return step_nonlinear(group, None, unit, substeps)
-    return step_weighted(group, unit, substeps) if has_lift(pool) else step_linear(group, unit)
+    return step_weighted(group, unit, substeps) if has_vertical_motion(pool) else step_linear(group, unit)
 
 
 @inlined
@@ -307,7 +307,7 @@ def march_to_sample(settings: Record, scratch: Record, pool: Pool, index: int) -
     ground = select_ground(pool.grounds, motion, pool.factors[index])
     end = pool.ends[motion]
     while True:
-        state.stop_piece = state.piece + 1 if state.piece < end else TO_THE_END
+        state.stop_piece = state.piece + 1 if state.piece < end else NO_STOP_PIECE
         state.ending = march(ground, block, settings, pool.table, scratch, state)
         if state.ending != Ending.RUNNING:
             return False

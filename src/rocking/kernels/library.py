@@ -107,8 +107,8 @@ def _make_caller(name: str, library: Library) -> Callable[..., Any]:
     kernel = library.kernels[name]
     code = getattr(library.handle, kernel["symbol"])
     packers = [_make_packer(description) for description in kernel["arguments"]]
-    pack = struct.Struct("=" + "".join(map(_struct_format, kernel["arguments"]))).pack
-    result_layout = struct.Struct("=" + "".join(map(_struct_format, kernel["returns"])))
+    pack = struct.Struct("=" + "".join(map(_write_struct_format, kernel["arguments"]))).pack
+    result_layout = struct.Struct("=" + "".join(map(_write_struct_format, kernel["returns"])))
     returns_tuple = len(kernel["returns"]) > 1
     code.restype = None
     if len(kernel["returns"]) == 1:
@@ -132,12 +132,12 @@ def _make_caller(name: str, library: Library) -> Callable[..., Any]:
     return call
 
 
-def _struct_format(description: Any) -> str:
+def _write_struct_format(description: Any) -> str:
     """Return the `struct` format of an argument: eight bytes per number or address."""
     if isinstance(description, str):
         return {"int": "q", "bool": "q", "float": "d"}[description]
     if "tuple" in description:
-        return "".join(map(_struct_format, description["tuple"]))
+        return "".join(map(_write_struct_format, description["tuple"]))
     return "q" + "q" * int(description.get("dimensions", 0))
 
 

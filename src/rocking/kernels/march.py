@@ -160,7 +160,7 @@ def rest_until_uplift(
             start_slip(block, state, 1 - 2 * state.side)
             write_slip_event(ground, settings, table, state)
             return Ending.RUNNING
-    state.continuous_uplift = not uplift.jump
+    state.continuous_uplift = not uplift.is_jump
     state.last_uplift_time = state.last_impact_time = state_time(ground, state)
     state.certificate_speed = np.inf
     state.time_at_rest += state.last_uplift_time - state.last_rest_time
@@ -361,7 +361,7 @@ def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, h
         state.piece += 1
         state.offset = 0.0
     elif end.outcome == StepOutcome.STEP:
-        normalize_offset(ground, state)  # the piece may be over by rounding
+        normalise_offset(ground, state)  # the piece may be over by rounding
     return end.outcome
 
 
@@ -370,7 +370,7 @@ def process_impact(
     ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record
 ) -> int:
     """Process an impact and the decision on rest; DONE if the march ends there."""
-    normalize_offset(ground, state)
+    normalise_offset(ground, state)
     if has_vertical(ground) and is_pushed_off_both_sides(ground, block, state, state.offset):
         acceleration = abs(restoring_acceleration(ground, block, state.side, state.piece, state.offset))
         depth = 0.5 * state.v * state.v / acceleration  # distance below zero rotation without ground
@@ -447,7 +447,7 @@ def finish_sequence(
     state.u = state.v = 0.0
     count_rest(settings, table, state, time + rest.time)
     state.offset += rest.time
-    normalize_offset(ground, state)
+    normalise_offset(ground, state)
     return Ending.RUNNING
 
 
@@ -473,7 +473,7 @@ def finish_while_sliding(
         if duration > 0.0:
             state.piece += 1
             state.offset = 0.0
-    normalize_offset(ground, state)
+    normalise_offset(ground, state)
     state.slip += shift
     state.side = AT_REST
     settle_slip(block, state)
@@ -489,7 +489,7 @@ def time_to_boundary(ground: Ground, settings: Record, state: Record) -> float:
 
 
 @inlined
-def normalize_offset(ground: Ground, state: Record) -> None:
+def normalise_offset(ground: Ground, state: Record) -> None:
     """Bring the offset within its piece."""
     while state.offset >= piece_length(ground, state.piece):
         state.offset -= piece_length(ground, state.piece)

@@ -68,7 +68,7 @@ TRAP_COLUMNS = 6
 
 
 @kernel
-def iterate(
+def iterate_periods(
     problem: PeriodicProblem,
     scratch: Record,
     states: Records,
@@ -256,7 +256,9 @@ def shift_back(ground: Ground, block: Record, state: Record, ending: int) -> int
 
 
 @kernel
-def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, states: Records, out: Floats) -> None:
+def differentiate_periods(
+    trail: Trail, scratch: Record, variation: Record, table: Records, states: Records, out: Floats
+) -> None:
     """Write the derivative of each state after one period by the state before it, in the frames of their sides.
 
     It is exactly zero if the body has come to rest for any time, or is held at rest at the start. At a stop that does
@@ -264,14 +266,14 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
     table, whose rows are reused. ``states`` are advanced by the period, with ``ending`` their `PeriodOutcome`.
     """
     for k in range(states.shape[0]):
-        differentiate_period(trail, scratch, work, table, states[k], out[k])
+        differentiate_period(trail, scratch, variation, table, states[k], out[k])
 
 
 @not_inlined
 def differentiate_period(
-    trail: Trail, scratch: Record, work: Record, table: Records, state: Record, M: Floats
+    trail: Trail, scratch: Record, variation: Record, table: Records, state: Record, M: Floats
 ) -> tuple[int, float]:
-    """Take one state through a period and write its derivative, as `differentiate`.
+    """Take one state through a period and write its derivative, as `differentiate_periods`.
 
     Returns the number of impacts and, for a nonzero derivative, the logarithm of its |determinant|: a sum over steps,
     because the columns of the derivative become parallel to rounding.
@@ -293,9 +295,9 @@ def differentiate_period(
         ending = march(ground, block, settings, table, scratch, state)
         impacts += state.impacts
         for n in range(state.nodes - 1):
-            area += apply_step(trail, scratch, work, table[n].node, table[n + 1].node, M)
+            area += apply_step(trail, scratch, variation, table[n].node, table[n + 1].node, M)
         if state.nodes > 0:
-            area += apply_step(trail, scratch, work, table[state.nodes - 1].node, state, M)
+            area += apply_step(trail, scratch, variation, table[state.nodes - 1].node, state, M)
     state.ending = shift_back(ground, block, state, ending)
     if state.ending == PeriodOutcome.RESTS or state.ending == PeriodOutcome.RESTS_FOR_EVER:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
@@ -306,7 +308,7 @@ def differentiate_period(
 
 @kernel
 def measure_stretches(
-    trail: Trail, scratch: Record, work: Record, table: Records, state: Record, frame: Floats, logs: Floats
+    trail: Trail, scratch: Record, variation: Record, table: Records, state: Record, frame: Floats, logs: Floats
 ) -> int:
     """Take a state through one period per row of ``logs``, and write the stretches of a frame of directions.
 
@@ -319,7 +321,7 @@ def measure_stretches(
     M = frame[:2]
     impacts = 0
     for n in range(logs.shape[0]):
-        new_impacts, area = differentiate_period(trail, scratch, work, table, state, M)
+        new_impacts, area = differentiate_period(trail, scratch, variation, table, state, M)
         impacts += new_impacts
         if state.ending != PeriodOutcome.MOVES and state.ending != PeriodOutcome.RESTS:
             break
@@ -336,7 +338,7 @@ def measure_stretches(
 
 
 @not_inlined
-def apply_step(trail: Trail, scratch: Record, work: Record, node: Record, next_node: Record, M: Floats) -> float:
+def apply_step(trail: Trail, scratch: Record, variation: Record, node: Record, next_node: Record, M: Floats) -> float:
     """Multiply a derivative by the derivative of the step from a node to ``next_node``, with any impact at its end.
 
     Returns the logarithm of the |determinant| of the step.
@@ -353,11 +355,11 @@ def apply_step(trail: Trail, scratch: Record, work: Record, node: Record, next_n
             h += piece_length(ground, piece)
         h += next_node.offset
     order, _, degree = expand_arc(ground, block, settings, scratch, node, h)
-    expand_unforced(trail, scratch, work, node.side, degree, order)
+    expand_unforced(trail, scratch, variation, node.side, degree, order)
     for column in range(2):
-        work.change[0], work.change[1] = M[0, column], M[1, column]
-        write_variation_coefficients(work, block.damping[node.side], order)
-        M[0, column], M[1, column], _ = evaluate_series(work.change, order, h)
+        variation.change[0], variation.change[1] = M[0, column], M[1, column]
+        write_variation_coefficients(variation, block.damping[node.side], order)
+        M[0, column], M[1, column], _ = evaluate_series(variation.change, order, h)
     area = -block.damping[node.side] * h
     if next_node.u == 0.0 and h > 0.0:
         _, v, _ = evaluate_series(scratch.rotation, order, h)

@@ -159,12 +159,12 @@ def next_coefficient(
 
 
 @inlined
-def write_variation_coefficients(work: Record, damping: float, order: int) -> None:
-    """Write the coefficients 2 to ``order`` of x'' = stiffness x - damping x' + forcing into work.change.
+def write_variation_coefficients(variation: Record, damping: float, order: int) -> None:
+    """Write the coefficients 2 to ``order`` of x'' = stiffness x - damping x' + forcing into variation.change.
 
     The first two must be set beforehand.
     """
-    stiffness, forcing, x = work.stiffness, work.forcing, work.change
+    stiffness, forcing, x = variation.stiffness, variation.forcing, variation.change
     for k in range(order - 1):
         value = forcing[k]
         for j in range(k + 1):

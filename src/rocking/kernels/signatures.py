@@ -33,10 +33,10 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
     count = array(1, dtype=np.int64)
     flags, singles = array(1, dtype=np.bool_), array(1, dtype=np.float32)
     sample = ground.Ground(array(3, 4), array(1, 1, 2), 0.0, 2, 2, 1.0, 1.0)
-    block, settings, scratch = state.new_record(state.BLOCK), state.new_record(state.SETTINGS), state.new_scratch()
-    blocks, states, table = state.new_records(1, state.BLOCK), state.new_states(1, 1), state.new_table(1)
-    variation = state.new_record(state.VARIATION)
-    trail = Trail(sample, block, settings, state.new_records(1, state.NODE_ROW))
+    block, settings = state.create_record(state.BLOCK), state.create_record(state.SETTINGS)
+    variation, scratch = state.create_record(state.VARIATION), state.create_scratch()
+    blocks, states, table = state.create_records(1, state.BLOCK), state.create_states(1, 1), state.create_table(1)
+    trail = Trail(sample, block, settings, state.create_records(1, state.NODE_ROW))
     grounds, motions = ground.join_grounds([sample]), array(1, dtype=np.int64)
     pool = build_pool(grounds, motions - 1, array(1), blocks, states, 1.0, 0)
     problem = PeriodicProblem(sample, block, settings, table, array(2, 1, 10))
@@ -49,8 +49,8 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
         "trace.compute_variation": (trail, scratch, variation, 0, fixed(), array(), array(), array()),
         "adjoint.adjoint": (trail, scratch, variation, 0, 0.0, array(3), array(2, 2)),
         "adjoint.differentiate_step_end": (trail, scratch, 0, array(3), array(2, 2)),
-        "periodic.iterate": (problem, scratch, states, 1, array(1, 1, 3), array(1, TRAP_COLUMNS), count, count),
-        "periodic.differentiate": (trail, scratch, variation, table, states, array(1, 2, 2)),
+        "periodic.iterate_periods": (problem, scratch, states, 1, array(1, 1, 3), array(1, TRAP_COLUMNS), count, count),
+        "periodic.differentiate_periods": (trail, scratch, variation, table, states, array(1, 2, 2)),
         "periodic.measure_stretches": (trail, scratch, variation, table, states[0], array(3, 2), array(1, 2)),
         "uplift.write_completeness": (grounds, motions, array(1), blocks, states, scratch, flags),
         "uplift.write_next_uplifts": (trail, scratch, array()),
@@ -64,7 +64,7 @@ def sample_arguments() -> dict[str, tuple[Any, ...]]:
         "population.write_overturned_fractions": (*population, array(1, 1, dtype=np.float32), array()),
         "population.write_log_sums": (array(1, 1), array(1, 1), array(), array()),
         "sine.sequence.write_rest_phases": (sequences, array(), statuses),
-        "sine.sequence.resolve_impacts": (1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.IMPACT)),
+        "sine.sequence.resolve_impacts": (1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.RESOLVED_IMPACT)),
         "sine.sequence.write_semianalytical_phases": (sequences, count, array(), statuses),
         "sine.sequence.write_critical_amplitudes": (fixed(), fixed(), array()),
     }

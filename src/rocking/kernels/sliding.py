@@ -18,7 +18,7 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.kernels.arc import NEGLIGIBLE, expand_arc, pad_to_same_degree, side_sign, weight_at, write_weight_series
 from rocking.kernels.compiled import inlined, not_inlined
-from rocking.kernels.events import StepEnd, find_first_passing
+from rocking.kernels.events import StepEnd, find_first_negative_beyond_rounding
 from rocking.kernels.ground import (
     Ground,
     acceleration,
@@ -129,7 +129,7 @@ def find_slip(
         d = scratch.auxiliary
         for k in range(order - 1):
             d[k] = block.static_friction * scratch.normal[k] - towards * scratch.slip[k]
-        passage = find_first_passing(d, order - 2, min(h, time))
+        passage = find_first_negative_beyond_rounding(d, order - 2, min(h, time))
         if passage < time:
             time, direction = passage, -towards * sign
     return order, h, time, direction
@@ -286,10 +286,10 @@ def find_slip_end(scratch: Record, order: int, h: float, direction: float) -> tu
     for k in range(order):
         d[k] = direction * scratch.slip[k]
     ignore_rounding_at_start(d)
-    stick = find_first_passing(d, order - 1, h)
+    stick = find_first_negative_beyond_rounding(d, order - 1, h)
     for k in range(order - 1):
         d[k] = scratch.undivided_normal[k]
-    return stick, find_first_passing(d, order - 2, h)
+    return stick, find_first_negative_beyond_rounding(d, order - 2, h)
 
 
 @inlined
@@ -335,12 +335,12 @@ def find_slide_end(
     for k in range(degree + 1):
         d[k] = state.direction * scratch.slip[k]
     ignore_rounding_at_start(d)
-    stick = find_first_passing(d, degree, h)
+    stick = find_first_negative_beyond_rounding(d, degree, h)
     lost = np.inf
     if has_vertical(ground):
         for k in range(degree):
             d[k] = scratch.weight[k]
-        lost = find_first_passing(d, degree - 1, h)
+        lost = find_first_negative_beyond_rounding(d, degree - 1, h)
     return h, stick, lost
 
 
@@ -385,7 +385,7 @@ def strike_with_friction(block: Record, state: Record, side: int, speed: float) 
 
 
 @inlined
-def least_sticking_friction(block: Record, side: int) -> float:
+def min_sticking_friction(block: Record, side: int) -> float:
     """Compute the friction with which an impact that leaves a side sticks if nothing slips before (Eq. 7)."""
     e = block.restitution[side]
     return block.height * (1.0 - e) / (block.pivot_distance[1 - side] * e + block.pivot_distance[side])

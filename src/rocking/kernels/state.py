@@ -26,7 +26,7 @@ ORDER = 22
 AT_REST = -1
 
 #: Value of ``stop_piece`` of a march without a final piece.
-TO_THE_END = 2**62
+NO_STOP_PIECE = 2**62
 
 
 class StepOutcome(IntEnum):
@@ -268,7 +268,7 @@ SCRATCH = define_record(
 VARIATION = define_record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
 
 
-def new_records(count: int, kind: np.dtype[np.void]) -> Records:
+def create_records(count: int, kind: np.dtype[np.void]) -> Records:
     """Return zeroed records."""
     return expose_fields(np.zeros(count, dtype=kind))
 
@@ -284,19 +284,19 @@ def replace_records(records: Records, indices: Integers, values: Records) -> Non
     records.view(raw)[indices] = values.view(raw)
 
 
-def new_record(kind: np.dtype[np.void], **values: Any) -> Record:
+def create_record(kind: np.dtype[np.void], **values: Any) -> Record:
     """Return one record with these values."""
-    row = new_records(1, kind)[0]
+    row = create_records(1, kind)[0]
     for name, value in values.items():
         row[name] = value
     return row
 
 
-def new_states(count: int, budget: int) -> Records:
+def create_states(count: int, budget: int) -> Records:
     """Return states of blocks at rest at time zero that march to the end of the motion."""
-    states = new_records(count, STATE)
+    states = create_records(count, STATE)
     states["side"] = AT_REST
-    states["stop_piece"] = TO_THE_END
+    states["stop_piece"] = NO_STOP_PIECE
     states["ending"] = Ending.RUNNING.value
     states["budget"] = budget
     return states
@@ -304,21 +304,21 @@ def new_states(count: int, budget: int) -> Records:
 
 def state_at_node(node: Record, plastic_elongation: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
     """Return the state of a march that starts at a node, with the plastic elongation of a tendon there."""
-    state = new_states(1, budget)[0]
+    state = create_states(1, budget)[0]
     for name in ("piece", "offset", "side", "u", "v", "tendon_law", "slip", "slip_rate", "direction"):
         state[name] = node[name]
     state["peak"], state["plastic_elongation"] = node["u"], plastic_elongation
     return state
 
 
-def new_scratch() -> Record:
+def create_scratch() -> Record:
     """Return scratch space for one march at a time."""
-    return new_record(SCRATCH)
+    return create_record(SCRATCH)
 
 
-def new_table(rows: int) -> Records:
+def create_table(rows: int) -> Records:
     """Return a table with empty rows."""
-    return new_records(rows, TABLE)
+    return create_records(rows, TABLE)
 
 
 def enlarge_table(table: Records) -> Records:

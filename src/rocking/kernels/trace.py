@@ -26,10 +26,10 @@ from rocking.kernels.ground import (
 from rocking.kernels.restraints import apply_tendon_law, tendon_law_at_rest, update_plastic_elongation
 from rocking.kernels.series import INTEGRATED_TWICE, write_variation_coefficients
 from rocking.kernels.sliding import expand_slide, expand_slip, integrate_slip
-from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, new_records
+from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, create_records
 
 #: Nodes of a response before its march.
-NO_NODES = new_records(0, NODE_ROW)
+NO_NODES = create_records(0, NODE_ROW)
 
 
 class Trail(NamedTuple):
@@ -168,7 +168,7 @@ _MIN_JUMP_EXCESS = 1e-9
 def compute_variation(
     trail: Trail,
     scratch: Record,
-    work: Record,
+    variation: Record,
     quantity: int,
     times: Floats,
     changes: Floats,
@@ -177,7 +177,7 @@ def compute_variation(
 ) -> None:
     """Write changes of u at given times, and shifts of all impacts and events, per unit of epsilon, into arrays.
 
-    ``times`` ascend; at an impact, the change before it is written. ``work`` is scratch space (`state.VARIATION`).
+    ``times`` ascend; at an impact, the change before it is written. ``variation`` is scratch space (`state.VARIATION`).
     """
     nodes = trail.nodes
     impact_count = event_count = 0
@@ -211,13 +211,14 @@ def compute_variation(
             events[event_count] = rest_shift(trail, node, quantity, variations, next_node)
             event_count += 1
             if written > first:
-                order = expand_variation(trail, scratch, work, node, quantity, start, duration)
-                write_changes(trail, scratch, work, node, order, times[first:written], changes[first:written], True)
+                order = expand_variation(trail, scratch, variation, node, quantity, start, duration)
+                part = slice(first, written)
+                write_changes(trail, scratch, variation, node, order, times[part], changes[part], True)
         else:
-            order = expand_variation(trail, scratch, work, node, quantity, start, duration)
-            write_changes(trail, scratch, work, node, order, times[first:written], changes[first:written], False)
+            order = expand_variation(trail, scratch, variation, node, quantity, start, duration)
+            write_changes(trail, scratch, variation, node, order, times[first:written], changes[first:written], False)
             t = step_duration(trail, node, next_node)
-            du, dv, _ = evaluate_series(work.change, order, t)
+            du, dv, _ = evaluate_series(variation.change, order, t)
             if node.tendon_law == TendonLaw.PLASTIC and next_node.tendon_law != node.tendon_law:
                 plastic_variation = elongation_rate(trail, node.side, next_node.u) * du
             if is_impact(nodes, k):
@@ -253,14 +254,21 @@ def count_times_until(times: Floats, count: int, last: float) -> int:
 
 @not_inlined
 def write_changes(
-    trail: Trail, scratch: Record, work: Record, node: Record, order: int, times: Floats, changes: Floats, is_last: bool
+    trail: Trail,
+    scratch: Record,
+    variation: Record,
+    node: Record,
+    order: int,
+    times: Floats,
+    changes: Floats,
+    is_last: bool,
 ) -> None:
     """Write changes of u along the arc from a node, whose series are in scratch, until it lands."""
     for n in range(times.shape[0]):
         t = times[n] - piece_start(trail.ground, node.piece) - node.offset
         u, _, _ = evaluate_series(scratch.rotation, order, t)
         if u > 0.0 or not is_last:
-            changes[n], _, _ = evaluate_series(work.change, order, t)
+            changes[n], _, _ = evaluate_series(variation.change, order, t)
 
 
 @inlined
@@ -309,39 +317,39 @@ def step_duration(trail: Trail, node: Record, next_node: Record) -> float:
 
 @not_inlined
 def expand_variation(
-    trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: Variations, duration: float
+    trail: Trail, scratch: Record, variation: Record, node: Record, quantity: int, start: Variations, duration: float
 ) -> int:
-    """Write the series of the variation along the arc from a node into ``work.change``, and return its order.
+    """Write the series of the variation along the arc from a node into ``variation.change``, and return its order.
 
     ``start``: variations of rotation, velocity and a tendon's plastic elongation.
     """
     order, _, degree = expand_arc(trail.ground, trail.block, trail.settings, scratch, node, duration)
-    expand_derivatives(trail, scratch, work, node.side, degree, order)
+    expand_derivatives(trail, scratch, variation, node.side, degree, order)
     side_quantity = quantity_on_side(quantity, node.side)
     if side_quantity == Quantity.FREQUENCY:
         for k in range(order - 1):
-            work.forcing[k] = 2.0 * scratch.rotation[k + 2] / INTEGRATED_TWICE[k]
+            variation.forcing[k] = 2.0 * scratch.rotation[k + 2] / INTEGRATED_TWICE[k]
     elif side_quantity == Quantity.SLENDERNESS:
         for k in range(order - 1):
-            work.forcing[k] = -trail.block.slenderness[node.side] * work.stiffness[k]
+            variation.forcing[k] = -trail.block.slenderness[node.side] * variation.stiffness[k]
     elif side_quantity != Quantity.MOTION:
         for k in range(order - 1):
-            work.forcing[k] = 0.0
-    work.change[0], work.change[1], plastic_elongation = start
+            variation.forcing[k] = 0.0
+    variation.change[0], variation.change[1], plastic_elongation = start
     if plastic_elongation != 0.0 and node.tendon_law == TendonLaw.ELASTIC:
         change = trail.block.tendon_stiffness[node.side] * plastic_elongation
         for k in range(order - 1):
-            work.forcing[k] += change * (
+            variation.forcing[k] += change * (
                 scratch.half_cosine[k] if trail.settings.nonlinear else (1.0 if k == 0 else 0.0)
             )
-    add_restraints(trail, scratch, work, node.side, order)
-    write_variation_coefficients(work, trail.block.damping[node.side], order)
+    add_restraints(trail, scratch, variation, node.side, order)
+    write_variation_coefficients(variation, trail.block.damping[node.side], order)
     return order
 
 
 @inlined
-def expand_derivatives(trail: Trail, scratch: Record, work: Record, side: int, degree: int, order: int) -> None:
-    """Write the series of d u''/d u without `add_restraints`, and of u'' per unit change of the motion, to ``work``.
+def expand_derivatives(trail: Trail, scratch: Record, variation: Record, side: int, degree: int, order: int) -> None:
+    """Write the series of d u''/d u without `add_restraints`, and of u'' per change of the motion, to ``variation``.
 
     This removes the contribution of restraints from the motion in scratch.
     """
@@ -355,9 +363,9 @@ def expand_derivatives(trail: Trail, scratch: Record, work: Record, side: int, d
                 stiffness += W[j] * C[k - j]
             for j in range(min(k, degree) + 1):
                 stiffness -= A[j] * S[k - j]
-            work.stiffness[k] = lam * stiffness
+            variation.stiffness[k] = lam * stiffness
         else:
-            work.stiffness[k] = lam * W[k] if k <= weight_degree else 0.0
+            variation.stiffness[k] = lam * W[k] if k <= weight_degree else 0.0
     W[0] -= trail.block.added_weight[side]
     A[0] -= trail.block.added_push[side]
     for k in range(order - 1):
@@ -367,30 +375,30 @@ def expand_derivatives(trail: Trail, scratch: Record, work: Record, side: int, d
                 forcing += W[j] * S[k - j]
             for j in range(min(k, degree) + 1):
                 forcing += A[j] * C[k - j]
-            work.forcing[k] = -lam * forcing
+            variation.forcing[k] = -lam * forcing
         else:
             forcing = gain * (A[k] + threshold * motion_weight(W, k, weight_degree)) if k <= degree else 0.0
             for j in range(min(k, weight_degree) + 1):
                 forcing -= lam * motion_weight(W, j, weight_degree) * scratch.rotation[k - j]
-            work.forcing[k] = -forcing
+            variation.forcing[k] = -forcing
 
 
 @inlined
-def add_restraints(trail: Trail, scratch: Record, work: Record, side: int, order: int) -> None:
+def add_restraints(trail: Trail, scratch: Record, variation: Record, side: int, order: int) -> None:
     """Add the contribution of prestress and springs to d u''/d u, after `expand_derivatives`."""
-    work.stiffness[0] -= trail.block.spring[side]
+    variation.stiffness[0] -= trail.block.spring[side]
     if trail.settings.nonlinear and trail.block.prestress[side] != 0.0:
         for k in range(order - 1):
-            work.stiffness[k] += 0.5 * trail.block.prestress[side] * scratch.half_sine[k]
+            variation.stiffness[k] += 0.5 * trail.block.prestress[side] * scratch.half_sine[k]
 
 
 @inlined
-def expand_unforced(trail: Trail, scratch: Record, work: Record, side: int, degree: int, order: int) -> None:
-    """Write the series of d u''/d u without forcing to ``work``."""
-    expand_derivatives(trail, scratch, work, side, degree, order)
+def expand_unforced(trail: Trail, scratch: Record, variation: Record, side: int, degree: int, order: int) -> None:
+    """Write the series of d u''/d u without forcing to ``variation``."""
+    expand_derivatives(trail, scratch, variation, side, degree, order)
     for k in range(order - 1):
-        work.forcing[k] = 0.0
-    add_restraints(trail, scratch, work, side, order)
+        variation.forcing[k] = 0.0
+    add_restraints(trail, scratch, variation, side, order)
 
 
 @inlined

@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, not_inlined
-from rocking.kernels.events import bound_rounding, find_first_passing, leading_power
+from rocking.kernels.events import bound_rounding, find_first_negative_beyond_rounding, leading_power
 from rocking.kernels.ground import (
     ROUNDING,
     Ground,
@@ -36,7 +36,7 @@ class Uplift(NamedTuple):
     piece: int  # piece of the motion
     offset: float  # time since the start of the piece
     side: int  # side of the rotation; AT_REST without an uplift
-    jump: bool  # whether the motion jumps past the threshold
+    is_jump: bool  # whether the motion jumps past the threshold
 
 
 @inlined
@@ -172,7 +172,7 @@ def find_first_excess(A: Floats, degree: int, h: float, threshold: float, sign: 
     d[0] = gap
     for k in range(1, degree + 1):
         d[k] = -sign * A[k]
-    return find_first_passing(d, degree, h), False
+    return find_first_negative_beyond_rounding(d, degree, h), False
 
 
 #: A motion is back within a threshold once below by this fraction, so that rounding causes no second passing.
@@ -254,4 +254,4 @@ def time_above_threshold(ground: Ground, block: Record, scratch: Record, piece: 
     d[0] = sign * A[0] - (threshold - _RETURN_MARGIN * abs(threshold))
     for k in range(1, degree + 1):
         d[k] = sign * A[k]
-    return find_first_passing(d, degree, piece_length(ground, piece) - offset)
+    return find_first_negative_beyond_rounding(d, degree, piece_length(ground, piece) - offset)

@@ -58,20 +58,20 @@ class MotionMeasures:
         return piecewise.sample_breakpoints(self)[1]
 
     @property
-    def jumps(self) -> bool:
+    def has_jumps(self) -> bool:
         """Whether the acceleration jumps between pieces, beyond rounding."""
         return piecewise.has_jumps(self)
 
-    def _widths(self) -> Floats:
+    def _compute_widths(self) -> Floats:
         return np.diff(self.breakpoints)
 
     def _compute_velocity(self) -> Floats:
         """Compute the coefficients of the ground velocity on each piece."""
-        return piecewise.integrate_pieces(self._widths(), self.coefficients)
+        return piecewise.integrate_pieces(self._compute_widths(), self.coefficients)
 
     def _compute_displacement(self) -> Floats:
         """Compute the coefficients of the ground displacement on each piece."""
-        return piecewise.integrate_pieces(self._widths(), self._compute_velocity())
+        return piecewise.integrate_pieces(self._compute_widths(), self._compute_velocity())
 
     def acceleration(self, time: ArrayLike) -> Any:
         """Return the ground acceleration at times (s), m/s^2, shaped like `time` and zero outside the motion."""
@@ -93,32 +93,36 @@ class MotionMeasures:
     @property
     def extremes(self) -> tuple[float, float]:
         """Exact lowest and highest acceleration with their signs, m/s^2."""
-        widths, maximum = self._widths(), piecewise.compute_maximum
+        widths, maximum = self._compute_widths(), piecewise.compute_maximum
         return -maximum(widths, -self.coefficients), maximum(widths, self.coefficients)
 
     @property
     def pga(self) -> float:
         """Exact peak ground acceleration, m/s^2."""
-        return piecewise.compute_peak_magnitude(self._widths(), self.coefficients)
+        return piecewise.compute_peak_magnitude(self._compute_widths(), self.coefficients)
 
     @property
     def pgv(self) -> float:
         """Exact peak ground velocity from rest, m/s."""
-        return piecewise.compute_peak_magnitude(self._widths(), self._compute_velocity())
+        return piecewise.compute_peak_magnitude(self._compute_widths(), self._compute_velocity())
 
     @property
     def pgd(self) -> float:
         """Exact peak ground displacement until the end of the motion, m."""
-        return piecewise.compute_peak_magnitude(self._widths(), self._compute_displacement())
+        return piecewise.compute_peak_magnitude(self._compute_widths(), self._compute_displacement())
 
     @property
     def arias_intensity(self) -> float:
         """Arias intensity, m/s: ``pi/(2 g)`` times the exact integral of the squared acceleration."""
-        return math.pi / (2.0 * STANDARD_GRAVITY) * float(np.sum(_integrate_square(self.coefficients, self._widths())))
+        return (
+            math.pi
+            / (2.0 * STANDARD_GRAVITY)
+            * float(np.sum(_integrate_square(self.coefficients, self._compute_widths())))
+        )
 
     def _integrate_between_signs(self) -> Floats:
         """Integrate the acceleration over intervals in which its sign is constant, located within pieces, m/s."""
-        widths = self._widths()
+        widths = self._compute_widths()
         integral = self._compute_velocity()[:, np.newaxis, :]
         roots = piecewise.find_root_candidates(widths, self.coefficients)
         cuts = np.hstack([np.zeros((len(widths), 1)), roots, widths[:, np.newaxis]])

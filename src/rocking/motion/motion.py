@@ -99,7 +99,7 @@ class Motion(ProcessingMethods):
         history = tuple(checks.text(entry, "sentence of a motion's history", MotionError) for entry in self.history)
         error_name = "approximation error of a motion"
         error = checks.between(self.error, error_name, MotionError, 0.0, piecewise.MAX_ACCELERATION)
-        for component, part in self._other_components().items():
+        for component, part in self._collect_other_components().items():
             if part is not None and not isinstance(part, Motion):
                 message = "{} must be a Motion, as from rocking.read or Motion.from_samples, not "
                 raise MotionError(message + type(part).__name__, component, value=part)
@@ -291,13 +291,13 @@ class Motion(ProcessingMethods):
         """
         from rocking.plot.curves import draw_motion
 
-        times, title = self.drawing_times(0.0, self.end), title or escape_dollars(self.label)
+        times, title = self.choose_drawing_times(0.0, self.end), title or escape_dollars(self.label)
         acceleration = self.acceleration(times) / STANDARD_GRAVITY
         vertical = None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY
         traces = {"acceleration_g": acceleration, "vertical_g": vertical}
         return draw_motion(time=times, **traces, title=title, ax=ax, figsize=figsize)
 
-    def drawing_times(self, start: float, end: float) -> Floats:
+    def choose_drawing_times(self, start: float, end: float) -> Floats:
         """Return times (s) for drawing an interval: its ends, breakpoints, and additional points on curved pieces.
 
         Breakpoints of both components are included, and times just before jumps. The end of the motion is a jump to
@@ -310,7 +310,7 @@ class Motion(ProcessingMethods):
         inner_jumps, end_jump = self.breakpoints[1:-1][is_jump[:-1]], self.breakpoints[-1:][is_jump[-1:]]
         points = np.concatenate([points, np.nextafter(inner_jumps, -np.inf), np.nextafter(end_jump, np.inf)])
         times = np.union1d([start, end], points[(points > start) & (points < end)])
-        return times if self.vertical is None else np.union1d(times, self.vertical.drawing_times(start, end))
+        return times if self.vertical is None else np.union1d(times, self.vertical.choose_drawing_times(start, end))
 
     def __repr__(self) -> str:
         return f"<Motion: {self}>"
@@ -347,7 +347,7 @@ class Motion(ProcessingMethods):
 
     def _multiply(self, factor: float, history_entry: str) -> Motion:
         """Return all components times a factor, the vertical and the orthogonal one times its absolute value."""
-        fields: dict[str, Any] = self._other_components()
+        fields: dict[str, Any] = self._collect_other_components()
         if abs(factor) != 1.0:
             fields = {name: part and part._multiply(abs(factor), history_entry) for name, part in fields.items()}
         with np.errstate(over="ignore", invalid="ignore"):

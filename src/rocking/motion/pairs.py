@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -15,11 +15,6 @@ from rocking.motion.processing import compute_oscillator, sine_cosine
 
 #: Cosine and sine of the directions from the first component, shape (180, 2).
 _DIRECTIONS: Final = np.stack(sine_cosine(np.arange(180.0))[::-1], axis=1)
-
-
-class _Pieces(NamedTuple):
-    breakpoints: Floats
-    coefficients: Floats
 
 
 class _Component(MotionMeasures):
@@ -52,7 +47,7 @@ def compute_directional_spectrum(
     breakpoints, components = piecewise.align_pieces(first, second)
     # The last extremum follows the motion within half a damped period.
     tail = math.pi / (rate * math.sqrt(1.0 - damping**2))
-    solved = [compute_oscillator(_Pieces(breakpoints, each), rate, damping, tail) for each in components]
+    solved = [compute_oscillator(piecewise.Pieces(breakpoints, each), rate, damping, tail) for each in components]
     return rate**2 * _find_peaks(np.diff(solved[0][0]), solved[0][1], solved[1][1])
 
 
@@ -62,8 +57,13 @@ def _find_peaks(widths: Floats, first: Floats, second: Floats) -> Floats:
     lower = np.array([np.abs(direction @ starts).max() for direction in _DIRECTIONS])
     # Pieces whose resultant is below the smallest peak do not contain any.
     bounds = np.hypot(*(piecewise.bound_magnitudes(widths, history) for history in (first, second)))
-    kept = bounds >= lower.min()
-    widths, first, second, bounds = widths[kept], first[kept], second[kept], bounds[kept]
+    is_candidate = bounds >= lower.min()
+    widths, first, second, bounds = (
+        widths[is_candidate],
+        first[is_candidate],
+        second[is_candidate],
+        bounds[is_candidate],
+    )
     peaks = np.empty(len(_DIRECTIONS))
     for k, (cosine, sine) in enumerate(_DIRECTIONS):
         near = bounds >= lower[k]

@@ -49,7 +49,7 @@ class ProcessingMethods(MotionMeasures):
     vertical: Self | None
     orthogonal: Self | None
 
-    def _other_components(self) -> dict[str, Self | None]:
+    def _collect_other_components(self) -> dict[str, Self | None]:
         """Return the other components by their names."""
         return {"vertical": self.vertical, "orthogonal": self.orthogonal}
 
@@ -128,7 +128,7 @@ class ProcessingMethods(MotionMeasures):
         wait = checks.positive(delay, "delay", MotionError, "s")
         rows = np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients])
         pieces = {"breakpoints": np.append(0.0, self.breakpoints + wait), "coefficients": rows}
-        others = {name: part and part.delayed(wait) for name, part in self._other_components().items()}
+        others = {name: part and part.delayed(wait) for name, part in self._collect_other_components().items()}
         return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, **others)
 
     def on_floor(self, period: float, damping: float = DAMPING, *, free_vibration: float | None = None) -> Self:
@@ -215,7 +215,7 @@ class ProcessingMethods(MotionMeasures):
             steps.append(lambda motion: _resample(motion, resample))
         if window is None and not steps:
             raise MotionError("at least one of trim, baseline, band_pass and resample is required")
-        others = self._other_components()
+        others = self._collect_other_components()
         for name, part in others.items():
             if part is not None and window is not None and window[0] > part.duration - piecewise.MIN_DURATION:
                 others[name] = None  # this component has ended by then
@@ -305,8 +305,8 @@ def _apply_band_pass(motion: Piecewise, low: float | None, high: float | None, o
 
     step = _require_even_step(motion, "band_pass")
     nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
-    given = [corner for corner in (low, high) if corner is not None]
-    corners = [checks.positive(corner, "corner frequency", MotionError, "Hz") for corner in given]
+    specified = [corner for corner in (low, high) if corner is not None]
+    corners = [checks.positive(corner, "corner frequency", MotionError, "Hz") for corner in specified]
     if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
         message = f"{{}} must be (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one may be None"
         raise MotionError(message, "band_pass", value=(low, high))

@@ -15,13 +15,13 @@ from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 
 #: Fraction of the Arias intensity at the middle, and of the part that is simulated.
-_MIDDLE: Final = 0.45
-_END: Final = 0.9999
+_MIDDLE_SHARE: Final = 0.45
+_END_SHARE: Final = 0.9999
 #: Lowest frequency of the filter, Hz, unless the frequency at the middle is lower.
 _LOWEST_FREQUENCY: Final = 0.3
 #: Motions in one product of matrices, and its rows. Fixed sizes make results independent of the number of motions.
-_GROUP: Final = 16
-_ROWS: Final = 256
+_GROUP_SIZE: Final = 16
+_BATCH_SIZE: Final = 256
 _MAX_SAMPLES: Final = 20_000
 
 
@@ -125,7 +125,7 @@ def _compute_envelope(values: dict[str, float]) -> Floats:
 
     def compute_ratio(log_shape: float) -> float:
         """Compute the duration divided by the time of the middle, which decreases with the shape."""
-        first, middle, last = gammaincinv(math.exp(log_shape), (0.05, _MIDDLE, 0.95))
+        first, middle, last = gammaincinv(math.exp(log_shape), (0.05, _MIDDLE_SHARE, 0.95))
         return float((last - first) / middle)
 
     ratio, limits = values["duration"] / values["middle_time"], (0.0, math.log(1e4))
@@ -134,8 +134,8 @@ def _compute_envelope(values: dict[str, float]) -> Floats:
         message = f"{{}} must be from {smallest:.2g} to {largest:.2f} times {{}}, not {ratio:.4g} times; change either"
         raise OptionError(message, "duration", "middle_time", value=values["duration"])
     shape = math.exp(brentq(lambda log_shape: compute_ratio(log_shape) - ratio, *limits, xtol=1e-12))
-    scale = values["middle_time"] / float(gammaincinv(shape, _MIDDLE))
-    samples = math.ceil(scale * float(gammaincinv(shape, _END)) / values["dt"]) + 1
+    scale = values["middle_time"] / float(gammaincinv(shape, _MIDDLE_SHARE))
+    samples = math.ceil(scale * float(gammaincinv(shape, _END_SHARE)) / values["dt"]) + 1
     if samples > _MAX_SAMPLES:
         message = f"these motions have {samples} samples, and at most {_MAX_SAMPLES} are possible; increase {{}}"
         raise OptionError(message, "dt", value=values["dt"])
@@ -162,13 +162,13 @@ def _generate_samples(values: dict[str, float], envelope: Floats, frequencies: F
     rates = 2.0 * math.pi * frequencies[:samples]
     damped = math.sqrt(1.0 - values["damping"] ** 2)
     factors = np.exp(step * rates * complex(-values["damping"], damped))  # of an impulse response in one step
-    noise = np.empty((-(-count // _GROUP), samples, _GROUP))
-    for k in range(len(noise) * _GROUP):
-        noise[k // _GROUP, :, k % _GROUP] = np.random.default_rng([seed, k]).standard_normal(samples)
+    noise = np.empty((-(-count // _GROUP_SIZE), samples, _GROUP_SIZE))
+    for k in range(len(noise) * _GROUP_SIZE):
+        noise[k // _GROUP_SIZE, :, k % _GROUP_SIZE] = np.random.default_rng([seed, k]).standard_normal(samples)
     responses, result = np.zeros(samples, dtype=np.complex128), np.empty_like(noise)
-    for start in range(0, samples, _ROWS):
-        rows = np.zeros((_ROWS, samples))
-        for row in range(min(_ROWS, samples - start)):
+    for start in range(0, samples, _BATCH_SIZE):
+        rows = np.zeros((_BATCH_SIZE, samples))
+        for row in range(min(_BATCH_SIZE, samples - start)):
             now = start + row
             responses[:now] *= factors[:now]
             impulses = rates[:now] * responses[:now].imag
@@ -176,7 +176,7 @@ def _generate_samples(values: dict[str, float], envelope: Floats, frequencies: F
             rows[row, :now] = envelope[now] / norm * impulses if norm > 0.0 else 0.0
             responses[now] = 1.0
         for group, group_noise in zip(result, noise, strict=True):
-            group[start : start + _ROWS] = (rows @ group_noise)[: samples - start]
+            group[start : start + _BATCH_SIZE] = (rows @ group_noise)[: samples - start]
     return result.swapaxes(0, 1).reshape(samples, -1)[:, :count]
 
 

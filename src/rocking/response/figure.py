@@ -13,7 +13,7 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import escape_dollars
-from rocking.engine.problem import compute_thresholds
+from rocking.engine.problem import compute_uplift_thresholds
 from rocking.errors import OptionError
 from rocking.plot.canvas import ACCENT, GREY, INK, PALE, FigureOptions, Page, add_labels, add_text, add_ticks, open_page
 from rocking.plot.curves import draw_ground
@@ -98,7 +98,7 @@ def draw_histories(
     if not is_rotation or (units == "slenderness" and any(map(math.isinf, balances))):
         units = "rad"
     factors = {"slenderness": (1.0 / plus, 1.0 / minus), "deg": (math.degrees(1.0),) * 2, "rad": (1.0, 1.0)}[units]
-    names = {"slenderness": f"rotation / {coordinate.limit}", "deg": "rotation (°)", "rad": "rotation (rad)"}
+    names = {"slenderness": f"rotation / {coordinate.limit_name}", "deg": "rotation (°)", "rad": "rotation (rad)"}
 
     def normalise(values: Floats) -> Floats:
         return np.where(values >= 0.0, *factors)
@@ -111,7 +111,7 @@ def draw_histories(
         main, *grounds = _create_panels(page, 1 + len(traces), zoomed=sequence is not None)
         _shade_rest(main, np.clip(response.rest_intervals, *span))
         _shade_slip(main, np.clip(response._history.find_slips(), *span))
-        _draw_rotation(main, time, scaled_rotation, np.array([-minus, plus]) * factors[::-1], coordinate.limit)
+        _draw_rotation(main, time, scaled_rotation, np.array([-minus, plus]) * factors[::-1], coordinate.limit_name)
         if units != "deg" and is_rotation:
             to_degrees = (lambda y: np.degrees(y / normalise(y)), lambda y: np.radians(y) * normalise(y))
             main.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
@@ -137,7 +137,7 @@ def draw_histories(
 
 def _choose_balances(response: ResponseData) -> tuple[float, float]:
     """Return the balance on each side, for a one-sided body the same value twice."""
-    (pair,), _ = compute_thresholds(response.block.as_bodies(), response.model)
+    (pair,), _ = compute_uplift_thresholds(response.block.as_bodies(), response.model)
     return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
 
 
@@ -149,7 +149,7 @@ def _compute_traces(response: ResponseData, start: float, end: float) -> dict[st
         slips["slip (mm)"] = times, 1e3 * response.slip(times)
     if motion is None:
         return slips
-    times = motion.drawing_times(start, end)
+    times = motion.choose_drawing_times(start, end)
     traces = {"ground acceleration (g)": (times, motion.acceleration(times) / STANDARD_GRAVITY)}
     if motion.vertical is not None:
         traces["vertical (g)"] = (times, motion.vertical.acceleration(times) / STANDARD_GRAVITY)
@@ -230,7 +230,7 @@ def _label_left_end(axes: Axes, text: str, y: float, offset: float) -> None:
 
 def _draw_thresholds(axes: Axes, response: ResponseData, time: Floats, acceleration: Floats) -> None:
     """Draw the uplift thresholds, which vary with the weight, and the motion beyond them."""
-    (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
+    (pair,), (weight_part,) = compute_uplift_thresholds(response.block.as_bodies(), response.model)
     lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
     fill_style: dict[str, Any] = {"color": ACCENT, "linewidth": 0.9, "interpolate": True, "zorder": 3}
     for sign, size, weight_slope in ((-1.0, pair[0], weight_part[0]), (1.0, pair[1], weight_part[1])):
@@ -273,7 +273,7 @@ def _draw_sequence(main: Axes, axes: Axes, response: ResponseData, sequence: np.
     axes.set_title(textwrap.fill(title, max(20, int(axes.bbox.width / axes.figure.dpi * 14))), color=ACCENT, loc="left")
 
 
-class Course(NamedTuple):
+class SampledInterval(NamedTuple):
     """Interval of a response, with two points at each impact: before it and, at the same time, after it.
 
     Attributes
@@ -301,7 +301,7 @@ class Course(NamedTuple):
         return np.insert(values, self.impact_rows + 1, np.nan)
 
 
-def compute_course(response: ResponseData, start: float, end: float) -> Course:
+def sample_interval(response: ResponseData, start: float, end: float) -> SampledInterval:
     """Compute the course of a response between two times, s."""
     history, energy = response._history, response._energy
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]
@@ -309,7 +309,7 @@ def compute_course(response: ResponseData, start: float, end: float) -> Course:
     impact_times = np.asarray(impacts["time"], dtype=float)
     times = np.setdiff1d(np.linspace(start, end, _EVEN_TIMES), impact_times)
     rows = history.find_rows(times)
-    theta, rate, _ = history.states_in(times, rows).T
+    theta, rate, _ = history.compute_states(times, rows).T
     positions = np.searchsorted(times, impact_times)
 
     def insert(values: Floats | Integers, before: Floats | Integers, after: Floats | Integers) -> Floats:
@@ -324,11 +324,11 @@ def compute_course(response: ResponseData, start: float, end: float) -> Course:
     unit = energy.unit_of_rotation[side_index]
     all_times, impact_rows = insert(times, impact_times, impact_times), positions + 2 * np.arange(len(positions))
     energies = energy.kinetic(velocity, side), energy.potential(rotation, side)
-    return Course(all_times, rotation / unit, velocity / (energy.p[side_index] * unit), *energies, impact_rows)
+    return SampledInterval(all_times, rotation / unit, velocity / (energy.p[side_index] * unit), *energies, impact_rows)
 
 
 def compute_boundary(response: ResponseData) -> tuple[Floats, Floats]:
-    """Return rotations and velocities, in units of a `Course`, with the energy of the balance."""
+    """Return rotations and velocities, in units of a `SampledInterval`, with the energy of the balance."""
     energy, gap = response._energy, np.array([np.nan])
     x: list[Floats] = []
     y: list[Floats] = []
@@ -352,20 +352,20 @@ def find_event_times(response: ResponseData, start: float, end: float) -> dict[s
 def draw_phase_plane(
     response: ResponseData, window: Sequence[float] | None, **options: Unpack[FigureOptions]
 ) -> Figure:
-    """Draw normalised velocity against normalised rotation in a window, in units of a `Course`."""
+    """Draw normalised velocity against normalised rotation in a window, in units of a `SampledInterval`."""
     span = resolve_window(response, window)
-    course = compute_course(response, *span)
-    limit = response.block.coordinate.limit if response._energy.has_balances else "rad"
+    interval = sample_interval(response, *span)
+    limit = response.block.coordinate.limit_name if response._energy.has_balances else "rad"
     with open_page((4.6, 4.2), **options) as page:
         (axes,) = page.create_panels()
         axes.axhline(0.0, color=INK, linewidth=0.4)
         axes.axvline(0.0, color=INK, linewidth=0.4)
         axes.plot(*compute_boundary(response), label="as much energy as at the balance", **_BOUNDARY)
-        if len(course.impact_rows):
-            jumps = np.column_stack([course.velocity[course.impact_rows], course.velocity[course.impact_rows + 1]])
+        if len(rows := interval.impact_rows):
+            jumps = np.column_stack([interval.velocity[rows], interval.velocity[rows + 1]])
             y = np.insert(jumps, 2, np.nan, axis=1).ravel()
             axes.plot(0.0 * y, y, color=GREY, linewidth=1.1, linestyle=(0, (1, 1.5)), label="impact")
-        rotation, velocity = course.insert_gaps(course.rotation), course.insert_gaps(course.velocity)
+        rotation, velocity = interval.insert_gaps(interval.rotation), interval.insert_gaps(interval.velocity)
         axes.plot(rotation, velocity, color=INK, linewidth=0.8, label="response")
         if name := " and ".join(kind for kind, times in find_event_times(response, *span).items() if len(times)):
             axes.plot(0.0, 0.0, "o", label=name, color=INK, markersize=5.0, markerfacecolor=PALE, zorder=4)
@@ -378,16 +378,17 @@ def draw_phase_plane(
 
 def draw_energies(response: ResponseData, window: Sequence[float] | None, **options: Unpack[FigureOptions]) -> Figure:
     """Draw kinetic, potential and total energy, divided by the overturning energy, in a window."""
-    course = compute_course(response, *resolve_window(response, window))
-    time, total = course.time, course.kinetic + course.potential
+    interval = sample_interval(response, *resolve_window(response, window))
+    time, total = interval.time, interval.kinetic + interval.potential
     with open_page((7.0, 3.0), **options) as page:
         (axes,) = page.create_panels()
         _shade_rest(axes, np.clip(response.rest_intervals, time[0], time[-1]))
         top = float(np.max(total, initial=0.0)) or 1.0
         axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")
-        axes.plot(time, course.potential, color=GREY, linewidth=1.0, label="potential")
-        axes.plot(time, course.kinetic, color="#3c6aa0", linewidth=0.8, linestyle=(0, (4, 1.5)), label="kinetic")
-        axes.plot(time[course.impact_rows], 0.0 * course.impact_rows, "|", color=INK, markersize=6, markeredgewidth=0.5)
+        axes.plot(time, interval.potential, color=GREY, linewidth=1.0, label="potential")
+        axes.plot(time, interval.kinetic, color="#3c6aa0", linewidth=0.8, linestyle=(0, (4, 1.5)), label="kinetic")
+        rows = interval.impact_rows
+        axes.plot(time[rows], 0.0 * rows, "|", color=INK, markersize=6, markeredgewidth=0.5)
         levels = [level for level in response._energy.overturning_energy.tolist() if level < min(1.6 * top, math.inf)]
         for level in levels:
             axes.axhline(level, label="as much energy as at the balance", **_BOUNDARY)

@@ -264,13 +264,13 @@ def _has_ties_before(trail: Trail, instant: float) -> bool:
         False,
         False,
     )
-    march(trail.ground, copy_trail(trail).block, settings, state.new_table(0), state.new_scratch(), start)
+    march(trail.ground, copy_trail(trail).block, settings, state.create_table(0), state.create_scratch(), start)
     return bool(start["rounding_decisions"] > 0)
 
 
 def _apply_adjoint(target: _Target, by_state: Floats, derivatives: Floats) -> str:
     """Write derivatives by the initial state and by pieces of the motion; return the reason if there are none."""
-    nodes, scratch = target.trail.nodes, state.new_scratch()
+    nodes, scratch = target.trail.nodes, state.create_scratch()
     starts_at_rest, start_time = int(nodes["side"][0]) < 0, float(nodes["time"][0])
     ending = AdjointEnd.START
     if target.by_state is None:
@@ -281,7 +281,7 @@ def _apply_adjoint(target: _Target, by_state: Floats, derivatives: Floats) -> st
         if not np.any(by_state) or (target.instant == start_time and not target.is_height):
             return ""  # at rest, or the initial state itself
     if ending not in _REASONS and target.instant > start_time:
-        trail, variation = copy_trail(target.trail), state.new_record(state.VARIATION)
+        trail, variation = copy_trail(target.trail), state.create_record(state.VARIATION)
         ending = AdjointEnd(adjoint(trail, scratch, variation, target.row, target.elapsed, by_state, derivatives))
         is_waiting = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > start_time)
         if ending not in _REASONS and (ending == AdjointEnd.REST or is_waiting):

@@ -59,14 +59,14 @@ class TimeHistory:
 
     def states(self, time: ArrayLike) -> Floats:
         """Return the coordinate and its two rates at times of any shape, as last dimension; NaN outside [0, end]."""
-        return self.states_and_sides(time)[0]
+        return self.compute_states_and_sides(time)[0]
 
-    def states_and_sides(self, time: ArrayLike) -> tuple[Floats, Integers]:
+    def compute_states_and_sides(self, time: ArrayLike) -> tuple[Floats, Integers]:
         """Return `states`, and the side at each time: 0, 1, or negative at rest."""
         times = checks.numbers(time, "time", OptionError)
         flat = times.ravel()
         rows = self.find_rows(flat)
-        states = self.states_in(flat, rows)
+        states = self.compute_states(flat, rows)
         states[self.is_outside(flat)] = np.nan
         sides = self.trail.nodes["side"][rows].astype(np.int64)
         return states.reshape((*times.shape, 3)), sides.reshape(times.shape)
@@ -75,11 +75,11 @@ class TimeHistory:
         """Return displacement, m, and velocity, m/s, of the foot at times of any shape; NaN outside [0, end]."""
         times = checks.numbers(time, "time", OptionError)
         flat = times.ravel()
-        slips = gravity * self.states_in(flat, self.find_rows(flat), columns=5)[:, 3:]
+        slips = gravity * self.compute_states(flat, self.find_rows(flat), columns=5)[:, 3:]
         slips[self.is_outside(flat)] = np.nan
         return slips.reshape((*times.shape, 2))
 
-    def states_in(self, times: Floats, rows: Integers, columns: int = 3) -> Floats:
+    def compute_states(self, times: Floats, rows: Integers, columns: int = 3) -> Floats:
         """Return coordinate and rates, shape (n, 3), at times in the steps that start at these rows.
 
         With five columns, the last two are displacement and velocity of the foot divided by g.
@@ -87,7 +87,7 @@ class TimeHistory:
         states = np.empty((len(times), columns))
         sample_times = times.view()
         sample_times.flags.writeable = False  # one type for any caller: `trace` is compiled once
-        trace(copy_trail(self.trail), state.new_scratch(), sample_times, rows, states)
+        trace(copy_trail(self.trail), state.create_scratch(), sample_times, rows, states)
         if any(self.stops):
             side = self.trail.nodes["side"][rows]
             states[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]
@@ -147,14 +147,14 @@ class TimeHistory:
         side = nodes["side"][moving]
         ends = np.append(nodes["time"][1:], self.end)[moving]
         times = np.linspace(nodes["time"][moving], ends, _PARTS_PER_STEP + 1, axis=1)
-        states = self.states_in(times.ravel(), np.repeat(moving, _PARTS_PER_STEP + 1)).reshape(*times.shape, 3)
+        states = self.compute_states(times.ravel(), np.repeat(moving, _PARTS_PER_STEP + 1)).reshape(*times.shape, 3)
         peaks, rate = np.abs(states[..., 0]).max(axis=1), (1.0 - 2.0 * side)[:, None] * states[..., 1]
         step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
         low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
         for _ in range(_BISECTIONS if len(step) else 0):
-            is_outward = sign * self.states_in(compute_midpoints(low, high), rows)[:, 1] > 0.0
+            is_outward = sign * self.compute_states(compute_midpoints(low, high), rows)[:, 1] > 0.0
             low, high = halve(low, high, is_outward, ~is_outward)
-        np.maximum.at(peaks, step, np.abs(self.states_in(low, rows)[:, 0]))
+        np.maximum.at(peaks, step, np.abs(self.compute_states(low, rows)[:, 0]))
         plus, minus = (float(np.max(peaks[side == k], initial=0.0)) for k in range(2))
         return plus, minus
 
@@ -193,9 +193,9 @@ def add_all_impacts(trail: Trail, *, ends_in_sequence: bool) -> Trail:
     last_impacts = last_impacts[nodes["v"][last_impacts] > min_speeds[nodes["side"][last_impacts]]]
     if not len(last_impacts):
         return trail
-    body, settings, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
+    body, settings, scratch = trail.block.copy(), trail.settings.copy(), state.create_scratch()
     settings["rest_rule"], settings["no_end_time"], settings["writes_tables"] = state.RestRule.VELOCITY, False, True
-    table = state.new_table(1024)
+    table = state.create_table(1024)
     parts, next_row, plastic_elongations = [], 0, compute_plastic_elongations(trail)
     for row in last_impacts:
         start = state.state_at_node(nodes[row], plastic_elongations[row], _MAX_IMPACTS)

@@ -64,19 +64,19 @@ def _bound_steps(values: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
-    """Ratios of horizontal and vertical ground force to the weight, up to the time `until` (s).
+class ContactForces:
+    """Ratios of horizontal and vertical ground force to the weight, up to the time `end_time` (s).
 
     Within a step the forces are smooth. Both limits at every impact and at every jump of the motion are evaluated. The
     impulses of impacts are not included.
     """
 
     history: TimeHistory
-    law: ContactLaw
-    until: float
+    contact_law: ContactLaw
+    end_time: float
 
     @cached_property
-    def _plastic(self) -> Floats:
+    def _plastic_elongations(self) -> Floats:
         return compute_plastic_elongations(self.history.trail)
 
     def compute_forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
@@ -149,19 +149,19 @@ class Contact:
 
     def _compute_forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
         """Compute the forces in the steps that start at these rows, with the side and the piece of each."""
-        theta, rate, acceleration = self.history.states_in(times, rows).T
+        theta, rate, acceleration = self.history.compute_states(times, rows).T
         side = self.history.trail.nodes["side"][rows]
         ground = self._evaluate_ground(times, rows, side < 0)
-        elongation = compute_elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
-        horizontal, vertical = self.law((theta, rate, acceleration), ground, side, elongation)
+        elongation = compute_elongation(self.history.trail, np.abs(theta), side) - self._plastic_elongations[rows]
+        horizontal, vertical = self.contact_law((theta, rate, acceleration), ground, side, elongation)
         direction, mu = self.history.trail.nodes["direction"][rows], self.history.trail.block["kinetic_friction"]
         return np.where(direction != 0, -direction * mu * vertical, horizontal), vertical
 
-    def _evaluate_ground(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
+    def _evaluate_ground(self, times: Floats, rows: Integers, is_resting: Flags) -> tuple[Floats, Floats]:
         """Return both ground accelerations in g, from the piece at the start of a step or, at rest, any piece."""
         ground = self.history.trail.ground
         current = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
-        piece = np.where(at_rest, current, self.history.trail.nodes["piece"][rows])
+        piece = np.where(is_resting, current, self.history.trail.nodes["piece"][rows])
         elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
         components = component_coefficients(ground, piece)
         push, *lift = (piecewise.evaluate_pieces(coefficients, elapsed) for coefficients in components)
@@ -173,10 +173,10 @@ class Contact:
         breakpoints = self.history.trail.ground.pieces[:, 0]
         breakpoints = breakpoints[nodes["side"][self.history.find_rows(breakpoints)] < 0]
         starts = np.unique(np.concatenate([nodes["time"], breakpoints]))
-        starts = starts[(starts < self.until) | (starts == starts[0])]
-        if nodes["side"][self.history.find_rows(np.array([self.until]))[0]] < 0:
-            starts = np.union1d(starts, [self.until])  # motion after a jump at the end
-        ends = np.append(starts[1:], max(self.until, starts[-1]))
+        starts = starts[(starts < self.end_time) | (starts == starts[0])]
+        if nodes["side"][self.history.find_rows(np.array([self.end_time]))[0]] < 0:
+            starts = np.union1d(starts, [self.end_time])  # motion after a jump at the end
+        ends = np.append(starts[1:], max(self.end_time, starts[-1]))
         rows = self.history.find_rows(starts)
         fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))
         times = starts[:, None] + fractions * (ends - starts)[:, None]
@@ -302,7 +302,7 @@ def compute_linear_balance(body: Block | RestrainedBlock) -> Floats:
     For a yielding tendon the first yield is considered, with the smaller of elastic force and strength, so the nearer
     balance is returned.
     """
-    (record,) = body.as_bodies().kernel_records("linear", np.zeros((1, 2)))
+    (record,) = body.as_bodies().create_kernel_records("linear", np.zeros((1, 2)))
     elastic = _solve_linear_balance(record, record["added_weight"], record["added_push"], record["prestress"])
     if not record["yielding"]:
         return elastic

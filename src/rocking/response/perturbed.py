@@ -142,7 +142,7 @@ class PerturbedSimulations(Result):
 
         NaN from the first event whose kind or side differs between factors.
         """
-        events = self._middle.events
+        events = self._unscaled_repeat.events
         ranges = np.full((len(events), 2), np.nan)
         common = min(len(repeat.events) for repeat in self.repeats)
         rows = np.array([repeat.events[:common] for repeat in self.repeats])
@@ -155,10 +155,10 @@ class PerturbedSimulations(Result):
     @property
     def event_spreads(self) -> Floats:
         """Largest distance of each event from its time at factor 1, s; NaN as in `event_ranges`."""
-        return np.asarray(np.abs(self.event_ranges - self._middle.events["time"][:, None]).max(axis=1))
+        return np.asarray(np.abs(self.event_ranges - self._unscaled_repeat.events["time"][:, None]).max(axis=1))
 
     @property
-    def _middle(self) -> Repeat:
+    def _unscaled_repeat(self) -> Repeat:
         return self.repeats[len(self.repeats) // 2]
 
     @property
@@ -167,13 +167,13 @@ class PerturbedSimulations(Result):
         return [
             repeat
             for repeat in self.repeats
-            if _count_unmoved_as_standing(repeat.outcome) == _count_unmoved_as_standing(self._middle.outcome)
+            if _count_unmoved_as_standing(repeat.outcome) == _count_unmoved_as_standing(self._unscaled_repeat.outcome)
         ]
 
     @property
     def outcome(self) -> str:
         """Outcome at factor 1, as a verb. A block that moves only for other factors "stands"."""
-        outcomes = [self._middle.outcome, *(repeat.outcome for repeat in self.agreeing_repeats)]
+        outcomes = [self._unscaled_repeat.outcome, *(repeat.outcome for repeat in self.agreeing_repeats)]
         return next((outcome for outcome in outcomes if outcome != UNMOVED), UNMOVED)
 
     def describe_agreement(self) -> str:

@@ -115,7 +115,7 @@ class Response(ResponseData):
         self, available_friction: float | None = None, *, precision: float = MOTION_PRECISION
     ) -> Sequence[Row]:
         """Return the entries of `to_dict` as rows of name, value and unit; arguments as of `summary`."""
-        body, motion, limit = self.block, self.motion, self.block.coordinate.limit
+        body, motion, limit = self.block, self.motion, self.block.coordinate.limit_name
         entries = motion and {
             "name": motion.name,
             add_unit("duration", "s"): motion.duration,
@@ -132,7 +132,7 @@ class Response(ResponseData):
             rows.append(Row("balance", list(self.balance), body.coordinate.unit))
             rows.append(Row("tendons", columns_to_records(self._convert_table("tendons"))))
         rows.append(Row("peak_time", self.peak_time, "s"))
-        if body.contact is not None:
+        if body.contact_law is not None:
             rows.append(Row("required_friction", self.required_friction))
             rows.append(Row("minimum_normal_force_over_weight", self.minimum_normal_force))
             rows.append(Row("lift_off_time", self.lift_off_time, "s"))

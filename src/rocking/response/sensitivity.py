@@ -23,7 +23,7 @@ from rocking.response.perturbed import Repeat
 
 #: A response is ambiguous if changes of its inputs by one unit in the last place change its peak by more than this
 #: fraction, or the time of an event or impact by more than this number of seconds.
-AMBIGUITY: Final = 1e-6
+VISIBLE_CHANGE: Final = 1e-6
 
 #: Inputs of a sensitivity.
 QUANTITIES: Final = ("motion", "initial_rotation", "initial_velocity", "p", "alpha", "restitution")
@@ -37,7 +37,7 @@ _START_FIELDS: Final[dict[int, str]] = {Quantity.ROTATION: "u", Quantity.VELOCIT
 _ULP: Final = 2.0**-52
 
 #: Relative distance from a threshold within which a motion may or may not exceed it.
-TIE: Final = 2.0**-44
+NEAR_TIE: Final = 2.0**-44
 
 #: Largest product of an error and the rates of balance and impacts for which its first order is used as a bound.
 _MAX_NONLINEARITY: Final = 0.5
@@ -153,7 +153,7 @@ def _vary_input(trail: Trail, quantity: int, times: Floats, impacts: int, events
     heights, impact_changes, event_changes = np.zeros(len(times)), np.zeros(impacts), np.zeros(events)
     start = _START_FIELDS.get(quantity)
     if start is None or trail.nodes[start][0] != 0.0:  # a share of zero has no effect
-        scratch, variation = state.new_scratch(), state.new_record(state.VARIATION)
+        scratch, variation = state.create_scratch(), state.create_record(state.VARIATION)
         compute_variation(
             copy_trail(trail), scratch, variation, quantity, times, heights, impact_changes, event_changes
         )
@@ -165,31 +165,31 @@ def find_ambiguities(changes: Sensitivity, trail: Trail, height: float, rounding
 
     ``height`` is the height of the peak above the stop, and ``rounding_decisions`` the known number of ties.
     """
-    early, late = (_compute_uplifts(trail, share) for share in (1.0 - TIE, 1.0 + TIE))
-    rounding_decisions += int(np.any(late > early + AMBIGUITY))
+    early, late = (_compute_uplifts(trail, share) for share in (1.0 - NEAR_TIE, 1.0 + NEAR_TIE))
+    rounding_decisions += int(np.any(late > early + VISIBLE_CHANGE))
     peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._changes)
-    is_peak_clear = np.all(peak <= AMBIGUITY * max(height, 1e-300))
-    is_clear = (is_peak_clear, np.all(np.concatenate(times) <= AMBIGUITY), rounding_decisions == 0)
+    is_peak_clear = np.all(peak <= VISIBLE_CHANGE * max(height, 1e-300))
+    is_clear = (is_peak_clear, np.all(np.concatenate(times) <= VISIBLE_CHANGE), rounding_decisions == 0)
     return tuple(name for name, clear in zip(("peak", "events", "touch"), is_clear, strict=True) if not clear)
 
 
 def find_slip_ambiguities(repeats: Sequence[Repeat], rounding_decisions: int) -> tuple[str, ...]:
-    """Return the results of `find_ambiguities` for a response that slips, from simulations with factors 1 +- TIE.
+    """Return the results of `find_ambiguities` for a response that slips, from simulations with factors 1 +- NEAR_TIE.
 
-    "touch" includes a mode of motion longer than `AMBIGUITY` that does not occur for all factors.
+    "touch" includes a mode of motion longer than `VISIBLE_CHANGE` that does not occur for all factors.
     """
-    share = _ULP / TIE
+    share = _ULP / NEAR_TIE
     peaks, modes = [repeat.peak for repeat in repeats], [_list_modes(repeat.events) for repeat in repeats]
     is_same = len({repeat.outcome for repeat in repeats}) == 1 == len({tuple(names) for names, _ in modes})
     spread = np.max(np.ptp([times for _, times in modes], axis=0), initial=0.0) if is_same else 0.0
-    is_peak_clear = share * np.ptp(peaks) <= AMBIGUITY * max(peaks)
-    is_clear = (is_peak_clear, share * spread <= AMBIGUITY, is_same and rounding_decisions == 0)
+    is_peak_clear = share * np.ptp(peaks) <= VISIBLE_CHANGE * max(peaks)
+    is_clear = (is_peak_clear, share * spread <= VISIBLE_CHANGE, is_same and rounding_decisions == 0)
     return tuple(name for name, clear in zip(("peak", "events", "touch"), is_clear, strict=True) if not clear)
 
 
 def _list_modes(events: NDArray[np.void]) -> tuple[list[tuple[str, int]], Floats]:
-    """Return kind and side of the events that start a mode longer than `AMBIGUITY`, and the times of these modes, s."""
-    lasting = np.append(np.diff(events["time"]) > AMBIGUITY, True)
+    """Return kind and side of the events that start a mode longer than `VISIBLE_CHANGE`, and their times, s."""
+    lasting = np.append(np.diff(events["time"]) > VISIBLE_CHANGE, True)
     names = [(str(event["kind"]), int(event["side"])) for event in events[lasting]]
     is_new = np.array([k == 0 or names[k] != names[k - 1] for k in range(len(names))])
     return [name for name, new in zip(names, is_new, strict=True) if new], events["time"][
@@ -202,7 +202,7 @@ def _compute_uplifts(trail: Trail, factor: float) -> Floats:
     block, times = trail.block.copy(), np.zeros(len(trail.nodes))
     block["threshold"] *= factor
     block["restraint_threshold"] *= factor
-    write_next_uplifts(trail._replace(block=block), state.new_scratch(), times)
+    write_next_uplifts(trail._replace(block=block), state.create_scratch(), times)
     return times
 
 
@@ -214,7 +214,7 @@ def bound_rest_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
     nodes = state.expose_fields(np.append(trail.nodes, trail.nodes[-1:]))
     nodes["side"][-1] = state.AT_REST
     trail = copy_trail(trail._replace(nodes=nodes))
-    scratch, variation = state.new_scratch(), state.new_record(state.VARIATION)
+    scratch, variation = state.create_scratch(), state.create_record(state.VARIATION)
     fastest, out = np.sqrt(np.max(np.abs(trail.block["stiffness"]))), np.zeros_like(trail.ground.pieces[:, 2:])
     last, errors = (np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0)), np.full(len(proven), np.inf))
     for k in np.flatnonzero(proven):

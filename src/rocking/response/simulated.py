@@ -21,7 +21,7 @@ from rocking.kernels import state
 from rocking.motion.motion import Motion
 from rocking.response.history import Solution, TimeHistory, add_all_impacts
 from rocking.response.mechanics import (
-    Contact,
+    ContactForces,
     Energy,
     check_available_friction,
     compute_friction_demand,
@@ -40,7 +40,7 @@ from rocking.response.perturbed import (
     check_factors,
 )
 from rocking.response.sensitivity import (
-    TIE,
+    NEAR_TIE,
     Sensitivity,
     bound_rest_errors,
     find_ambiguities,
@@ -92,11 +92,11 @@ class ResponseData(Result):
         return create_energy(self.block, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
 
     @cached_property
-    def _contact(self) -> Contact:
-        law = self.block.contact
+    def _contact(self) -> ContactForces:
+        law = self.block.contact_law
         if law is None:
             raise OptionError(f"the ground forces of this body are unknown: {self.block.description}")
-        return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
+        return ContactForces(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
 
     @property
     def slips(self) -> bool:
@@ -191,7 +191,7 @@ class ResponseData(Result):
             return "leans"
         if not self.moved:
             return UNMOVED
-        return STANDS if self.block.coordinate.limit else "comes to rest"
+        return STANDS if self.block.coordinate.limit_name else "comes to rest"
 
     @property
     def residual_rotation(self) -> float:
@@ -255,7 +255,7 @@ class ResponseData(Result):
         the ground, or whether it falls from its balance. `perturbed` returns the spread of such results.
         """
         if self.slips:
-            repeats = [self._repeat(1.0 + change) for change in (-TIE, 0.0, TIE)]
+            repeats = [self._repeat(1.0 + change) for change in (-NEAR_TIE, 0.0, NEAR_TIE)]
             return find_slip_ambiguities(repeats, self.rounding_decisions)
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
@@ -362,7 +362,7 @@ class ResponseData(Result):
             If `time` is not numeric, the body is not a block, one of its tendons yields, or its restraints hold it at
             any rotation.
         """
-        states, sides = self._history.states_and_sides(time)
+        states, sides = self._history.compute_states_and_sides(time)
         return unwrap_scalar(self._energy.kinetic(states[..., 1], sides))
 
     def potential_energy(self, time: ArrayLike) -> Floats:
@@ -371,7 +371,7 @@ class ResponseData(Result):
         The result is NaN outside [0, duration]. Between impacts the sum of both energies is constant without ground
         motion and damping. Arguments and errors are the same as of `kinetic_energy`.
         """
-        states, sides = self._history.states_and_sides(time)
+        states, sides = self._history.compute_states_and_sides(time)
         return unwrap_scalar(self._energy.potential(states[..., 0], sides))
 
     @cached_property

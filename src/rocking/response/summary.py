@@ -12,7 +12,7 @@ from rocking.block.sides import format_sides
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Row
 from rocking.core.tables import format_count
-from rocking.engine.problem import compute_thresholds
+from rocking.engine.problem import compute_uplift_thresholds
 from rocking.response.perturbed import choose_steps, format_percent
 from rocking.response.simulated import ResponseData
 
@@ -47,7 +47,7 @@ def create_rows(response: ResponseData, available_friction: float | None, precis
         Row("block" if isinstance(body, Block) else "body", body.description),
         Row("parameters", format_sides(body.sides)),
         *([Row("balance", _describe_balance(response))] if isinstance(body, RestrainedBlock) else []),
-        Row("motion", _summarize_motion(response)),
+        Row("motion", _summarise_motion(response)),
         Row("uplift above", _describe_thresholds(response)),
         *_create_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
@@ -58,9 +58,9 @@ def create_rows(response: ResponseData, available_friction: float | None, precis
         plastic_text = f", {1e3 * row['plastic_elongation']:.4g} mm of it for good" if row["plastic_elongation"] else ""
         text = f"longer by {1e3 * row['elongation']:.4g} mm at most{plastic_text}"
         rows.append(Row("tendon", text, note=f", force {1e-3 * row['force']:.4g} kN at most"))
-    if isinstance(body, RestrainedBlock) and body.contact is None:
+    if isinstance(body, RestrainedBlock) and body.contact_law is None:
         rows.append(Row("friction, lift-off", "not judged: the forces of the ground are not known"))
-    if body.contact is not None:
+    if body.contact_law is not None:
         until = "" if math.isnan(response.tipping_time) else f", until it tips at {format_tipping_time(response)}"
         rows += [
             Row("friction needed", f"{response.required_friction:.4f}", note=until),
@@ -96,7 +96,7 @@ def describe_subject(response: ResponseData) -> str:
 
 def format_line(response: ResponseData) -> str:
     """Return the response in one line."""
-    limit, peak = response.block.coordinate.limit, ""
+    limit, peak = response.block.coordinate.limit_name, ""
     if limit and not response.overturned and math.isfinite(response._balance_at_peak):
         peak = f", peak {format_ratio(response)} of the {limit}"
     outcome = format_outcome(response, f"{response.overturn_time:.4f} s")
@@ -116,13 +116,13 @@ def format_outcome(response: ResponseData, overturn_time: str) -> str:
         motion_end = 0.0 if response.motion is None else response.motion.end
         to_come = f"; the motion goes on to {motion_end:.6g} s" if response.duration < motion_end else ""
         return f"{_describe_stop(response)}, where the simulation was stopped{to_come}"
-    if response.leans and response.block.coordinate.limit:
+    if response.leans and response.block.coordinate.limit_name:
         return f"does not overturn: it stays leaning, at {_format_residual(response)}"
     if not response.moved:
         return "does not move"
     if response.slips and response.peak_rotation == 0.0:
         return "slides and does not rock"
-    return "rocks and does not overturn" if response.block.coordinate.limit else "moves, and comes to rest"
+    return "rocks and does not overturn" if response.block.coordinate.limit_name else "moves, and comes to rest"
 
 
 def format_brief_outcome(response: ResponseData, precision: float) -> str:
@@ -179,7 +179,7 @@ def format_tipping_time(response: ResponseData) -> str:
     return f"{prefix}{response.tipping_time:.{min(_count_decimals(uncertainty), _SHORT_DECIMALS)}f} s"
 
 
-def _summarize_motion(response: ResponseData) -> str:
+def _summarise_motion(response: ResponseData) -> str:
     """Describe the ground motion. In all texts g is standard gravity."""
     motion = response.motion
     if motion is None:
@@ -193,7 +193,7 @@ def _summarize_motion(response: ResponseData) -> str:
 def _describe_thresholds(response: ResponseData) -> str:
     """Return the uplift thresholds, which vary with the weight under vertical motion."""
     motion = response.motion
-    (pair,), (weight_part,) = compute_thresholds(response.block.as_bodies(), response.model)
+    (pair,), (weight_part,) = compute_uplift_thresholds(response.block.as_bodies(), response.model)
     plus, minus = (pair / STANDARD_GRAVITY).tolist()
     is_single = plus == minus or math.isinf(minus)
     text = f"{plus:.4f} g" if is_single else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"
@@ -285,7 +285,7 @@ def _describe_stop(response: ResponseData) -> str:
     if not math.isnan(response.tipping_time):
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
     if response.moves_at_end:
-        return f"still {'rocking' if response.block.coordinate.limit else 'moving'} at {end}"
+        return f"still {'rocking' if response.block.coordinate.limit_name else 'moving'} at {end}"
     return f"at rest at {end}" if response.moved else f"has not moved by {end}"
 
 

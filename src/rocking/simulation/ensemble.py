@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Polarity = Literal["+", "-", "both"]
 
-SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
+POLARITY_SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
 
 #: Units and meanings of outcomes by their names in the engine's result.
 VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
@@ -55,14 +55,14 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
 }  # fmt: skip
 
 #: Optional times, likewise.
-TIMES: Final[Mapping[str, tuple[str, str]]] = {
+TIME_VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "first_uplift": ("s", "time of the first uplift; 0 without one"),
     "first_rest": ("s", "time at which the block first came to rest; 0 if it never did"),
     "last_rest": ("s", "time at which the block last came to rest; 0 if it never did"),
 }
 
 #: Further outcomes with friction, likewise.
-SLIPS: Final[Mapping[str, tuple[str, str]]] = {
+SLIP_VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "lost_contact": ("1", "whether the ground ceased to press on the block, where the simulation ends"),
     "largest_slip": ("m", "largest displacement of the base relative to the ground in size"),
     "residual_slip": ("m", "displacement of the base relative to the ground at the end"),
@@ -70,8 +70,8 @@ SLIPS: Final[Mapping[str, tuple[str, str]]] = {
 
 #: Names of coordinates and results that labels of blocks must not replace.
 _RESERVED: Final = {
-    *VARIABLES, *TIMES, *SLIPS, "motion", "record", "file", "vertical", "scale", "level", "polarity", "block", "weight",
-    "limit_state", "fractile", "change", "median", "dispersion", "exceeded", "outcomes", "fault",
+    *VARIABLES, *TIME_VARIABLES, *SLIP_VARIABLES, "motion", "record", "file", "vertical", "scale", "level", "polarity",
+    "block", "weight", "limit_state", "fractile", "change", "median", "dispersion", "exceeded", "outcomes", "fault",
     "low", "high", "known",
 }  # fmt: skip
 
@@ -187,7 +187,7 @@ class Product:
     friction: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        checks.choice(self.polarity, "polarity", OptionError, list(SIGNS))
+        checks.choice(self.polarity, "polarity", OptionError, list(POLARITY_SIGNS))
         build_settings(
             self.bodies, self.model, self.chattering, self.duration, writes_tables=False
         )  # raises before the work
@@ -198,7 +198,7 @@ class Product:
     @property
     def signs(self) -> tuple[int, ...]:
         """Signs of the polarities."""
-        return SIGNS[self.polarity]
+        return POLARITY_SIGNS[self.polarity]
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -262,7 +262,7 @@ def create_dataset(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     requested = {"motion": True, "scale": has_scales, "polarity": has_polarities, "block": True}
     dimensions = tuple(name for name, is_requested in requested.items() if is_requested)
     part = tuple(slice(None) if is_requested else 0 for is_requested in requested.values())
-    meanings = {**VARIABLES, **TIMES, **SLIPS, "overturned_share": ("1", _SHARE_MEANING)}
+    meanings = {**VARIABLES, **TIME_VARIABLES, **SLIP_VARIABLES, "overturned_share": ("1", _SHARE_MEANING)}
     variable_attributes = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in meanings.items()}
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
@@ -420,8 +420,8 @@ def simulate_many(
     [[True, False, True, False]]
     """
     product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration, friction)
-    names = [*VARIABLES, *(TIMES if checks.boolean(include_times, "include_times", OptionError) else ())]
-    names += SLIPS if product.friction is not None else ()
+    names = [*VARIABLES, *(TIME_VARIABLES if checks.boolean(include_times, "include_times", OptionError) else ())]
+    names += SLIP_VARIABLES if product.friction is not None else ()
     setup = create_setup(product)
     outcomes = simulate_product(product, setup, names)
     if checks.boolean(robust, "robust", OptionError):

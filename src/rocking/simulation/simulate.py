@@ -14,7 +14,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.engine.problem import compute_peaks, require_body, set_start
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.engine.tasks import SLICE, Setup, count_slices
+from rocking.engine.tasks import STEPS_PER_SLICE, Setup, count_slices
 from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.march import march
@@ -180,11 +180,11 @@ def _scale_start(
 def march_in_slices(trail: Trail, body_state: state.Record) -> tuple[int, state.Records]:
     """Integrate in interruptible slices, and return the end and the growing table."""
     ground, block, settings, _ = trail
-    table = state.new_table(128 + int(_ROWS_PER_PIECE * len(ground.pieces)))
-    scratch = state.new_scratch()
+    table = state.create_table(128 + int(_ROWS_PER_PIECE * len(ground.pieces)))
+    scratch = state.create_scratch()
     ending: int = state.Ending.PAUSED
     for _ in range(count_slices(ground)):
-        body_state["budget"] = SLICE
+        body_state["budget"] = STEPS_PER_SLICE
         ending = march(ground, block, settings, table, scratch, body_state)
         while ending == state.Ending.FULL:
             table = state.enlarge_table(table)

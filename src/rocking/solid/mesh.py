@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.errors import BlockError, OptionError, describe_install, escape_braces
-from rocking.inputs.notes import density_notes, height_notes
+from rocking.inputs.notes import list_density_notes, list_height_notes
 from rocking.motion.processing import sine_cosine
 from rocking.solid import support as polygons
 from rocking.solid.repair import (
@@ -237,6 +237,12 @@ def compute_properties(
     prefixes = [f"{name}: " if len(names) > 1 else "" for name in names]
     repairs = [prefix + repair for prefix, part in zip(prefixes, surfaces, strict=True) for repair in part.repairs]
     volumes = [part.amount for part in part_moments]
+    notes = (
+        *notes,
+        *describe_overlaps(names, surfaces),
+        *list_height_notes(height),
+        *list_density_notes(part_densities),
+    )
     arguments = {
         "support": polygon,
         "centre": total.centre - [0.0, 0.0, ground],
@@ -246,7 +252,7 @@ def compute_properties(
         "height": height,
         "regions": [Region(*fields) for fields in zip(names, volumes, part_densities, strict=True)],
         "repairs": repairs,
-        "notes": (*notes, *describe_overlaps(names, surfaces), *height_notes(height), *density_notes(part_densities)),
+        "notes": notes,
     }
     return arguments, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.result import DatasetResult, format_some_rows, variable
+from rocking.core.result import DatasetResult, create_variable, format_some_rows
 from rocking.core.tables import Column, columns_to_records, escape_dollars, round_decimal
 from rocking.errors import OptionError
 from rocking.solid import support as polygons
@@ -145,9 +145,9 @@ def compute_rose(
         "lateral_offset": (front.lateral_offset, "how far the pivot lies to the side of the centre of mass", "m"),
         "gap": (gap, "how far the pivots of both sides are from facing each other", "m"),
     }
-    variables = {name: variable("azimuth", values, label, unit) for name, (values, label, unit) in columns.items()}
-    variables["east"] = variable("corner", polygon[:, 0], "support, east of the centre of mass", "m")
-    variables["north"] = variable("corner", polygon[:, 1], "support, north of the centre of mass", "m")
+    variables = {name: create_variable("azimuth", *column) for name, column in columns.items()}
+    variables["east"] = create_variable("corner", polygon[:, 0], "support, east of the centre of mass", "m")
+    variables["north"] = create_variable("corner", polygon[:, 1], "support, north of the centre of mass", "m")
     attributes = {
         "description": description,
         "weakest_azimuth": float(edge_azimuths[weakest]),
@@ -155,7 +155,7 @@ def compute_rose(
         "height_of_mass": height,
         "gravity": gravity,
     }
-    coordinates = {"azimuth": variable("azimuth", azimuths, "clockwise from north", "deg")}
+    coordinates = {"azimuth": create_variable("azimuth", azimuths, "clockwise from north", "deg")}
     return ResistanceRose(xr.Dataset(variables, coordinates, attributes))
 
 

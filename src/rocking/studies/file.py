@@ -19,7 +19,7 @@ from rocking.engine.schemes import chattering_scheme
 from rocking.errors import MotionError, OptionError, RecordError, StudyError, join_placeholders
 from rocking.inputs import quantities
 from rocking.inputs.bodies import (
-    STOCHASTIC,
+    STOCHASTIC_READERS,
     check_parameters,
     create_block,
     create_body,
@@ -28,9 +28,16 @@ from rocking.inputs.bodies import (
     find_reader,
     note_likely_mistakes,
 )
-from rocking.inputs.declared import BLOCK, COUPLES, FORCES, INPUTS, SUPPORTS, read_noted_acceleration
+from rocking.inputs.declared import (
+    BLOCK_INPUTS,
+    FORCE_RESTRAINTS,
+    INPUTS,
+    MOMENT_RESTRAINTS,
+    SUPPORT_INPUTS,
+    read_noted_acceleration,
+)
 from rocking.inputs.inventory import read_inventory
-from rocking.inputs.notes import motion_notes
+from rocking.inputs.notes import list_motion_notes
 from rocking.inputs.pulses import find_family
 from rocking.inputs.toml import Tables
 from rocking.motion.motion import Motion
@@ -53,11 +60,11 @@ _MEASURES: Final[Mapping[str, quantities.NumberReader]] = {
 }
 
 #: Keys of restraints; keys of tables are plurals.
-_RESTRAINT_KEYS: Final = tuple(f"{name}s" if name in FORCES else name for name in SUPPORTS)
+_RESTRAINT_KEYS: Final = tuple(f"{name}s" if name in FORCE_RESTRAINTS else name for name in SUPPORT_INPUTS)
 
 #: Tables of a file and their keys.
 SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
-    "blocks": ("csv", *BLOCK, *_RESTRAINT_KEYS),
+    "blocks": ("csv", *BLOCK_INPUTS, *_RESTRAINT_KEYS),
     "motions": (
         *("records", "channel", "vertical", "pairs", "units", "dt", "baseline", "highpass", "skip_unreadable"),
         *("pulses", "stochastic"),
@@ -70,7 +77,7 @@ SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
 _VALUE_TYPES: Final[Mapping[str, tuple[Any, str]]] = {
     **dict.fromkeys(("csv", "vertical", "units", "component", "polarity", "model", "chattering"), (str, "text")),
     **dict.fromkeys(("one_sided", "skip_unreadable", "pairs"), (bool, "true or false")),
-    **{f"{name}s": ([dict], f"tables, [[blocks.{name}s]]") for name in FORCES},
+    **{f"{name}s": ([dict], f"tables, [[blocks.{name}s]]") for name in FORCE_RESTRAINTS},
     "pulses": ([dict], "tables, [[motions.pulses]]"),
     "stochastic": ([dict], "tables, [[motions.stochastic]]"),
     **dict.fromkeys(("channel", "baseline"), (str | int, "text or a whole number")),
@@ -192,16 +199,17 @@ def _read_bodies(tables: Tables) -> Bodies:
     with tables.locating_errors("blocks"):
         find_description(entries)
     axes: dict[str, Any] = {}
-    for name in (*(name for name in entries if name in BLOCK), "one_sided", "lean", *COUPLES):
+    for name in (*(name for name in entries if name in BLOCK_INPUTS), "one_sided", "lean", *MOMENT_RESTRAINTS):
         with tables.locating_errors("blocks", key=name):
             if name in entries:
-                values = INPUTS[name].axis(entries[name])
-                axes[name] = [COUPLES[name](value) for value in values] if name in COUPLES else values
-    for name in FORCES:
+                values = INPUTS[name].read_axis(entries[name])
+                restraint = MOMENT_RESTRAINTS.get(name)
+                axes[name] = values if restraint is None else [restraint(value) for value in values]
+    for name in FORCE_RESTRAINTS:
         for k in range(len(entries.get(f"{name}s", []))):
             axes[f"{name} {k + 1}"] = _create_forces(tables, name, k)
     with tables.locating_errors("blocks"):
-        if "p" in entries and axes.keys() <= {*BLOCK}:
+        if "p" in entries and axes.keys() <= {*BLOCK_INPUTS}:
             return Blocks.grid(**axes)
         checks.check_grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
         rows = [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
@@ -217,15 +225,15 @@ def _create_objects(
     table: str,
     k: int,
     entries: Mapping[str, Any],
-    find_quantity: Callable[[str], quantities.NumberReader | None],
+    find_reader: Callable[[str], quantities.NumberReader | None],
     create: Callable[[dict[str, Any]], Any],
 ) -> list[Any]:
     """Create the object of the k-th table, or several for lists or ranges."""
     axes: dict[str, Any] = {}
     for key, value in entries.items():
         with tables.locating_errors(table, key=key, occurrence=k):
-            quantity = None if isinstance(value, bool) else find_quantity(key)
-            axes[key] = [value] if quantity is None else quantities.read_axis(value, key, quantity)
+            reader = None if isinstance(value, bool) else find_reader(key)
+            axes[key] = [value] if reader is None else quantities.read_axis(value, key, reader)
     with tables.locating_errors(table, occurrence=k):
         return [create(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())]
 
@@ -234,8 +242,8 @@ def _create_forces(tables: Tables, name: str, k: int) -> list[Any]:
     table = f"blocks.{name}s"
 
     def create_force(values: dict[str, Any]) -> Any:
-        check_parameters(FORCES[name], values, f"[[{table}]]")
-        return FORCES[name](**values)
+        check_parameters(FORCE_RESTRAINTS[name], values, f"[[{table}]]")
+        return FORCE_RESTRAINTS[name](**values)
 
     return _create_objects(tables, table, k, tables.table(table, k), find_reader, create_force)
 
@@ -244,7 +252,7 @@ def _create_pulses(tables: Tables, k: int) -> list[Motion]:
     entries, table = dict(tables.table("motions.pulses", k)), "motions.pulses"
     with tables.locating_errors(table, key="family", occurrence=k):
         family = find_family(str(entries.pop("family", "")))
-    return _create_objects(tables, table, k, entries, family.quantity, family.create_motion)
+    return _create_objects(tables, table, k, entries, family.find_reader, family.create_motion)
 
 
 def _create_stochastic_motions(tables: Tables, k: int) -> list[Motion]:
@@ -253,7 +261,8 @@ def _create_stochastic_motions(tables: Tables, k: int) -> list[Motion]:
     def create(values: dict[str, Any]) -> tuple[Motion, ...]:
         return create_stochastic(values, f"[[{table}]]")
 
-    return [*itertools.chain(*_create_objects(tables, table, k, tables.table(table, k), STOCHASTIC.get, create))]
+    readers = STOCHASTIC_READERS.get
+    return [*itertools.chain(*_create_objects(tables, table, k, tables.table(table, k), readers, create))]
 
 
 def _read_scales(tables: Tables) -> Scales:
@@ -311,7 +320,7 @@ def _load_motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[st
 
 
 #: Keys of [motions] that also apply to pairs.
-_READING: Final = ("dt", "units", "baseline", "highpass")
+_READING_OPTIONS: Final = ("dt", "units", "baseline", "highpass")
 
 
 def _load_pairs(tables: Tables, paths: list[str]) -> list[Motion]:
@@ -320,7 +329,7 @@ def _load_pairs(tables: Tables, paths: list[str]) -> list[Motion]:
     if "channel" in entries or entries.get("vertical", OWN) != OWN:
         message = f'with pairs, {{}} is not allowed, and {{}} must be "{OWN}": the vertical component of the station'
         raise tables.create_error("motions", "pairs", message, "channel", "vertical")
-    options = {name: entries[name] for name in _READING if name in entries}
+    options = {name: entries[name] for name in _READING_OPTIONS if name in entries}
     with tables.locating_record_errors(paths[0] if paths else ""):
         keep_going = entries.get("skip_unreadable", False)
         return [*records.load_pairs(paths, vertical="vertical" in entries, keep_going=keep_going, **options)]
@@ -328,14 +337,14 @@ def _load_pairs(tables: Tables, paths: list[str]) -> list[Motion]:
 
 def _load_record(tables: Tables, path: str, *, several: bool) -> Motion:
     entries = tables.table("motions")
-    metadata = {name: entries[name] for name in _READING if name in entries}
+    metadata = {name: entries[name] for name in _READING_OPTIONS if name in entries}
     if "channel" in entries:
         metadata["channel"] = str(entries["channel"])
     if "vertical" in entries:  # a file beside the study file, or any other name
         sibling = str(tables.file.parent / entries["vertical"])
         metadata["vertical"] = sibling if path_exists(sibling) else entries["vertical"]
     motion = load_motion(path, **metadata, several=several)
-    for sentence in motion_notes(motion):
+    for sentence in list_motion_notes(motion):
         note(f"{path}: {sentence}")
     return motion
 

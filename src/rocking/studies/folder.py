@@ -100,7 +100,7 @@ class Store:
         if changed:
             parts = dict.fromkeys("/".join(name.split("/")[:2]) for name in changed)
             progress = f"{len(self.find_done())} of {format_count(len(self.grid), 'unit')} done"
-            message = f"the folder contains a study of other inputs ({_list_some(parts)} changed), {progress}"
+            message = f"the folder contains a study of other inputs ({_format_some(parts)} changed), {progress}"
             message += ": create this study elsewhere, or remove the other one"
             raise StudyError(message, path=str(self.folder))
 
@@ -166,11 +166,11 @@ def require_empty(path: str | Path) -> None:
     folder = check_folder(path)
     names = sorted({entry.name for entry in folder.glob("[!.]*")} - {"lock"})
     if names:
-        message = f"the folder contains no study, but {_list_some(names)}: choose a new or empty folder"
+        message = f"the folder contains no study, but {_format_some(names)}: choose a new or empty folder"
         raise StudyError(message, path=str(folder))
 
 
-def _list_some(names: Collection[str]) -> str:
+def _format_some(names: Collection[str]) -> str:
     return ", ".join([*names][:3]) + (" and more" if len(names) > 3 else "")
 
 

@@ -37,7 +37,7 @@ from rocking.block.body import Bodies
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers, select_evenly, split_range
 from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, format_some_rows, variable
+from rocking.core.result import DatasetResult, create_variable, format_some_rows
 from rocking.core.tables import (
     atomic_file,
     columns_to_frame,
@@ -193,19 +193,19 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
         raise OptionError("critical scales require at least two scales, in increasing order")
     store.require_complete()
     names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
-    holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
+    has_outcome, is_known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
     for part in split_range(len(product.motions), store.grid.unit_shape[0]):
         outcomes = _read_selection(store, names, True, (part, _ALL, _ALL, _ALL))
         unfinished, stopped, overturned, completes, rests, rests_by_rounding = (values != 0.0 for values in outcomes)
-        holds[part], known[part] = overturned, ~(unfinished | stopped)
+        has_outcome[part], is_known[part] = overturned, ~(unfinished | stopped)
         if outcome == "complete_chattering":
-            holds[part], known[part] = completes, (known[part] | rests) & ~rests_by_rounding
+            has_outcome[part], is_known[part] = completes, (is_known[part] | rests) & ~rests_by_rounding
     # Unknown outcomes inherit the last known one below, so that no change is lost.
     below = np.zeros(store.grid.shape, np.int64)  # index of that scale; -1 if no outcome is known so far
     for k in range(product.scales.count):
-        below[:, k] = np.where(known[:, k], k, below[:, k - 1] if k else -1)
-        np.copyto(holds[:, k], holds[:, k - 1], where=~known[:, k])
-    changed = (holds[:, 1:] != holds[:, :-1]) & (below[:, :-1] >= 0)
+        below[:, k] = np.where(is_known[:, k], k, below[:, k - 1] if k else -1)
+        np.copyto(has_outcome[:, k], has_outcome[:, k - 1], where=~is_known[:, k])
+    changed = (has_outcome[:, 1:] != has_outcome[:, :-1]) & (below[:, :-1] >= 0)
     motion, polarity, block, scale = np.nonzero(changed.transpose(0, 2, 3, 1))
     low = below[motion, scale, polarity, block]
     dataset, attributes = _add_records(store, create_dataset(product, {})), product.scales.attributes
@@ -214,10 +214,10 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
         name, meaning = ("completes", "whether chattering is complete at the scale above, and not below")
     unit = attributes.pop("units")
     variables = {
-        "low": variable("change", levels[low], "scale below the change", unit),
-        "high": variable("change", levels[scale + 1], "scale above the change", unit),
-        name: variable("change", holds[motion, scale + 1, polarity, block], meaning),
-        "known": variable("change", low == scale, "whether the outcomes of all simulations are known"),
+        "low": create_variable("change", levels[low], "scale below the change", unit),
+        "high": create_variable("change", levels[scale + 1], "scale above the change", unit),
+        name: create_variable("change", has_outcome[motion, scale + 1, polarity, block], meaning),
+        "known": create_variable("change", low == scale, "whether the outcomes of all simulations are known"),
     }
     motions = {name: values for name, values in dataset.coords.items() if values.dims == ("motion",)}
     coordinates: dict[Any, Any] = {name: ("change", values.values[motion]) for name, values in motions.items()}
@@ -401,8 +401,8 @@ def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
             bar.advance(blocks.stop - blocks.start)
     meaning = "peak rotation over the slenderness, infinite where that share overturns"
     variables = {
-        "fractile_over_alpha": variable(("fractile", "scale", "block"), values, meaning, "1"),
-        "overturned_share": variable(("scale", "block"), overturned, unit="1"),
+        "fractile_over_alpha": create_variable(("fractile", "scale", "block"), values, meaning, "1"),
+        "overturned_share": create_variable(("scale", "block"), overturned, unit="1"),
     }
     coordinates = {"fractile": shares, "scale": ("scale", scales.values, scales.attributes)}
     text = f"fractiles of peak rotation over slenderness, {format_count(len(product.motions), 'motion')}"
@@ -456,9 +456,9 @@ def fit_pooled_fragility(
     return Fragility(
         *(tuple(curves), measure, text, find_single_block(bodies), product.model),
         outcomes=None,
-        one_way=product.polarity != "both" and not bodies.is_symmetric,
-        with_vertical=bool(collect_verticals(product.motions)),
-        several_blocks=bool(np.count_nonzero(shares) > 1),
+        is_one_way=product.polarity != "both" and not bodies.is_symmetric,
+        includes_vertical=bool(collect_verticals(product.motions)),
+        has_several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
         missing=describe_missing(missing),
     )
@@ -529,8 +529,8 @@ def fit_block_fragilities(
     variables = {}
     for name, values in estimates.items():
         unit = measure.units if name.startswith("median") else "1"
-        variables[name] = variable(dims, values, _CURVE_VARIABLES[name], unit)
-    variables["fault"] = variable(dims, faults.astype(str), "why there is no curve")
+        variables[name] = create_variable(dims, values, _CURVE_VARIABLES[name], unit)
+    variables["fault"] = create_variable(dims, faults.astype(str), "why there is no curve")
     coordinates = {"limit_state": list(limits), **body_coordinates(bodies)}
     return BlockTable(xr.Dataset(variables, coordinates, attributes))
 

@@ -31,7 +31,7 @@ from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.core.progress import Progress
 from rocking.core.tables import format_count, write_netcdf
-from rocking.core.threads import count_cores, thread_count
+from rocking.core.threads import choose_thread_count, count_cores
 from rocking.engine.schemes import ChatteringScheme
 from rocking.errors import OptionError, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
@@ -73,7 +73,7 @@ class Status:
     >>> import rocking, tempfile
     >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
     >>> status = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0]).status
-    >>> status.done, status.units, status.complete
+    >>> status.done, status.units, status.is_complete
     (0, 2, False)
     """
 
@@ -82,7 +82,7 @@ class Status:
     simulations: int
 
     @property
-    def complete(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether every unit is done."""
         return self.done == self.units
 
@@ -525,9 +525,9 @@ def _catch_sigterm() -> Iterator[threading.Event]:
 def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[bytes]], Callable[[], int]]]:
     """Yield functions that submit a unit and count the workers; errors stop the threads."""
     if executor is None:
-        cancelled, threads = threading.Event(), ThreadPoolExecutor(thread_count())
+        cancelled, threads = threading.Event(), ThreadPoolExecutor(choose_thread_count())
         try:
-            yield lambda unit_input: threads.submit(compute_unit, unit_input, cancelled), thread_count
+            yield lambda unit_input: threads.submit(compute_unit, unit_input, cancelled), choose_thread_count
         finally:
             cancelled.set()
             threads.shutdown(cancel_futures=True)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.core.arrays import Floats, Integers
-from rocking.kernels.certificate import Bounds, bracket_geometrically
+from rocking.kernels.certificate import RestoringBounds, bracket_geometrically
 from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.remaining import ImpactSide, estimate_remaining_time
 from rocking.kernels.sine import SequenceStatus
@@ -98,8 +98,8 @@ def bracket_remaining_phase(entry: State, window: float, delta: float, eta: floa
     rate = (D + window * math.sqrt((1.0 - P) * (1.0 - P) + D * D)) * (1.0 + _PHASE_ROUNDING)
     low = P * (1.0 - _PHASE_ROUNDING)
     high = (P + window * rate) * (1.0 + _PHASE_ROUNDING)
-    second = Bounds(delta, 2.0 - high, 2.0 - low, high - low, rate, 0.0)
-    first = Bounds(delta, low, high, high - low, rate, 0.0)
+    second = RestoringBounds(delta, 2.0 - high, 2.0 - low, high - low, rate, 0.0)
+    first = RestoringBounds(delta, low, high, high - low, rate, 0.0)
     return bracket_geometrically(V, second, first, (eta, eta), (eta, eta))
 
 
@@ -118,7 +118,9 @@ MIN_MOVING_SPEED: Final = 1e-120
 _MAX_PAIRS: Final = 5_000_000
 
 #: Resolved impact: phase since the previous one, speed before and after.
-IMPACT: Final = np.dtype((np.record, [("interval", np.float64), ("before", np.float64), ("after", np.float64)]))
+RESOLVED_IMPACT: Final = np.dtype(
+    (np.record, [("interval", np.float64), ("before", np.float64), ("after", np.float64)])
+)
 
 
 #: Amplitudes, frequencies and coefficients of restitution.
