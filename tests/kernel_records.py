@@ -48,13 +48,13 @@ def rocking_block(
 ) -> Record:
     p, alpha = np.array(p, dtype=float), np.array(alpha, dtype=float)
     return state.create_record(
-        state.BLOCK,
+        state.BLOCK_DTYPE,
         stiffness=p * p,
         slenderness=alpha,
         sine=np.sin(alpha),
         cosine=np.cos(alpha),
         threshold=np.tan(alpha) if nonlinear else alpha,
-        threshold_slope=p * p * np.cos(alpha) if nonlinear else p * p,
+        restoring_gain=p * p * np.cos(alpha) if nonlinear else p * p,
         restitution=e,
         rest_limit=limit,
         next_side=(1, 0),
@@ -65,10 +65,10 @@ def rocking_block(
 def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Record:
     """Something that bounces on one side: u'' = stiffness u - gain (threshold + a), and back with e times the speed."""
     return state.create_record(
-        state.BLOCK,
+        state.BLOCK_DTYPE,
         stiffness=stiffness,
         threshold=(threshold, math.inf),
-        threshold_slope=gain,
+        restoring_gain=gain,
         restitution=e,
         next_side=(0, 0),
         overturn_angle=math.inf,
@@ -84,7 +84,7 @@ def rules_for(
     writes_tables: bool = True,
 ) -> Record:
     return state.create_record(
-        state.SETTINGS,
+        state.SETTINGS_DTYPE,
         nonlinear=nonlinear,
         rest_rule=rest_rule,
         tolerance=tolerance,

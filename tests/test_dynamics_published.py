@@ -148,7 +148,7 @@ def test_asymmetric_orbits_double_where_their_two_equations_say(ratio, restituti
     amplitude, phase, speed = exact.flip
     assert amplitude > exact.amplitude(exact.breaking)
     strobe = dynamics.stroboscopic_map(*family(amplitude / unit), model="linear")
-    state = strobe.from_impacts([phase / (ratio * P), speed])
+    state = strobe.convert_impacts([phase / (ratio * P), speed])
     after, change = strobe.derivative(state, m)
     assert after == pytest.approx(state, abs=1e-10)
     assert np.linalg.det(change + np.eye(2)) == pytest.approx(0.0, abs=1e-8)

@@ -64,7 +64,7 @@ CALLS = [
     (lambda: strobe(BALL, TABLE, model="nonlinear"), OptionError, "linear"),
     (lambda: strobe(BALL, TABLE)([0.0, -1.0]), OptionError, "^states must not point into a stop"),
     (lambda: strobe(BALL, TABLE)([-1.0, 0.0]), OptionError, "^states must be at least 0 m, in front of"),
-    (lambda: strobe(BALL, TABLE).from_impacts([0.0, -1.0]), OptionError, "away"),
+    (lambda: strobe(BALL, TABLE).convert_impacts([0.0, -1.0]), OptionError, "away"),
     (lambda: orbits(BALL, TABLE, starts=[[math.nan, 0.0]]), OptionError, "starts must be finite"),
     (lambda: orbits(BALL, TABLE, starts=[]), OptionError, "starts must contain pairs"),
     (lambda: orbits(BALL, TABLE, starts=[[-1.0, 0.0]]), OptionError, "starts must be at least 0 m"),

@@ -124,7 +124,7 @@ def stepped(
 
 def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: float = 1.0) -> tuple[Records, Records]:
     """A group of blocks in motion: steps from next to nothing to one over p, rotations and speeds of all sizes."""
-    blocks, states = state.create_records(LANE_COUNT, state.BLOCK), state.create_states(LANE_COUNT, 0)
+    blocks, states = state.create_records(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
     width = 10.0 ** random.uniform(-9.0, -1.4 if nonlinear else 0.0, LANE_COUNT)
     for k in range(LANE_COUNT):
         p, alpha = width[k] / h, 10.0 ** random.uniform(-2.0, 0.0)
@@ -143,7 +143,7 @@ def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: flo
 def linear_end(step: Step, row: tuple[float, float], t: float) -> tuple[mpmath.mpf, mpmath.mpf]:
     """Rotation and velocity in 60 digits."""
     side = int(step.start["side"])
-    lam, gain, threshold = (float(step.block[name][side]) for name in ("stiffness", "threshold_slope", "threshold"))
+    lam, gain, threshold = (float(step.block[name][side]) for name in ("stiffness", "restoring_gain", "threshold"))
     push = [(1 - 2 * side) * x for x in row]
     return after(System(lam, threshold, gain=gain), step.start["u"], step.start["v"], t, push)
 
@@ -172,7 +172,7 @@ def test_a_quiet_linear_step_is_exact(stiffness: float, late: float, rounds: flo
             quiet += 1
             u, v = linear_end(step, row, h * (1.0 + late))
             side = int(step.start["side"])
-            push = float(step.block["threshold_slope"][side]) * (
+            push = float(step.block["restoring_gain"][side]) * (
                 step.block["threshold"][side] + abs(row[0]) + abs(row[1]) * h
             )
             size = max(abs(step.start["u"]), abs(step.start["v"]) * h, abs(u), abs(v) * h, push * h * h)
@@ -226,7 +226,7 @@ def weighted_cases(
     weight = (random.uniform(low, high), random.normal() * swing)
     heaviest = max(1.0, abs(weight[0]), abs(sum(weight)))
     longest = substeps * (MAX_SUBSTEP if nonlinear else MAX_WEIGHTED_SUBSTEP) / math.sqrt(heaviest)
-    blocks, states = state.create_records(LANE_COUNT, state.BLOCK), state.create_states(LANE_COUNT, 0)
+    blocks, states = state.create_records(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
     for k in range(LANE_COUNT):
         p, alpha = longest * 10.0 ** random.choice([0.0, random.uniform(-9.0, 0.0)]), 10.0 ** random.uniform(-2.0, 0.0)
         blocks[k] = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
@@ -269,7 +269,7 @@ def test_a_quiet_step_is_exact_while_the_weight_changes(
 
 def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Records, Records]:
     """Steps with turning points: down to nearly nothing and up again, up to nearly the highest and down again."""
-    blocks, states = state.create_records(LANE_COUNT, state.BLOCK), state.create_states(LANE_COUNT, 0)
+    blocks, states = state.create_records(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
     for k in range(LANE_COUNT):
         alpha = 0.2
         p = random.uniform(0.05, 1.0) * (0.02 if nonlinear else 1.0) / h
@@ -322,7 +322,7 @@ P, ALPHA, H = 0.5, 0.2, 0.005
 
 
 def one(u: float, v: float, peak: float, *, nonlinear: bool = False) -> tuple[Records, Records]:
-    blocks, states = state.create_records(1, state.BLOCK), state.create_states(1, 0)
+    blocks, states = state.create_records(1, state.BLOCK_DTYPE), state.create_states(1, 0)
     blocks[0] = rocking_block((P, P), (ALPHA, ALPHA), nonlinear=nonlinear)
     states[0] = state_of(0, u, v, peak=peak)
     return blocks, states
@@ -382,7 +382,7 @@ def test_a_bulge_over_the_highest_so_far_between_two_ends_below_it_is_an_event(w
 def test_the_curvature_of_an_oscillator_may_be_largest_inside_a_step(up: float) -> None:
     """u = A cos(omega (t - h/2)) - c over a step of one radian: bulges by A (1 - cos(1/2))."""
     a, beyond = up, 1.0 - math.cos(0.5)
-    blocks, states = state.create_records(1, state.BLOCK), state.create_states(1, 0)
+    blocks, states = state.create_records(1, state.BLOCK_DTYPE), state.create_states(1, 0)
     for share, quiet in ((0.95, False), (1.06, True)):
         u = 1.0 if up > 0.0 else share * beyond
         pull = (a * math.cos(0.5) - u) / H**2

@@ -149,7 +149,7 @@ def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, colu
         assert table[size:].tobytes() == guard
         while ending == state.Ending.FULL:
             size *= 2
-            grown = state.create_records(max(size, 8) + 5, state.TABLE)
+            grown = state.create_records(max(size, 8) + 5, state.TABLE_DTYPE)
             grown.view(np.uint8)[:] = 0xA5
             grown[: len(table) - 5] = table[: len(table) - 5]
             size = max(size, 8)
@@ -205,7 +205,7 @@ def test_recording_or_not_gives_the_same_bits(nonlinear: bool, columns: int) -> 
         kept = run(ground, nonlinear=nonlinear)
         state_alone = run(ground, nonlinear=nonlinear, rows=0, keep=False)
         assert kept.ending == state_alone.ending
-        for name in state.STATE.names:
+        for name in state.STATE_DTYPE.names:
             if name not in ("nodes", "budget"):
                 assert kept.at[name] == state_alone.at[name], name
 

@@ -199,9 +199,9 @@ def test_the_variation_along_an_arc_is_the_derivative_by_what_is_changed(
         lift = random.uniform(-0.5, 0.5, degree + 1) / h ** np.arange(degree + 1.0) if weighted else np.zeros(1)
         block = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
         ground = in_units_of_g([0.0, 9.0], [push], vertical=[lift] if weighted else None)
-        trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.create_records(0, state.NODE_ROW))
-        node = state.create_record(state.NODE_ROW, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
-        work = state.create_record(state.VARIATION)
+        trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.create_records(0, state.NODE_DTYPE))
+        node = state.create_record(state.NODE_DTYPE, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
+        work = state.create_record(state.VARIATION_DTYPE)
         order = expand_variation(trail, create_scratch(), work, node, quantity, (du, dv, 0.0), h)
         name, _, of_side = quantity.name.partition("_")
         of_this = Quantity[name] if of_side in ("", ("PLUS", "MINUS")[side]) else Quantity.NOTHING

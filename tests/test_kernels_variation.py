@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
 
 def node_of(side: int, u: float, v: float, time: float = 0.0) -> Record:
-    return state.create_record(state.NODE_ROW, time=time, piece=0, offset=time, side=side, u=u, v=v)
+    return state.create_record(state.NODE_DTYPE, time=time, piece=0, offset=time, side=side, u=u, v=v)
 
 
 @pytest.mark.cases(fast=8)
@@ -51,7 +51,7 @@ def test_the_shift_of_the_rest_is_its_derivative_by_what_is_changed(model: str, 
     block = block_of(problem)
     dv = faster + compute_restoring(ground_of(problem), block, side, 0, start) * shift
     trail = Trail(
-        ground_of(problem), block, rules_for(nonlinear=model == "nonlinear"), state.create_records(0, state.NODE_ROW)
+        ground_of(problem), block, rules_for(nonlinear=model == "nonlinear"), state.create_records(0, state.NODE_DTYPE)
     )
     # What happens to the speed at the impact itself is in dv.
     node, later = node_of(side, 0.0, v, start), node_of(state.AT_REST, 0.0, 0.0, start + 1e-4)

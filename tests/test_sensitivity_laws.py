@@ -33,7 +33,7 @@ BODIES = {
 BY_SIDE = tuple(f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus"))
 
 #: What is proportional to p^2 where every moment over the moment of inertia is.
-WITH_P = ("stiffness", "threshold_slope", "prestress", "base_prestress", "spring", "damping", "tendon_stiffness")
+WITH_P = ("stiffness", "restoring_gain", "prestress", "base_prestress", "spring", "damping", "tendon_stiffness")
 
 
 def change(made, name, nonlinear, strength):
@@ -47,14 +47,14 @@ def change(made, name, nonlinear, strength):
         for field in ("restitution", "min_restitution", "restitution_slope"):
             made[field][:, j] *= 1.0 + strength
     elif np.isfinite(made["threshold"][0, j]):
-        at_zero = made["restraint_threshold"][:, j] * made["threshold_slope"][:, j]
+        at_zero = made["restraint_threshold"][:, j] * made["restoring_gain"][:, j]
         added = [made["stiffness"][:, j] * made[f"added_{field}"][:, j] for field in ("weight", "push")]
         before = [made[field][:, j].copy() for field in ("sine", "cosine")]
         made["slenderness"][:, j] *= 1.0 + strength
         alpha = made["slenderness"][:, j]
         if nonlinear:
             made["sine"][:, j], made["cosine"][:, j] = np.sin(alpha), np.cos(alpha)
-            made["threshold"][:, j], made["threshold_slope"][:, j] = (
+            made["threshold"][:, j], made["restoring_gain"][:, j] = (
                 np.tan(alpha),
                 made["stiffness"][:, j] * np.cos(alpha),
             )
@@ -63,7 +63,7 @@ def change(made, name, nonlinear, strength):
         else:
             at_zero += added[0] * (alpha - made["threshold"][:, j])
             made["threshold"][:, j] = alpha
-        made["restraint_threshold"][:, j] = at_zero / made["threshold_slope"][:, j]
+        made["restraint_threshold"][:, j] = at_zero / made["restoring_gain"][:, j]
     return made
 
 

@@ -315,9 +315,9 @@ def test_results_are_the_same_in_every_browser(html):
 
 def test_layouts_are_those_of_the_records(built):
     layouts = standalone.describe_computation([])["layouts"]
-    assert layouts["state"]["size"] == state.STATE.itemsize
+    assert layouts["state"]["size"] == state.STATE_DTYPE.itemsize
     for name, (offset, _, count) in layouts["block"]["fields"].items():
-        field, start = state.BLOCK.fields[name][:2]
+        field, start = state.BLOCK_DTYPE.fields[name][:2]
         assert (start, field.itemsize) == (offset, count * field.itemsize // max(count, 1))
     offset, kind, count = layouts["table"]["fields"]["impact.speed_after"]
     table = state.create_table(1)

@@ -419,10 +419,10 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
         message = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MAX_CYCLES}, not {gamma}"
         raise MotionError(message, "gamma", value=gamma)
     breakpoints = np.linspace(0.0, gamma / frequency, _count_breakpoints(_PIECES_PER_CYCLE * (gamma + 1.0)))
-    turns, rest = multiply_exactly(frequency, _compute_midpoints(breakpoints))
-    carrier = _compute_angle(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
-    quotient, quotient_rest = divide_exactly(turns, rest, gamma)
-    envelope = _compute_angle(quotient, quotient_rest - 0.5, 0.0)
+    turns, low_part = multiply_exactly(frequency, _compute_midpoints(breakpoints))
+    carrier = _compute_angle(turns, low_part - 0.5 * math.fmod(gamma, 2.0), phase)
+    quotient, quotient_low_part = divide_exactly(turns, low_part, gamma)
+    envelope = _compute_angle(quotient, quotient_low_part - 0.5, 0.0)
     # The product of cosines is the sum of three with a half, a quarter and a quarter of the amplitude.
     rate, shift = 2.0 * math.pi * frequency, 1.0 / gamma
     series = (
@@ -444,9 +444,9 @@ class _Angle(NamedTuple):
     cosine: Floats
 
 
-def _compute_angle(turns: Floats, rest: Floats, phase: float) -> _Angle:
-    """Compute ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle."""
-    fraction = (turns - np.rint(turns)) + rest
+def _compute_angle(turns: Floats, low_part: Floats, phase: float) -> _Angle:
+    """Compute ``2 pi (turns + low_part) + phase`` without the rounding of a large angle; `low_part` is small."""
+    fraction = (turns - np.rint(turns)) + low_part
     quarters = np.rint(4.0 * fraction)
     angle = _Angle(*piecewise.sine_cosine_from_quarters(quarters, 2.0 * np.pi * (fraction - 0.25 * quarters)))
     return _add_angles(angle, _Angle(np.sin(phase), np.cos(phase)), 1.0)
@@ -477,8 +477,8 @@ def _shift_to_starts(breakpoints: Floats, midpoint_series: Floats) -> Floats:
 
 def _compute_sine_pieces(breakpoints: Floats, frequency: float, phase: float) -> Floats:
     """Compute the coefficients of ``sin(2 pi frequency t + phase)`` on each piece."""
-    turns, rest = multiply_exactly(frequency, _compute_midpoints(breakpoints))
-    angle = _compute_angle(turns, rest, phase)
+    turns, low_part = multiply_exactly(frequency, _compute_midpoints(breakpoints))
+    angle = _compute_angle(turns, low_part, phase)
     return _shift_to_starts(breakpoints, _compute_sine_series(angle, 2.0 * math.pi * frequency))
 
 

@@ -314,14 +314,14 @@ class Blocks:
         return share * self.p * self.alpha
 
     def create_kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
-        """Return records for kernels (`kernels.state.BLOCK`), shape (n,)."""
+        """Return records for kernels (`kernels.state.BLOCK_DTYPE`), shape (n,)."""
         p, alpha = self.p, self.alpha
-        records = state.create_records(len(self), state.BLOCK)
+        records = state.create_records(len(self), state.BLOCK_DTYPE)
         stiffness, cosine = p * p, np.cos(alpha)
         records["stiffness"], records["slenderness"] = stiffness, alpha
         records["sine"], records["cosine"] = np.sin(alpha), cosine
         records["threshold"] = alpha if model == "linear" else np.tan(alpha)
-        records["threshold_slope"] = stiffness if model == "linear" else stiffness * cosine
+        records["restoring_gain"] = stiffness if model == "linear" else stiffness * cosine
         records["restitution"] = self.restitution
         records["rest_limit"] = thresholds
         records["next_side"] = (1, 0)

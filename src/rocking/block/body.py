@@ -1,7 +1,7 @@
 """Protocols of bodies with one coordinate, for example blocks.
 
-Between impacts (see `kernels.state.BLOCK`), u'' = lambda u - gain (threshold + side a/g), with any stiffness lambda,
-with or without damping, with one or two sides, or between two stops. Everything above the kernels uses only these
+Between impacts (see `kernels.state.BLOCK_DTYPE`), u'' = lambda u - gain (threshold + side a/g), with any stiffness
+lambda, with or without damping, with one or two sides, or between two stops. Everything above the kernels uses only these
 protocols.
 """
 
@@ -162,7 +162,7 @@ class Bodies(Protocol):
         """Return a share of the characteristic speed of each side, shape (n, 2): p alpha for a block, rad/s."""
 
     def create_kernel_records(self, model: Model, thresholds: Floats) -> Records:
-        """Return records for kernels (`kernels.state.BLOCK`), with thresholds of a chattering scheme, shape (n, 2)."""
+        """Return records for kernels (`kernels.state.BLOCK_DTYPE`); ``thresholds`` of a scheme have shape (n, 2)."""
 
 
 class BodiesFactory(Protocol):

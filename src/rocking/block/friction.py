@@ -133,10 +133,10 @@ def _find_radii(blocks: Blocks) -> Floats:
         differs = np.any((blocks.p[:, :1] != blocks.p[:, 1:]) | (blocks.alpha[:, :1] != blocks.alpha[:, 1:]), axis=1)
         if not np.any(differs):
             return radii
-        depth = np.full(len(blocks), np.inf)
-        depth[differs] = compute_rigid_bodies(blocks.p[differs], blocks.alpha[differs])[1]
-        _raise_if_any(np.isnan(depth), _MISSING)
-        radii[differs] = blocks.gravity * depth[differs, None] / np.cos(blocks.alpha[differs])
+        height_over_gravity = np.full(len(blocks), np.inf)
+        height_over_gravity[differs] = compute_rigid_bodies(blocks.p[differs], blocks.alpha[differs])[1]
+        _raise_if_any(np.isnan(height_over_gravity), _MISSING)
+        radii[differs] = blocks.gravity * height_over_gravity[differs, None] / np.cos(blocks.alpha[differs])
     heights = radii * np.cos(blocks.alpha)
     squares = blocks.gravity * radii / blocks.p**2 - radii**2
     for sizes in (heights, squares):

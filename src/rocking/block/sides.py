@@ -318,15 +318,15 @@ def compute_rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = (quotient[:, 0] - quotient[:, 1]) / (tangent[:, 0] - tangent[:, 1])
         factors: Floats = 1.0 - np.sin(alpha[:, ::-1]) * p[:, ::-1] ** 2 * slope[:, None]
-        depth = slope / tangent.sum(axis=1)
+        height_over_gravity = slope / tangent.sum(axis=1)
     difference, bound = _compare_sides(p, cosine)
     factors[difference >= bound] = np.nan
     equal = np.all(
         [abs(values[:, 0] - values[:, 1]) <= _EQUALITY_TOLERANCE * values[:, 0] for values in (p, alpha)], axis=0
     )
     factors[equal] = 1.0 - 1.5 * np.sin(alpha[equal]) ** 2
-    depth[equal] = np.nan
-    return factors, depth
+    height_over_gravity[equal] = np.nan
+    return factors, height_over_gravity
 
 
 def _compare_sides(p: Floats, cosine: Floats) -> tuple[Floats, Floats]:

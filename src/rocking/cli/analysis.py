@@ -18,11 +18,11 @@ from rocking.analysis.survey import create_file_stem
 from rocking.block import Block, Blocks
 from rocking.chattering.report import chattering_report, critical_report
 from rocking.cli.options import (
-    BLOCK,
+    BLOCK_OPTIONS,
     INTEGER,
-    MEASURE,
-    MODEL,
-    RECORDS,
+    MEASURE_OPTIONS,
+    MODEL_OPTIONS,
+    RECORD_OPTIONS,
     RISK,
     BlockOptions,
     ClusterOptions,
@@ -62,8 +62,8 @@ def spectrum(
     ensemble: Path | None = None,
     fractiles: str = "0.16,0.5,0.84",
     against: Abscissa = "p",
-    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
+    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
@@ -123,8 +123,8 @@ def map(
     gamma: float | None = None,
     kind: str | None = None,
     rtol: float = 1e-6,
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
-    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
+    block: Annotated[BlockOptions, BLOCK_OPTIONS] = BlockOptions(),
+    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Map the outcomes of a pulse over its amplitude and frequency, with refined boundaries.
@@ -166,10 +166,10 @@ def map(
 def ida(
     *names: Names,
     rtol: float = 1e-6,
-    measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    block: Annotated[ObjectOptions, BLOCK] = ObjectOptions(),
-    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
-    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
+    measure: Annotated[MeasureOptions, MEASURE_OPTIONS] = MeasureOptions(),
+    block: Annotated[ObjectOptions, BLOCK_OPTIONS] = ObjectOptions(),
+    motion: Annotated[UnscaledOptions, RECORD_OPTIONS] = UnscaledOptions(),
+    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
@@ -201,9 +201,9 @@ def measures(
     damping: float = 0.05,
     also: str | None = None,
     clusters: Annotated[ClusterOptions, RISK] = ClusterOptions(),
-    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
-    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
+    motion: Annotated[UnscaledOptions, RECORD_OPTIONS] = UnscaledOptions(),
+    model: Annotated[ModelOptions, MODEL_OPTIONS] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compare intensity measures by the scatter of the intensities at which motions first overturn a block.

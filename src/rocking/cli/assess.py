@@ -13,9 +13,9 @@ from cyclopts import Parameter
 from rocking.assessment.assess import assess as assess_objects
 from rocking.cli.options import (
     INTEGER,
-    MEASURE,
-    MODEL,
-    RECORDS,
+    MEASURE_OPTIONS,
+    MODEL_OPTIONS,
+    RECORD_OPTIONS,
     RISK,
     MeasureOptions,
     MotionOptions,
@@ -35,9 +35,9 @@ def assess(
     samples: Annotated[int, INTEGER] = 50,
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "both",
     risk: Annotated[RiskOptions, RISK] = RiskOptions(),
-    measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
+    measure: Annotated[MeasureOptions, MEASURE_OPTIONS] = MeasureOptions(),
+    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Assess which objects of a table overturn, at which intensity, and how often at a site, in one report.

@@ -17,10 +17,10 @@ from rocking.calibration.tables import MeasuredHistory, read_calibration, read_t
 from rocking.calibration.validate import ShakeTest
 from rocking.calibration.validate import validate as run_validation
 from rocking.cli.options import (
-    BLOCK,
+    BLOCK_OPTIONS,
     INTEGER,
-    MODEL,
-    RECORDS,
+    MODEL_OPTIONS,
+    RECORD_OPTIONS,
     EnsembleOptions,
     FileOptions,
     ModelOptions,
@@ -51,7 +51,7 @@ def calibrate(
     motion: str | None = None,
     initial_rotation: str | None = None,
     seed: Annotated[int, INTEGER] = 0,
-    file: Annotated[ScaledPulseOptions, RECORDS] = ScaledPulseOptions(),
+    file: Annotated[ScaledPulseOptions, RECORD_OPTIONS] = ScaledPulseOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Estimate the block from observed outcomes (overturned or not) or from a measured rotation history.
@@ -158,9 +158,9 @@ def validate(
     outlier_probability: float | None = None,
     bins: Annotated[int, INTEGER] = 10,
     seed: Annotated[int, INTEGER] = 0,
-    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
-    file: Annotated[FileOptions, RECORDS] = FileOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
+    file: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
+    model: Annotated[ModelOptions, MODEL_OPTIONS] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compare the predictions of a block, or of an ensemble from a calibration, with observed outcomes of tests.

@@ -53,10 +53,10 @@ Item = TypeVar("Item")
 OptionsClass = TypeVar("OptionsClass", bound="InputOptions")
 
 #: Spread over the options of a command, each group under its own heading in the help.
-MEASURE: Final = Parameter(name="*", group=Group("Intensity", sort_key=0))
-BLOCK: Final = Parameter(name="*", group=Group("Block", sort_key=1))
-RECORDS: Final = Parameter(name="*", group=Group("Records", sort_key=2))
-MODEL: Final = Parameter(name="*", group=Group("Model", sort_key=3))
+MEASURE_OPTIONS: Final = Parameter(name="*", group=Group("Intensity", sort_key=0))
+BLOCK_OPTIONS: Final = Parameter(name="*", group=Group("Block", sort_key=1))
+RECORD_OPTIONS: Final = Parameter(name="*", group=Group("Records", sort_key=2))
+MODEL_OPTIONS: Final = Parameter(name="*", group=Group("Model", sort_key=3))
 
 #: Records as arguments, including a lone hyphen.
 Names = Annotated[

@@ -10,7 +10,7 @@ from typing import Annotated, Final
 
 from cyclopts import App, Parameter
 
-from rocking.cli.options import INTEGER, MEASURE, IntensityOptions, parse_limit_states
+from rocking.cli.options import INTEGER, MEASURE_OPTIONS, IntensityOptions, parse_limit_states
 from rocking.cli.output import (
     OUTPUT,
     PrintOptions,
@@ -196,7 +196,7 @@ def report(
     fractiles: str = "0.16,0.5,0.84",
     component: ComponentName = "own",
     larger: Annotated[bool, Parameter(negative="")] = False,
-    measure: Annotated[IntensityOptions, MEASURE] = IntensityOptions(),
+    measure: Annotated[IntensityOptions, MEASURE_OPTIONS] = IntensityOptions(),
     output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
 ) -> None:
     """Fit a fragility curve to the outcomes of each block and compute its spectrum: figures, tables, result.json.

@@ -191,13 +191,13 @@ class LinearBodies:
 
     def create_kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
         _require_linear_model(model)
-        records = state.create_records(len(self), state.BLOCK)
+        records = state.create_records(len(self), state.BLOCK_DTYPE)
         equations = np.array([body.equation for body in self.members])
         two_stops = np.isfinite(equations[:, 4])
         records["stiffness"] = equations[:, :1]
         records["damping"] = equations[:, 1:2]
         records["restrained"] = equations[:, 1] > 0.0
-        records["threshold_slope"] = self.gravity
+        records["restoring_gain"] = self.gravity
         records["threshold"] = np.array([body.uplift_thresholds() for body in self.members]) / self.gravity
         records["restitution"] = self.restitution
         records["two_stops"] = two_stops

@@ -98,7 +98,7 @@ class PeriodicallyForcedBody:
     def _create_derivative_arguments(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
         """Create the problem and the workspace of the derivative kernels."""
         trail = Trail(self._ground, self._body_records[0], self._copy_settings(stores_nodes=True), NO_NODES)
-        return trail, state.create_scratch(), state.create_record(state.VARIATION), state.create_table(512)
+        return trail, state.create_scratch(), state.create_record(state.VARIATION_DTYPE), state.create_table(512)
 
     def _check_starts(self, starts: ArrayLike, name: str) -> Floats:
         """Return initial states, shape (n, 2), after checking that they are finite and in front of the stops."""
@@ -181,7 +181,7 @@ def compute_scale(forced_body: PeriodicallyForcedBody) -> StateScale:
     if not isinstance(forced_body.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
         return StateScale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
-    pull = float(np.max(np.abs(record["threshold_slope"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
+    pull = float(np.max(np.abs(record["restoring_gain"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
     speed = period * max(estimate_mean_acceleration(forced_body.motion), pull, 1e-300)
     rate = math.sqrt(abs(float(record["stiffness"][0])))
     if record["two_stops"]:
@@ -313,7 +313,7 @@ class StroboscopicMap(PeriodicallyForcedBody):
         final_states[ended] = product[ended] = np.nan
         return final_states.reshape(pairs.shape), product.reshape(*pairs.shape, 2)
 
-    def from_impacts(self, impacts: ArrayLike) -> Floats:
+    def convert_impacts(self, impacts: ArrayLike) -> Floats:
         """Return the states at the end of the period in which bodies leave impacts, shape (..., 2).
 
         An impact is a pair: time since the start of the period, s, and velocity after the impact. The sign of the

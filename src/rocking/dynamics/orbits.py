@@ -364,7 +364,7 @@ class _OrbitSearch:
         coordinates = 0.5 * (low + high) + 0.5 * width * fractions if is_two_sided else low + width * (1.0 + fractions)
         between = np.stack(np.meshgrid(coordinates, max_speed * fractions), axis=-1).reshape(-1, 2)
         rests = np.array([[stop, 0.0] for stop in {low, high}])
-        states = np.concatenate([rests, between, strobe.from_impacts(impacts)])
+        states = np.concatenate([rests, between, strobe.convert_impacts(impacts)])
         states = states[self._are_admissible(states)]
         later = strobe(states[::_LATER_STRIDE], _LATER_PERIOD_COUNT * self.n_periods)
         return np.concatenate([states, later[self._are_admissible(later)]])
@@ -380,7 +380,7 @@ class _OrbitSearch:
         if not math.isinf(min(strobe.body.balance)):
             return min(speed, _MAX_BLOCK_SPEED * self.scale.velocity + push)
         if float(record["stiffness"][0]) == 0.0:  # the flight time of a ball is proportional to its speed
-            pull = float(record["threshold_slope"][0] * record["threshold"][0])
+            pull = float(record["restoring_gain"][0] * record["threshold"][0])
             return min(speed, 0.5 * self.n_periods * strobe.forcing_period * pull + push)
         return speed
 

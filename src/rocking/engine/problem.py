@@ -217,7 +217,7 @@ def build_settings(
         duration = checks.positive(duration, "duration", OptionError, "s")
     stop = math.inf if duration is None else duration
     fields = (model == "nonlinear", scheme.code, scheme.bracket_width, stop, duration is None, writes_tables)
-    return state.expose_fields(np.array([fields], dtype=state.SETTINGS))[0]
+    return state.expose_fields(np.array([fields], dtype=state.SETTINGS_DTYPE))[0]
 
 
 @functools.lru_cache(maxsize=8)

@@ -154,8 +154,8 @@ def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
         "layouts": {
             name: _describe_layout(kind)
             for name, kind in (
-                ("block", state.BLOCK), ("settings", state.SETTINGS), ("state", state.STATE),
-                ("table", state.TABLE), ("scratch", state.SCRATCH), ("node", state.NODE_ROW),
+                ("block", state.BLOCK_DTYPE), ("settings", state.SETTINGS_DTYPE), ("state", state.STATE_DTYPE),
+                ("table", state.TABLE_DTYPE), ("scratch", state.SCRATCH_DTYPE), ("node", state.NODE_DTYPE),
             )
         },
         "templates": _build_templates(),

@@ -63,7 +63,7 @@ def adjoint(
     The derivatives are by u, v and plastic elongation at ``time`` after the node of a row; if infinite, at the end of
     its step, before an impact there. On return they refer to the start, and are 0 if the body has come to rest.
     Derivatives by the coefficients of piece k (units of g, horizontal first) are added to row k of ``out``, and
-    ``variation`` is scratch space (`state.VARIATION`). For two more numbers in ``change``, see `add_rounding`.
+    ``variation`` is scratch space (`state.VARIATION_DTYPE`). For two more numbers in ``change``, see `add_rounding`.
     """
     block, nodes = trail.block, trail.nodes
     number = count_impacts(nodes, row)
@@ -114,10 +114,10 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
     if has_vertical(ground):
         weight += 0.5 * ground.columns * sum_absolute_terms(select_vertical(ground), node.piece, end)[0]
     force = abs(block.threshold[side]) * weight + abs(block.restraint_threshold[side]) + push
-    force *= block.threshold_slope[side]
+    force *= block.restoring_gain[side]
     force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
     force = _STEP_ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
-    force += block.threshold_slope[side] * ground_error(ground)
+    force += block.restoring_gain[side] * ground_error(ground)
     change[3] += abs(change[0]) * (0.5 * _STEP_ROUNDING * (height + speed * t) + 0.5 * force * t * t)
     change[3] += abs(change[1]) * (0.5 * _STEP_ROUNDING * speed + force * t)
     change[3] += abs(change[0] * v + change[1] * w) * _STEP_ROUNDING * end
@@ -182,7 +182,7 @@ def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floa
             return AdjointEnd.START
         if not rate > 0.0:
             return AdjointEnd.TOUCHES_THRESHOLD
-        change[2] = vary_tendon_restoring(block, side, plastic_elongation, 1.0) / (block.threshold_slope[side] * rate)
+        change[2] = vary_tendon_restoring(block, side, plastic_elongation, 1.0) / (block.restoring_gain[side] * rate)
         add_instant(trail, next_node, (side_sign(side) / rate, block.threshold[side] / rate), out)
     elif next_node.side < 0:
         differentiate_rest_time(trail, node, plastic_elongation, change, out)
@@ -208,12 +208,12 @@ def differentiate_rest_time(trail: Trail, node: Record, plastic_elongation: floa
     by_speed = scale * (1.0 / g_i + e_i / g_j)
     by_g_i, by_g_j = -scale * node.v / (g_i * g_i), -scale * node.v * e_i / (g_j * g_j)
     by_time = 1.0 - by_speed * g_i  # by the shift of the impact
-    by_time += by_g_i * block.threshold_slope[i] * compute_push_rate(trail.ground, block, i, node.piece, node.offset)
-    by_time += by_g_j * block.threshold_slope[j] * compute_push_rate(trail.ground, block, j, node.piece, node.offset)
+    by_time += by_g_i * block.restoring_gain[i] * compute_push_rate(trail.ground, block, i, node.piece, node.offset)
+    by_time += by_g_j * block.restoring_gain[j] * compute_push_rate(trail.ground, block, j, node.piece, node.offset)
     change[0], change[1] = -by_time / node.v, by_speed
     change[2] = by_g_i * vary_tendon_restoring(block, i, plastic_elongation, 1.0)
     change[2] += by_g_j * vary_tendon_restoring(block, j, plastic_elongation, 1.0)
-    by_i, by_j = by_g_i * block.threshold_slope[i], by_g_j * block.threshold_slope[j]
+    by_i, by_j = by_g_i * block.restoring_gain[i], by_g_j * block.restoring_gain[j]
     push = by_i * side_sign(i) + by_j * side_sign(j)
     add_instant(trail, node, (push, by_i * block.threshold[i] + by_j * block.threshold[j]), out)
 
@@ -284,7 +284,7 @@ def propagate_through_arc(
         return
     x[0], x[1] = change[1], drag * change[1] - change[0]
     write_variation_coefficients(variation, -drag, order)
-    lam, gain, threshold = block.stiffness[node.side], block.threshold_slope[node.side], block.threshold[node.side]
+    lam, gain, threshold = block.stiffness[node.side], block.restoring_gain[node.side], block.threshold[node.side]
     m = variation.forcing
     for k in range(order - 1):  # times d u'' / d A, for the horizontal motion in the frame of the side
         m[k] = -gain * x[k]

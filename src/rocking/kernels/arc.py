@@ -33,7 +33,7 @@ def side_sign(side: int) -> float:
 def compute_restoring(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
     """Compute the restoring acceleration of a side at zero rotation."""
     threshold = block.threshold[side] * compute_weight(ground, piece, offset) + block.restraint_threshold[side]
-    return block.threshold_slope[side] * (threshold + side_sign(side) * compute_acceleration(ground, piece, offset))
+    return block.restoring_gain[side] * (threshold + side_sign(side) * compute_acceleration(ground, piece, offset))
 
 
 @inlined

@@ -374,7 +374,7 @@ def fit_restoring_parabola(block: Record, settings: Record, j: int, scratch: Rec
     ``scratch`` contains the ground acceleration and the weight about the impact.
     """
     A, W = scratch.ground, scratch.weight
-    sign, gain, threshold, lam = side_sign(j), block.threshold_slope[j], block.threshold[j], block.stiffness[j]
+    sign, gain, threshold, lam = side_sign(j), block.restoring_gain[j], block.threshold[j], block.stiffness[j]
     weight, push = W[0] + block.added_weight[j], sign * A[0] + block.added_push[j]
     horizontal, vertical = horizon.motion
     error = horizon.error + bound_higher_terms(A, horizon)
@@ -473,13 +473,13 @@ def bound_side(block: Record, settings: Record, j: int, motion: MotionBounds) ->
         max_stiffness_factor = compute_norm(max_stiffness_factor, bound_push(block, j, horizontal))
         spring += 0.5 * abs(block.prestress[j])
     stiffness = (abs(block.stiffness[j]) * max_stiffness_factor + spring) * (1.0 + ROUNDING)
-    per_push = (block.stiffness[j] if settings.nonlinear else block.threshold_slope[j]) * (1.0 + ROUNDING)
-    per_weight = block.threshold_slope[j] * threshold * (1.0 + ROUNDING)  # largest at zero rotation: see `prove_rest`
+    per_push = (block.stiffness[j] if settings.nonlinear else block.restoring_gain[j]) * (1.0 + ROUNDING)
+    per_weight = block.restoring_gain[j] * threshold * (1.0 + ROUNDING)  # largest at zero rotation: see `prove_rest`
     return RestoringBounds(
         stiffness,
-        block.threshold_slope[j]
+        block.restoring_gain[j]
         * (from_weight[0] + block.restraint_threshold[j] + min(from_push[0], from_push[1]) - rounding),
-        block.threshold_slope[j]
+        block.restoring_gain[j]
         * (from_weight[1] + block.restraint_threshold[j] + max(from_push[0], from_push[1]) + rounding),
         per_push * (horizontal.high - horizontal.low) + per_weight * (vertical.high - vertical.low),
         per_push * horizontal.slope + per_weight * vertical.slope,

@@ -24,10 +24,10 @@ _SIDES = ("f8", (2,))
 #: increment of the row by a step (0 without a simulation); whether the step may contain an event, whether one of its
 #: substeps may, whether its series is too short, whether the step is still to be taken; length of the sample,
 #: accelerations (horizontal, vertical) of the unscaled motion at its start, and their slopes; u, u' and (nonlinear) sin
-#: and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation;
-#: rotation of overturning; usual length of a sample; factor on the motion; with friction, the largest push without a
-#: slip at zero velocity and its decrease per squared velocity (`sliding.may_slip`).
-GROUP = define_record(
+#: and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS_DTYPE`); largest
+#: rotation; rotation of overturning; usual length of a sample; factor on the motion; with friction, the largest push
+#: without a slip at zero velocity and its decrease per squared velocity (`sliding.may_slip`).
+GROUP_DTYPE = define_record(
     **dict.fromkeys(
         ("simulation", "row", "end_row", "increment", "has_event", "has_substep_event", "is_truncated", "is_pending"),
         ("i8", (LANE_COUNT,)),
@@ -47,7 +47,7 @@ GROUP = define_record(
 #: c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
 #: instead of its gain. ``curvature_factor`` max |u''| bounds the distance of the rotation above or below both ends of
 #: the step.
-STEP_CONSTANTS = define_record(
+STEP_CONSTANTS_DTYPE = define_record(
     **dict.fromkeys(
         ("stiffness", "pull", "push_gain", "stumpff_1", "stumpff_2", "stumpff_3", "curvature_factor"), _SIDES
     )

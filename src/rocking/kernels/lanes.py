@@ -18,9 +18,9 @@ from rocking.kernels.compiled import inlined, kernel, not_inlined
 from rocking.kernels.events import raise_peak
 from rocking.kernels.ground import FIRST, LENGTH, START, Grounds, select_ground
 from rocking.kernels.lane_steps import (
-    GROUP,
+    GROUP_DTYPE,
     LANE_COUNT,
-    STEP_CONSTANTS,
+    STEP_CONSTANTS_DTYPE,
     compute_push_line,
     step_linear,
     step_nonlinear,
@@ -49,7 +49,7 @@ MAX_WEIGHTED_SUBSTEP = 0.125
 EMPTY_ROTATION = 1e-300
 
 #: Numbers of lanes in use and of simulations that have started.
-COUNTS = define_record(active="i8", started="i8")
+COUNTS_DTYPE = define_record(active="i8", started="i8")
 
 
 class SimulationPool(NamedTuple):
@@ -63,7 +63,7 @@ class SimulationPool(NamedTuple):
     steps: Records  # step constants of each
     ends: Integers  # first piece of each motion that lanes do not step
     groups: Records  # one group of lanes
-    counts: Record  # `COUNTS`
+    counts: Record  # `COUNTS_DTYPE`
     table: Records  # table without rows
 
 
@@ -75,7 +75,7 @@ def build_pool(
     breakpoints = (grounds.pieces[start + 1 : end + 1, START] for start, end in zip(first, last, strict=True))
     ends = np.array([np.searchsorted(times, stop, "right") for times in breakpoints], dtype=np.int64)
     steps = compute_step_constants(blocks, grounds.pieces[first, LENGTH][motions], substeps)
-    groups, counts = _allocate_aligned(1, GROUP), create_record(COUNTS, active=LANE_COUNT)
+    groups, counts = _allocate_aligned(1, GROUP_DTYPE), create_record(COUNTS_DTYPE, active=LANE_COUNT)
     return SimulationPool(grounds, motions, factors, blocks, states, steps, ends, groups, counts, create_table(0))
 
 
@@ -88,8 +88,8 @@ def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Records:
 
 
 def compute_step_constants(blocks: Records, lengths: Floats, substeps: int) -> Records:
-    """Compute the constants of a step of each length for every block (`STEP_CONSTANTS`)."""
-    steps = create_records(len(blocks), STEP_CONSTANTS)
+    """Compute the constants of a step of each length for every block (`STEP_CONSTANTS_DTYPE`)."""
+    steps = create_records(len(blocks), STEP_CONSTANTS_DTYPE)
     lam, h = blocks["stiffness"], lengths[:, None]
     sign = np.array([1.0, -1.0])
     if substeps > 0:
@@ -98,8 +98,8 @@ def compute_step_constants(blocks: Records, lengths: Floats, substeps: int) -> R
         return steps
     q = lam * h * h
     steps["stiffness"] = lam
-    steps["pull"] = blocks["threshold_slope"] * blocks["threshold"]
-    steps["push_gain"] = blocks["threshold_slope"] * sign
+    steps["pull"] = blocks["restoring_gain"] * blocks["threshold"]
+    steps["push_gain"] = blocks["restoring_gain"] * sign
     steps["stumpff_1"] = h * compute_stumpff(1, q)
     steps["stumpff_2"] = h * h * compute_stumpff(2, q)
     steps["stumpff_3"] = h * h * h * compute_stumpff(3, q)

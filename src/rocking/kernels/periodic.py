@@ -191,7 +191,7 @@ def build_step_rows(ground: Ground, block: Record) -> Floats:
     if any(np.any(block[name]) for name in ("restraint_threshold", "added_weight", "spring")):
         return np.zeros((2, 0, _COLUMNS))
     for side in range(2):
-        lam, gain, threshold = (float(block[name][side]) for name in ("stiffness", "threshold_slope", "threshold"))
+        lam, gain, threshold = (float(block[name][side]) for name in ("stiffness", "restoring_gain", "threshold"))
         if not np.isfinite(threshold):
             continue
         root, drag = np.sqrt(abs(lam)), float(block["damping"][side])

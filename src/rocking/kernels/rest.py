@@ -190,7 +190,7 @@ def apply_proven_impacts(
     for _ in range(PROVEN_PER_ITERATION):
         side, v = state.side, state.v
         g = compute_restoring(ground, block, side, state.piece, state.offset)
-        t, speed = solve_proven_arc(v, g, block.threshold_slope[side] * side_sign(side) * rate, block.stiffness[side])
+        t, speed = solve_proven_arc(v, g, block.restoring_gain[side] * side_sign(side) * rate, block.stiffness[side])
         next_speed = block.restitution[side] * speed
         # The arc is below its first tangent.
         if not (t < end - state.offset and next_speed > state.certificate_speed and v * t <= state.peak):

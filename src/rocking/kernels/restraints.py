@@ -40,7 +40,7 @@ def apply_tendon_law(block: Record, law: int, plastic_elongation: float) -> None
         block.added_push[side] = block.base_push[side] + push
         block.prestress[side] = block.base_prestress[side] + prestress
         block.restraint_threshold[side] = (
-            block.base_restraint_threshold[side] + max(0.0, force) / block.threshold_slope[side]
+            block.base_restraint_threshold[side] + max(0.0, force) / block.restoring_gain[side]
         )
 
 
@@ -264,6 +264,6 @@ def compute_static_restoring(block: Record, tendon_state: tuple[bool, int, float
         psi, pull = block.slenderness[side] - u, pull * math.cos(0.5 * u)
         gravity = block.stiffness[side] * ((1.0 + weight) * math.sin(psi) + push * math.cos(psi))
     else:
-        standing = block.threshold_slope[side] * (block.threshold[side] * (1.0 + weight) + push)
+        standing = block.restoring_gain[side] * (block.threshold[side] * (1.0 + weight) + push)
         gravity = standing - block.stiffness[side] * (1.0 + weight) * u
     return gravity + pull + block.spring[side] * u

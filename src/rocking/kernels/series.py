@@ -57,7 +57,7 @@ def apply_weight(weight: ValueAndSlope | None, current: float, previous: float) 
 def write_linear_coefficients(block: Record, state: Record, scratch: Record, degree: int, order: int) -> None:
     """Write c[0] to c[order] of a linear arc under constant weight and a motion of ``degree`` into scratch.rotation."""
     c, A, side = scratch.rotation, scratch.ground, state.side
-    lam, gain = block.stiffness[side], block.threshold_slope[side]
+    lam, gain = block.stiffness[side], block.restoring_gain[side]
     c[0] = state.u
     c[1] = state.v
     c[2] = 0.5 * (lam * state.u - gain * (block.threshold[side] + A[0]))
@@ -74,7 +74,7 @@ def compute_weighted_coefficient(block: Record, side: int, scratch: Record, degr
     ``degree`` applies to both the motion and the weight.
     """
     c, A, W = scratch.rotation, scratch.ground, scratch.weight
-    lam, gain, threshold = block.stiffness[side], block.threshold_slope[side], block.threshold[side]
+    lam, gain, threshold = block.stiffness[side], block.restoring_gain[side], block.threshold[side]
     value = -gain * (threshold * W[k] + A[k]) if k <= degree else 0.0
     for j in range(min(k, degree) + 1):
         value += lam * W[j] * c[k - j]
@@ -121,9 +121,9 @@ def compute_restrained_coefficient(
         value += compute_nonlinear_coefficient(lam, scratch, degrees, k) / INTEGRATED_TWICE[k]
         return value - block.prestress[side] * scratch.half_cosine[k]
     if k <= degrees[0]:
-        value -= block.threshold_slope[side] * A[k]
+        value -= block.restoring_gain[side] * A[k]
     if k <= degrees[1]:
-        value -= block.threshold_slope[side] * (block.threshold[side] * W[k])
+        value -= block.restoring_gain[side] * (block.threshold[side] * W[k])
     if k == 0:
         value -= block.prestress[side]
     for j in range(min(k, degrees[1]) + 1):

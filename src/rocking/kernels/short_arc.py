@@ -158,7 +158,7 @@ def find_largest_weight(weight: ValueAndSlope | None, duration: float) -> float:
 def compute_linear_series(ground: Ground, block: Record, state: Record) -> RotationCoefficients:
     """Compute the series of a linear arc under a ground acceleration that is linear in time."""
     side = state.side
-    gain = block.threshold_slope[side]
+    gain = block.restoring_gain[side]
     push = compute_push_line(ground, state)
     return expand_linear(
         state.u, state.v, block.stiffness[side], gain * (block.threshold[side] + push[0]), gain * push[1]
@@ -170,7 +170,7 @@ def compute_weighted_series(
     ground: Ground, block: Record, state: Record, weight: ValueAndSlope
 ) -> RotationCoefficients:
     """Compute the series of a linear arc under two ground accelerations that are linear in time."""
-    side, gain = state.side, block.threshold_slope[state.side]
+    side, gain = state.side, block.restoring_gain[state.side]
     push = compute_push_line(ground, state)
     pushes = (gain * push[0], gain * push[1])
     return expand_weighted(state.u, state.v, block.stiffness[side], gain * block.threshold[side], pushes, weight)

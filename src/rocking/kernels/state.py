@@ -124,9 +124,9 @@ _SERIES = ("f8", (ORDER + 2,))
 
 #: Body. Fields of two numbers refer to side + and side -; accelerations are in units of g. In all records the most used
 #: fields come first, so that fewer cache lines are read.
-BLOCK = define_record(
+BLOCK_DTYPE = define_record(
     stiffness=_SIDES,  # lambda in u'' = lambda u - ..., 1/s^2
-    threshold_slope=_SIDES,  # restoring acceleration at zero rotation per acceleration above the threshold
+    restoring_gain=_SIDES,  # restoring acceleration at zero rotation per acceleration above the threshold
     threshold=_SIDES,  # ground acceleration at uplift without restraints
     restraint_threshold=_SIDES,  # added to the threshold by restraints
     restitution=_SIDES,  # factor on the speed on leaving the side; the largest one if it varies
@@ -170,7 +170,7 @@ BLOCK = define_record(
 )
 
 #: Settings of the computation.
-SETTINGS = define_record(
+SETTINGS_DTYPE = define_record(
     nonlinear="?",  # whether the model is nonlinear
     rest_rule="i8",  # `RestRule` that ends chattering
     tolerance="f8",  # largest accepted width of a bracket on the time of rest, s
@@ -180,7 +180,7 @@ SETTINGS = define_record(
 )
 
 #: State of a march.
-STATE = define_record(
+STATE_DTYPE = define_record(
     piece="i8",  # present piece of the motion
     offset="f8",  # time since the start of the piece, s
     side="i8",  # 0 for side +, 1 for side -; negative at rest
@@ -219,8 +219,8 @@ STATE = define_record(
     largest_slip="f8",  # largest absolute displacement so far
 )
 
-#: Step of a response: state at its start (see `STATE`) and time, for `expand_arc`.
-NODE_ROW = define_record(
+#: Step of a response: state at its start (see `STATE_DTYPE`) and time, for `expand_arc`.
+NODE_DTYPE = define_record(
     time="f8",
     piece="i8",
     offset="f8",
@@ -234,20 +234,20 @@ NODE_ROW = define_record(
 )
 
 #: Impact: time, side entered (+1 or -1), speeds before and after.
-IMPACT_ROW = define_record(time="f8", side="i8", speed_before="f8", speed_after="f8")
+IMPACT_DTYPE = define_record(time="f8", side="i8", speed_before="f8", speed_after="f8")
 
 #: Event: time, `EventKind`, side (+1 or -1; 0 at rest).
-EVENT_ROW = define_record(time="f8", kind="i8", side="i8")
+EVENT_DTYPE = define_record(time="f8", kind="i8", side="i8")
 
 #: Chattering sequence: time since which it is proven, time of rest with bounds, number of impacts in between.
-SEQUENCE_ROW = define_record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
+SEQUENCE_DTYPE = define_record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
 
 #: Row k contains the k-th node, impact, event and chattering sequence of a march: one array, because kernels pass
 #: arrays by value.
-TABLE = define_record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
+TABLE_DTYPE = define_record(node=NODE_DTYPE, impact=IMPACT_DTYPE, event=EVENT_DTYPE, sequence=SEQUENCE_DTYPE)
 
 #: Scratch space: series of one step about its start.
-SCRATCH = define_record(
+SCRATCH_DTYPE = define_record(
     rotation=_SERIES,  # u
     ground=_SERIES,  # push: acceleration of the ground in the frame of the side, in units of g
     weight=_SERIES,  # weight divided by the weight at rest
@@ -265,7 +265,7 @@ SCRATCH = define_record(
 )
 
 #: Scratch space of a variation: series of the stiffness, the forcing and the variation itself.
-VARIATION = define_record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
+VARIATION_DTYPE = define_record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
 
 
 def create_records(count: int, kind: np.dtype[np.void]) -> Records:
@@ -294,7 +294,7 @@ def create_record(kind: np.dtype[np.void], **values: Any) -> Record:
 
 def create_states(count: int, budget: int) -> Records:
     """Return states of blocks at rest at time zero that march to the end of the motion."""
-    states = create_records(count, STATE)
+    states = create_records(count, STATE_DTYPE)
     states["side"] = AT_REST
     states["stop_piece"] = NO_STOP_PIECE
     states["ending"] = Ending.RUNNING.value
@@ -313,12 +313,12 @@ def create_state_at_node(node: Record, plastic_elongation: float = 0.0, budget: 
 
 def create_scratch() -> Record:
     """Return scratch space for one march at a time."""
-    return create_record(SCRATCH)
+    return create_record(SCRATCH_DTYPE)
 
 
 def create_table(rows: int) -> Records:
     """Return a table with empty rows."""
-    return create_records(rows, TABLE)
+    return create_records(rows, TABLE_DTYPE)
 
 
 def enlarge_table(table: Records) -> Records:

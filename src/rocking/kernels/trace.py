@@ -26,10 +26,10 @@ from rocking.kernels.ground import (
 from rocking.kernels.restraints import apply_tendon_law, find_tendon_law_at_rest, update_plastic_elongation
 from rocking.kernels.series import INTEGRATED_TWICE, write_variation_coefficients
 from rocking.kernels.sliding import expand_slide, expand_slip, integrate_slip
-from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, create_records
+from rocking.kernels.state import NODE_DTYPE, Record, Records, TendonLaw, create_records
 
 #: Nodes of a response before its march.
-NO_NODES = create_records(0, NODE_ROW)
+NO_NODES = create_records(0, NODE_DTYPE)
 
 
 class Trail(NamedTuple):
@@ -177,7 +177,8 @@ def compute_variation(
 ) -> None:
     """Write changes of u at given times, and shifts of all impacts and events, per unit of epsilon, into arrays.
 
-    ``times`` ascend; at an impact, the change before it is written. ``variation`` is scratch space (`state.VARIATION`).
+    ``times`` ascend; at an impact, the change before it is written. ``variation`` is scratch space
+    (`state.VARIATION_DTYPE`).
     """
     nodes = trail.nodes
     impact_count = event_count = 0
@@ -353,7 +354,7 @@ def expand_derivatives(trail: Trail, scratch: Record, variation: Record, side: i
 
     This removes the contribution of restraints from the motion in scratch.
     """
-    lam, gain, threshold = trail.block.stiffness[side], trail.block.threshold_slope[side], trail.block.threshold[side]
+    lam, gain, threshold = trail.block.stiffness[side], trail.block.restoring_gain[side], trail.block.threshold[side]
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     weight_degree = degree if has_vertical(trail.ground) else 0
     for k in range(order - 1):
@@ -439,14 +440,14 @@ def compute_uplift_shift(trail: Trail, node: Record, quantity: int, tendon_chang
     rate = -compute_push_rate(ground, block, node.side, node.piece, node.offset)
     if is_jump(trail, node):
         return 0.0
-    tendon_shift = tendon_change / (block.threshold_slope[node.side] * rate)
+    tendon_shift = tendon_change / (block.restoring_gain[node.side] * rate)
     if quantity == Quantity.MOTION:
         return -push / rate + tendon_shift
     if find_side_quantity(quantity, node.side) == Quantity.SLENDERNESS:
         growth = compute_weight(ground, node.piece, node.offset) + block.added_weight[node.side]
         if settings.nonlinear:
             growth *= 1.0 + threshold * threshold
-            growth += block.prestress[node.side] * threshold / block.threshold_slope[node.side]
+            growth += block.prestress[node.side] * threshold / block.restoring_gain[node.side]
         return block.slenderness[node.side] * growth / rate + tendon_shift
     return tendon_shift
 
@@ -516,9 +517,9 @@ def compute_restoring_shift(trail: Trail, node: Record, j: int, quantity: int, s
     """Compute the change of a restoring acceleration at an impact that shifts."""
     ground, block, settings, _ = trail
     motion = compute_acceleration(ground, node.piece, node.offset)
-    change = block.threshold_slope[j] * shift * compute_push_rate(ground, block, j, node.piece, node.offset)
+    change = block.restoring_gain[j] * shift * compute_push_rate(ground, block, j, node.piece, node.offset)
     if quantity == Quantity.MOTION:
-        change += block.threshold_slope[j] * compute_side_push(ground, block, j, node.piece, node.offset)
+        change += block.restoring_gain[j] * compute_side_push(ground, block, j, node.piece, node.offset)
     elif find_side_quantity(quantity, j) == Quantity.FREQUENCY:
         change += 2.0 * compute_restoring(ground, block, j, node.piece, node.offset)
     elif find_side_quantity(quantity, j) == Quantity.SLENDERNESS:

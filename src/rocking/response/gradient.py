@@ -281,7 +281,7 @@ def _apply_adjoint(target: _Target, by_state: Floats, derivatives: Floats) -> st
         if not np.any(by_state) or (target.instant == start_time and not target.is_height):
             return ""  # at rest, or the initial state itself
     if ending not in _REASONS and target.instant > start_time:
-        trail, variation = copy_trail(target.trail), state.create_record(state.VARIATION)
+        trail, variation = copy_trail(target.trail), state.create_record(state.VARIATION_DTYPE)
         ending = AdjointEnd(adjoint(trail, scratch, variation, target.row, target.elapsed, by_state, derivatives))
         is_waiting = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > start_time)
         if ending not in _REASONS and (ending == AdjointEnd.REST or is_waiting):

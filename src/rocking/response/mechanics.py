@@ -191,12 +191,12 @@ _MAX_RATIO: Final = 1.6
 
 #: Fields of a record that determine the potential.
 _FIELDS: Final = (
-    "stiffness", "threshold_slope", "threshold", "slenderness", "added_weight", "added_push", "prestress", "spring",
+    "stiffness", "restoring_gain", "threshold", "slenderness", "added_weight", "added_push", "prestress", "spring",
 )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class EnergyHistory:
+class EnergyModel:
     """Energy of a block divided by the smallest energy from rest to an unstable balance without ground motion.
 
     ``record`` is the body as a record for kernels. Rotations are in the frame of a side, u = |theta|. A side is 0, 1,
@@ -268,7 +268,7 @@ class EnergyHistory:
             psi = fields["slenderness"] - 0.5 * u
             raised = fields["stiffness"] * (weight * np.sin(psi) + push * np.cos(psi)) + fields["prestress"]
             return np.asarray(chord * raised + 0.5 * fields["spring"] * u * u)
-        restoring = fields["threshold_slope"] * (fields["threshold"] * weight + push) + fields["prestress"]
+        restoring = fields["restoring_gain"] * (fields["threshold"] * weight + push) + fields["prestress"]
         return np.asarray(u * (restoring - 0.5 * (fields["stiffness"] * weight - fields["spring"]) * u))
 
     def compute_boundary(self, side: int) -> tuple[Floats, Floats]:
@@ -315,18 +315,18 @@ def _solve_linear_balance(record: Record, added_weight: Floats, added_push: Floa
     """Return the rotation without restoring moment, if the moment is linear in the rotation."""
     balance, weight = np.full(2, math.inf), 1.0 + added_weight
     softening = record["stiffness"] * weight - record["spring"]
-    restoring = record["threshold_slope"] * (record["threshold"] * weight + added_push) + prestress
+    restoring = record["restoring_gain"] * (record["threshold"] * weight + added_push) + prestress
     np.divide(restoring, softening, out=balance, where=softening > 0.0)
     return balance
 
 
-def create_energy(body: Body, record: Record, *, nonlinear: bool) -> EnergyHistory:
+def create_energy(body: Body, record: Record, *, nonlinear: bool) -> EnergyModel:
     """Return the energy of a block; raise `OptionError` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
         raise OptionError(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")
     if record["yielding"]:
         raise OptionError("the energy is not defined for a yielding tendon; omit the strength of the tendon")
-    energy = EnergyHistory(body, record, nonlinear)
+    energy = EnergyModel(body, record, nonlinear)
     if not np.any(np.isfinite(energy.balance)):
         raise OptionError("this block has no overturning energy, because its restraints hold it at any rotation")
     return energy

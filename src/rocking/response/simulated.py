@@ -22,7 +22,7 @@ from rocking.motion.motion import Motion
 from rocking.response.history import Solution, TimeHistory, add_all_impacts
 from rocking.response.mechanics import (
     ContactForces,
-    EnergyHistory,
+    EnergyModel,
     check_available_friction,
     compute_friction_demand,
     compute_linear_balance,
@@ -87,7 +87,7 @@ class ResponseData(Result):
         return TimeHistory(trail, self.duration, self.block.stops)
 
     @cached_property
-    def _energy(self) -> EnergyHistory:
+    def _energy(self) -> EnergyModel:
         trail = self.solution.trail
         return create_energy(self.block, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
 

@@ -123,7 +123,7 @@ export class Kernels {
       stiffness: sides.map(({p}) => p * p), slenderness: sides.map(({alpha}) => alpha),
       sine: sides.map(({alpha}) => sin(alpha)), cosine: sides.map(({alpha}) => cos(alpha)),
       threshold: sides.map(({alpha}) => (linear ? alpha : tan(alpha))),
-      threshold_slope: sides.map(({p, alpha}) => (linear ? p * p : p * p * cos(alpha))),
+      restoring_gain: sides.map(({p, alpha}) => (linear ? p * p : p * p * cos(alpha))),
       restitution: sides.map(({restitution}) => restitution),
       ...(threshold === null ? {} : {rest_limit: sides.map(({p, alpha}) => threshold * p * alpha)}),
     };
