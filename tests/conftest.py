@@ -217,7 +217,7 @@ def run(unarranged: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., t
 @pytest.fixture
 def small_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     """Give simulations of ensembles up soon."""
-    monkeypatch.setattr("rocking.engine.tasks.BUDGET", 0)
+    monkeypatch.setattr("rocking.engine.tasks.STEP_BUDGET", 0)
 
 
 @pytest.fixture(scope="session")

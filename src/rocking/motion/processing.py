@@ -15,7 +15,7 @@ from rocking.core.arrays import Floats
 from rocking.errors import MotionError
 from rocking.motion import piecewise
 from rocking.motion.description import Description, Origin, compute_start_delay
-from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
+from rocking.motion.measures import DEFAULT_DAMPING, MotionMeasures, check_damping
 from rocking.motion.piecewise import Piecewise
 
 T = TypeVar("T")
@@ -131,7 +131,7 @@ class ProcessingMethods(MotionMeasures):
         others = {name: part and part.delayed(wait) for name, part in self._collect_other_components().items()}
         return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, **others)
 
-    def on_floor(self, period: float, damping: float = DAMPING, *, free_vibration: float | None = None) -> Self:
+    def on_floor(self, period: float, damping: float = DEFAULT_DAMPING, *, free_vibration: float | None = None) -> Self:
         """Return the motion of a floor: the absolute acceleration of a linear oscillator under the motion.
 
         Parameters
