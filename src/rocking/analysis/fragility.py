@@ -482,11 +482,8 @@ def fragility(
 def _describe_lost(has_lost_contact: Flags) -> str:
     """Describe the number of simulations that end because the ground no longer presses on the block."""
     count = np.count_nonzero(has_lost_contact)
-    return (
-        f"{count} of {has_lost_contact.size} simulations ended with a loss of contact and are not counted"
-        if count
-        else ""
-    )
+    text = f"{count} of {has_lost_contact.size} simulations ended with a loss of contact and are not counted"
+    return text if count else ""
 
 
 def fit_fragility(
