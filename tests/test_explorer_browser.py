@@ -18,8 +18,8 @@ import explorer_addresses
 import numpy as np
 import pytest
 import trimesh
+from explorer_answers import page_answer
 from explorer_browser import Watched, launched, slowed, tool
-from explorer_texts import page_answer
 from PIL import Image
 
 import rocking
@@ -430,11 +430,12 @@ def test_files_are_saved_under_the_name_of_the_case(opened):
     page = opened(STATUE)
     page.until(READY)
     names = []
-    for label in ("Figure, PNG", "Events, CSV"):
+    for label in ("Rotation, PNG", "Events, CSV"):
         with page.page.expect_download() as download:
             page.page.locator("#exports button", has_text=label).click()
         names.append(download.value.suggested_filename)
-    assert names == [f"p-3.61-rad-s-alpha-12.3deg-ridgecrest-clc-090-0.4-g.{end}" for end in ("png", "events.csv")]
+    case = "p-3.61-rad-s-alpha-12.3deg-ridgecrest-clc-090-0.4-g"
+    assert names == [f"{case}-rotation.png", f"{case}.events.csv"]
 
 
 @pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=MORE)])
@@ -536,23 +537,24 @@ def test_a_study_opens_as_a_map(opened, tmp_path):
     page.until(COMPUTED["map"])
     page.page.locator("#map-tools label", has_text="scale").locator("select").select_option("1")
     page.until("location.search.includes('scale_index=1')")
-    page.paused(300)
+    page.until(COMPUTED["map"])
     page.page.locator("#map").focus()
     page.page.keyboard.press("ArrowRight")
     page.page.keyboard.press("ArrowUp")
     said = page.text("#map-at")
     page.rested(lambda: page.page.keyboard.press("Enter"))
     page.until("document.body.dataset.view === 'shake' && location.search.includes('alpha')")
+    page.until(f"document.title.includes({re.search(r'p = [0-9.]+ rad/s', said)[0]!r})", "the case is shown")
     assert ("overturns" in page.text("#verdict")) == ("Overturns" in said or ": overturns" in said)
     server.server.should_exit = True
 
 
 def test_a_diagram_is_read_by_keys_and_opens_a_case(opened):
     page = opened(f"{STATUE}&view=periodic")
-    page.until("!document.getElementById('orbit-sine').hidden")
-    page.page.click("#orbit-sine")
-    page.until("location.search.includes('sine')")
-    page.page.goto(page.page.url + "&sweep_points=16")
+    page.until("!document.getElementById('problem').hidden")
+    assert "requires a sine" in page.text("#problem") and page.js(MARKED) == ["motion"]
+    page.complaints = [each for each in page.complaints if "422" not in each]
+    page.page.goto(f"{page.page.url.partition('?')[0]}?{SINE}&view=periodic&sweep_points=16")
     page.until(COMPUTED["periodic"], timeout=180.0)
     page.page.locator("#diagram").focus()
     page.page.keyboard.press("ArrowRight")

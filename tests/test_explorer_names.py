@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from explorer_texts import page_answer
+from explorer_answers import page_answer
 
 import rocking
 from rocking.explorer.code import case_as_command, case_as_python

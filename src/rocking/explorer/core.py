@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
 import tempfile
-import threading
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,7 +31,7 @@ _MAX_ASSESSMENTS: Final = 8
 
 #: Tables of a response by the ending of their files, and other files of a case.
 _TABLES: Final[Mapping[str, Any]] = {"csv": "histories", "events.csv": "events", "impacts.csv": "impacts"}
-EXPORTS: Final = (*_TABLES, "nc", "svg", "png", "report.html", "assessment.nc")
+EXPORTS: Final = (*_TABLES, "nc", "report.html", "assessment.nc")
 
 
 class Stream(NamedTuple):
@@ -95,7 +93,6 @@ class Explorer:
     def __init__(self, opening: Mapping[str, str] | None = None, study: StudyView | None = None) -> None:
         self.opening, self.study = dict(opening or {}), study
         self.uploads = UploadStore()
-        self._drawing = threading.Lock()
         self._simulated = RecentCache[SimulatedCase](_MAX_ROWS, _count_rows)
         self._assessed = RecentCache[AssessedCase](_MAX_ASSESSMENTS)
         self._answers: dict[str, Callable[[Query], Any]] = {
@@ -145,11 +142,16 @@ class Explorer:
 
     def simulate(self, texts: Texts) -> SimulatedCase:
         """Return a case with its response."""
-        return self._simulated.get(_create_key(texts), lambda: SimulatedCase.from_case(read_case(texts, self.uploads)))
+
+        def simulate() -> SimulatedCase:
+            case = read_case(texts, self.uploads)
+            return SimulatedCase(case, case.simulate())
+
+        return self._simulated.get(_create_key(texts), simulate)
 
     def _start(self, _: Query) -> dict[str, Any]:
         study = None if self.study is None else self.study.describe()
-        axes = [maps.describe_axis_kind(name) for name in maps.AXES]
+        axes = [{"name": name, "unit": kind.unit} for name, kind in maps.AXES.items()]
         own = {"axes": axes, "opening": self.opening, "study": study, "block_page": is_available()}
         return specification() | own | {"record_units": list_units()}
 
@@ -160,7 +162,7 @@ class Explorer:
         payload.header["summary"] = [(row.name, row.text) for row in shown.response.summary_rows()]
         payload.header.update(python=case_as_python(shown.case), command=case_as_command(shown.case), body=None)
         if shown.case.body is not None:
-            body = describe_body(shown.case.body, shown.case.azimuth)
+            body = describe_body(shown.case.body)
             payload.header["body"] = body.header
             payload.arrays.update(body.arrays)
         return payload
@@ -203,7 +205,7 @@ class Explorer:
         return self.study
 
     def _export(self, query: Query) -> bytes:
-        """Return a file in one of `EXPORTS`; a figure shows a window."""
+        """Return a file in one of `EXPORTS`."""
         form = query.get("form")
         if form not in EXPORTS:
             raise OptionError(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
@@ -215,25 +217,9 @@ class Explorer:
                 self._assess(query).result.to_netcdf(file)
             elif form in _TABLES:
                 self.simulate(query.case).response.to_csv(file, _TABLES[form])
-            elif form == "nc":
-                self.simulate(query.case).response.to_netcdf(file)
             else:
-                with self._drawing:
-                    _draw(self.simulate(query.case), query.window, file)
+                self.simulate(query.case).response.to_netcdf(file)
             return file.read_bytes()
-
-
-def _draw(shown: SimulatedCase, window: tuple[float, float] | None, file: Path) -> None:
-    """Draw a response in a window."""
-    from matplotlib import rc_context
-
-    response = shown.response
-    ends = None if window is None else simulated.check_window(window, response.duration)
-    figure = response.plot(window=ends, longest_sequence=bool(len(response.sequences)))
-    with rc_context({"svg.hashsalt": "rocking"}):
-        figure.savefig(file, dpi=160)
-    if "matplotlib.pyplot" in sys.modules:
-        sys.modules["matplotlib.pyplot"].close(figure)
 
 
 def _create_key(texts: Texts) -> tuple[str, ...]:

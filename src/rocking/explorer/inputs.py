@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from rocking.block import Block
-from rocking.block.friction import Friction
 from rocking.block.single import require_block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
@@ -34,39 +33,44 @@ _MAX_RESTITUTION_PRODUCT: Final = 0.998
 _MIN_DURATION: Final = 1e-12
 
 
+#: Arguments of `rocking.simulate` besides block and motion.
+_OPTIONS: Final = ("model", "chattering", "duration", "initial_rotation", "initial_velocity", "friction")
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """Arguments of `rocking.simulate`, with equivalent Python code and words of a command."""
 
     texts: Texts  # from which the case was read
+    options: dict[str, Any]  # arguments besides block and motion
     block: Block
-    motion: Motion | None
-    model: Model
-    chattering: ChatteringScheme
-    duration: float | None
-    initial_rotation: float
-    initial_velocity: float
-    friction: Friction | None
     block_call: str  # Python expression
     block_options: Texts  # of the command
     body: MeshBody | None  # of a mesh
-    azimuth: float  # of the body's plane, degrees
+    motion: Motion | None
     motion_call: str  # Python expression
-    motion_preamble: str  # line of Python before it, or empty
     words: tuple[str, ...]  # of the command; empty if the motion has no name
+    motion_preamble: str  # line of Python before the motion, or empty
 
-    def simulate(self) -> Response:
-        """Return the response."""
-        return simulate(
-            self.block,
-            self.motion,
-            model=self.model,
-            chattering=self.chattering,
-            duration=self.duration,
-            initial_rotation=self.initial_rotation,
-            initial_velocity=self.initial_velocity,
-            friction=self.friction,
-        )
+    @property
+    def model(self) -> Model:
+        """Equation of motion."""
+        model: Model = self.options.get("model", "nonlinear")
+        return model
+
+    @property
+    def chattering(self) -> ChatteringScheme:
+        """Scheme that ends chattering."""
+        return chattering_scheme(self.options.get("chattering", "certified"))
+
+    @property
+    def azimuth(self) -> float:
+        """Azimuth of the plane of a body, degrees."""
+        return float(PARAMETERS["azimuth"].read(self.texts.get("azimuth", "0")))
+
+    def simulate(self, **options: Any) -> Response:
+        """Return the response, perhaps with other options."""
+        return simulate(self.block, self.motion, **self.options | options)
 
 
 def read_case(texts: Texts, uploads: UploadStore) -> Case:
@@ -85,36 +89,20 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     """
     case_texts = clean_texts(texts)
     values = {name: PARAMETERS[name].read(text) for name, text in case_texts.items()}
-    written_block = _read_block(case_texts, values, uploads)
-    block = written_block.block
-    written_motion = read_motion_values(case_texts, values, uploads)
+    block, motion = _read_block(case_texts, values, uploads), read_motion_values(case_texts, values, uploads)
     if "duration" not in values:
-        require_rest(side.restitution for side in block.sides)
+        require_rest(side.restitution for side in block.block.sides)
     elif values["duration"] < _MIN_DURATION:
         raise OptionError(f"{{}} must be {_MIN_DURATION:g} s or more here", "duration", value=values["duration"])
-    return Case(
-        texts=case_texts,
-        block=block,
-        motion=written_motion.motion,
-        model=values.get("model", "nonlinear"),
-        chattering=chattering_scheme(values.get("chattering", "certified")),
-        duration=values.get("duration"),
-        initial_rotation=values.get("initial_rotation", 0.0),
-        initial_velocity=values.get("initial_velocity", 0.0),
-        friction=values.get("friction"),
-        block_call=written_block.python,
-        block_options=written_block.options,
-        body=written_block.body,
-        azimuth=values.get("azimuth", 0.0),
-        motion_call=written_motion.python,
-        motion_preamble=written_motion.preamble,
-        words=written_motion.words,
-    )
+    zero = {name for name in values if name.startswith("initial") and values[name] == 0.0}
+    options: dict[str, Any] = {name: values[name] for name in _OPTIONS if name in values and name not in zero}
+    chattering_scheme(options.get("chattering", "certified"))  # raises for an unknown scheme
+    return Case(case_texts, options, *block, *motion)
 
 
 def require_sticking(case: Case) -> None:
     """Raise `OptionError` if a case has friction, which maps, diagrams and assessments do not support."""
-    if case.friction is not None:
+    if "friction" in case.options:
         raise OptionError("{} is simulated for the response alone; leave it empty here", "friction")
 
 

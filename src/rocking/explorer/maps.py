@@ -23,9 +23,8 @@ from rocking.errors import OptionError
 from rocking.explorer.inputs import Case, block_to_texts, require_possible, require_rest, require_sticking
 from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_arguments, write_pulse
 from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, list_names, read_count
-from rocking.explorer.payload import Payload, phrase
+from rocking.explorer.payload import Payload
 from rocking.inputs.declared import SCALINGS
-from rocking.inputs.pulses import split_pulse
 from rocking.inputs.quantities import read_number
 from rocking.motion.motion import Motion
 
@@ -272,12 +271,7 @@ def describe_map(grid: MapGrid) -> dict[str, Any]:
 
 
 def _describe_axis(axis: Axis) -> dict[str, Any]:
-    return {**describe_axis_kind(axis.name), "values": axis.values.tolist()}
-
-
-def describe_axis_kind(name: str) -> dict[str, Any]:
-    """Describe a parameter of maps."""
-    return {"name": name, "unit": AXES[name].unit, "label": phrase(f"axis.{name}")}
+    return {"name": axis.name, "unit": AXES[axis.name].unit, "values": axis.values.tolist()}
 
 
 def map_point_to_texts(grid: MapGrid, x: float, y: float) -> dict[str, str]:
@@ -289,31 +283,21 @@ def map_point_to_texts(grid: MapGrid, x: float, y: float) -> dict[str, str]:
         texts = {name: text for name, text in texts.items() if name not in BLOCK_NAMES}
         p, alpha, restitution = blocks.p[0] / time_scale[0], blocks.alpha[0], blocks.restitution[0]
         texts |= block_to_texts(Block.from_parameters(p, alpha, restitution, gravity=blocks.gravity))
-    if "omega" in grid.names:
-        frequency = read_pulse_arguments(texts["motion"])["frequency"]
-        change_pulse(texts, frequency=float(frequency / time_scale[0]))
     if grid.names & {"omega", *_PEAK_AXES}:
-        _change_amplitude(texts, grid, float(factors[0]) * grid.motion.pga)
+        _change_motion(texts, grid, float(time_scale[0]), float(factors[0]) * grid.motion.pga)
     return texts
 
 
-def change_pulse(texts: dict[str, str], **numbers: float) -> None:
-    """Change parameters of the pulse in the texts of a case; a truncated pulse keeps its number of cycles."""
-    arguments = read_pulse_arguments(texts["motion"])
-    if "duration" in arguments and "frequency" in numbers:
-        numbers["duration"] = arguments["duration"] * arguments["frequency"] / numbers["frequency"]
-    _, written = split_pulse(texts["motion"])
-    current: dict[str, Any] = {name: ",".join(values) for name, values in written.items() if name in arguments}
-    texts["motion"] = write_pulse(texts["motion"], current | numbers)
-
-
-def _change_amplitude(texts: dict[str, str], grid: MapGrid, peak: float) -> None:
-    """Scale the motion to a peak acceleration, m/s^2, in its polarity: pulses by amplitude, records by scale."""
-    scale = read_number(texts.get("scale", "1"), "scale")
-    for name in SCALINGS:
-        texts.pop(name, None)
-    if is_pulse(texts["motion"]):
-        amplitude = math.copysign(read_pulse_arguments(texts["motion"])["amplitude"], scale)
-        change_pulse(texts, amplitude=amplitude * peak / create_pulse(texts["motion"]).pga)
-    else:
+def _change_motion(texts: dict[str, str], grid: MapGrid, time_scale: float, peak: float) -> None:
+    """Shorten the pulse of a case, and scale the motion to a peak acceleration, m/s^2, in its polarity."""
+    scale, name = read_number(texts.get("scale", "1"), "scale"), texts["motion"]
+    for scaling in SCALINGS:
+        texts.pop(scaling, None)
+    if not is_pulse(name):
         texts |= {"scale": repr(scale * peak / grid.motion.pga)} if scale < 0.0 else {"pga": repr(peak)}
+        return
+    pulse = read_pulse_arguments(name)
+    pulse |= {key: pulse[key] * factor for key, factor in (("frequency", 1.0 / time_scale), ("duration", time_scale))
+              if key in pulse}  # fmt: skip
+    amplitude = math.copysign(1.0, scale) * pulse["amplitude"] * peak / create_pulse(write_pulse(name, pulse)).pga
+    texts["motion"] = write_pulse(name, pulse | {"amplitude": amplitude})

@@ -12,7 +12,7 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.explorer.payload import Payload, phrase
+from rocking.explorer.payload import Payload
 from rocking.inputs.quantities import read_densities, read_number
 from rocking.solid import ResistanceRose, Solid
 from rocking.solid.mesh import compute_properties
@@ -27,9 +27,6 @@ _read_lock = threading.Lock()
 
 #: Azimuths of the rose, degrees.
 _AZIMUTHS: Final = np.arange(0.0, 360.0, 2.0)
-
-#: Maximum number of named parts.
-_MAX_NAMED_PARTS: Final = 6
 
 #: Texts that describe a body, and how each is read as an argument of `rocking.Solid.from_mesh`.
 _READERS: Final[Mapping[str, Callable[[str], Any]]] = {
@@ -69,24 +66,14 @@ class MeshBody:
         }
 
 
-def describe_body(body: MeshBody, azimuth: float) -> Payload:
-    """Return plan, rose and description of a body for the page; m from its centre of mass."""
+def describe_body(body: MeshBody) -> Payload:
+    """Return plan, rose and summary of a body for the page; m from its centre of mass."""
     solid, rose = body.solid, body.rose
     pieces = body.sections.hulls[:: -(-len(body.sections.hulls) // 40)]
     corners = np.vstack(pieces) - solid.centre[:2]
     support = solid.support - solid.centre[:2]
-    parts = [region.name for region in solid.regions]
-    data = solid.rose([azimuth]).data
-    names = {"coupling": "coupling", "aside": "lateral_offset", "gap": "gap"}
-    neglected = {text: float(data[name][0]) for text, name in names.items()}
     header = {
-        "name": solid.description,
-        "about": _describe_solid(solid),
-        "parts": parts,
-        "left_out": phrase("body.left_out", azimuth=azimuth, **neglected),
-        "repaired": phrase("body.repaired", repairs="; ".join(solid.repairs))
-        if solid.repairs
-        else phrase("body.sound"),
+        "summary": solid.summary().splitlines(),
         "weakest_azimuth": rose.data.weakest_azimuth,
         "weakest": rose.data.weakest_acceleration,
         "gravity_g": solid.gravity / STANDARD_GRAVITY,
@@ -127,13 +114,3 @@ def read_body(name: str, stream: BinaryIO | None, arguments: Mapping[str, Any]) 
     written = "".join(f", {argument}={value!r}" for argument, value in arguments.items())
     file = stream.name if stream else name
     return MeshBody(Solid(gravity=gravity, **parts), sections, f"Solid.from_mesh({file!r}{written})")
-
-
-def _describe_solid(solid: Solid) -> dict[str, Any]:
-    """Describe a body."""
-    count, name, size = len(solid.regions), solid.description, {"height": solid.height, "volume": solid.volume}
-    names = ", ".join(region.name for region in solid.regions[:_MAX_NAMED_PARTS]) + ", ..." * (count > _MAX_NAMED_PARTS)
-    name_with_parts = phrase("body.parts", name=name, count=count, names=names) if count > 1 else name
-    if solid.mass is None:
-        return phrase("body.is", name=name_with_parts, **size)
-    return phrase("body.is_heavy", name=name_with_parts, mass=solid.mass, **size)

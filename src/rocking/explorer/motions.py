@@ -31,7 +31,7 @@ class WrittenMotion(NamedTuple):
     motion: Motion | None
     python: str  # expression
     words: tuple[str, ...]  # of a command
-    preamble: str = ""  # line of Python before the expression
+    preamble: str = ""  # line of Python before the expression, with its end
 
 
 def read_motion(texts: Texts, uploads: UploadStore) -> WrittenMotion:
@@ -106,14 +106,14 @@ def _read_unscaled(name: str, values: Values, uploads: UploadStore) -> WrittenMo
     if name == "none":
         return WrittenMotion(None, "None", ())
     if is_pulse(name):
-        call = write_pulse_call(name, {argument: repr(value) for argument, value in read_pulse_arguments(name).items()})
+        call = f"rocking.pulses.{read_pulse(name)[0].make.__name__}({written_arguments(read_pulse_arguments(name))})"
         return WrittenMotion(create_pulse(name), call, ("--pulse", name))
     if kind == "given":
         motion = uploads.motion(key)
         name = "".join(letter for letter in motion.name if letter.isprintable())  # a line break would end the comment
         variable = f"given_{key[:6]}"
         return WrittenMotion(
-            motion, variable, (), f"{variable} = ...  # {name}: the motion that this page was opened with"
+            motion, variable, (), f"{variable} = ...  # {name}: the motion that this page was opened with\n"
         )
     if kind == "file":
         return _read_file(key, values, values.get("channel"), uploads)
@@ -149,7 +149,7 @@ def read_pulse_arguments(text: str) -> dict[str, Any]:
     >>> read_pulse_arguments("sine:amplitude=2, frequency=1Hz, cycles=5,")
     {'amplitude': 2.0, 'frequency': 1.0, 'cycles': 5.0}
     """
-    family, arguments = read_pulse(text)
+    _, arguments = read_pulse(text)
     for name in ("cycles", "gamma"):
         if arguments.get(name, 0.0) > MAX_CYCLES:
             raise MotionError(
@@ -157,11 +157,6 @@ def read_pulse_arguments(text: str) -> dict[str, Any]:
                 name,
                 value=arguments[name],
             )
-    if "duration" in arguments and "duration" in family.optional:
-        without_duration = {name: value for name, value in arguments.items() if name != "duration"}
-        return (
-            without_duration if family.create_motion(without_duration).duration == arguments["duration"] else arguments
-        )
     return arguments
 
 
@@ -174,12 +169,6 @@ def write_pulse(text: str, arguments: Mapping[str, Any]) -> str:
 def create_pulse(text: str) -> Motion:
     """Create the pulse that a text names."""
     return read_pulse(text)[0].create_motion(read_pulse_arguments(text))
-
-
-def write_pulse_call(text: str, arguments: Mapping[str, str]) -> str:
-    """Write the call that creates a pulse of the same family with these arguments, as Python expressions."""
-    written_arguments = ", ".join(f"{name}={value}" for name, value in arguments.items())
-    return f"rocking.pulses.{read_pulse(text)[0].make.__name__}({written_arguments})"
 
 
 def write_motion_as_pulse(motion: Motion) -> str | None:
@@ -198,7 +187,7 @@ def write_motion_as_pulse(motion: Motion) -> str | None:
         return None
     names = [*FAMILIES[name].needed, *FAMILIES[name].optional]
     text = write_pulse(name, {parameter: value for parameter, value in parameters.items() if parameter in names})
-    return write_pulse(text, read_pulse_arguments(text)) if _is_equal(create_pulse(text), motion) else None
+    return text if _is_equal(create_pulse(text), motion) else None
 
 
 def _is_equal(motion: Motion, other: Motion) -> bool:

@@ -72,12 +72,11 @@ SHAPES: Final = (
 
 _PERIOD: Final = Input("period", "motion", "duration", "", "s", "1", 0.05, 5.0, True)
 
-#: Pulses of the page, and their choices.
-_CHOICES: Final[Mapping[str, dict[str, Any]]] = {
-    "sine": {}, "half-sine": {}, "one-sine": {}, "one-cosine": {},
-    "ricker": {"choices": {"kind": ("symmetric", "antisymmetric")}},
-    "mavroeidis-papageorgiou": {}, "rectangular": {}, "triangular": {},
-}  # fmt: skip
+#: Pulses of the page, and choices of a parameter.
+_PULSES: Final = (
+    "sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou", "rectangular", "triangular"
+)  # fmt: skip
+_CHOICES: Final[Mapping[str, Any]] = {"ricker": {"kind": ("symmetric", "antisymmetric")}}
 
 
 def _list_fields(pulse: str) -> tuple[Input, ...]:
@@ -89,7 +88,7 @@ def _list_fields(pulse: str) -> tuple[Input, ...]:
 
 #: Parameters of each pulse, and choices.
 PULSES: Final[Mapping[str, dict[str, Any]]] = {
-    name: {"parameters": _list_fields(name), **choices} for name, choices in _CHOICES.items()
+    name: {"parameters": _list_fields(name), "choices": _CHOICES.get(name, {})} for name in _PULSES
 }
 
 

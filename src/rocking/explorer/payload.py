@@ -1,4 +1,4 @@
-"""Data for the page (plain values, arrays, and keys of the page's texts) and their encoding."""
+"""Data for the page, plain values and arrays, and their encoding."""
 
 from __future__ import annotations
 
@@ -43,24 +43,13 @@ def pack(payload: Payload) -> bytes:
     return b"".join([struct.pack("<I", len(header)), header, *arrays])
 
 
-def phrase(key: str, **values: Any) -> dict[str, Any]:
-    """Return a phrase for the page: the key of a text, and the values of its placeholders.
-
-    Examples
-    --------
-    >>> phrase("sweep.period", period=2)
-    {'phrase': 'sweep.period', 'values': {'period': 2}}
-    """
-    return {"phrase": key, "values": values}
-
-
 def fill_page(page: str, texts: Mapping[str, Any]) -> str:
     r"""Return the page with all texts for its scripts.
 
     Examples
     --------
-    >>> fill_page("<script>TEXTS</script>", {"sweep.still": "stays at rest</script>"})
-    '<script>{"sweep.still": "stays at rest\\u003c/script>"}</script>'
+    >>> fill_page("<script>TEXTS</script>", {"field.p": "Frequency</script>"})
+    '<script>{"field.p": "Frequency\\u003c/script>"}</script>'
     """
     return page.replace("TEXTS", json.dumps(texts, ensure_ascii=False).replace("<", "\\u003c"), 1)
 

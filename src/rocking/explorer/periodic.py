@@ -14,13 +14,13 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.dynamics.bifurcation import NOT_FOLLOWED, OVERTURNED, BifurcationDiagram, bifurcation_diagram
 from rocking.dynamics.maps import stroboscopic_map
-from rocking.dynamics.orbits import create_orbit, simulate_periods
+from rocking.dynamics.orbits import create_orbit
 from rocking.errors import OptionError
 from rocking.explorer.inputs import Case, require_possible, require_sticking
-from rocking.explorer.maps import AXES, Axis, change_pulse, read_range
-from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_arguments
+from rocking.explorer.maps import AXES, Axis, read_range
+from rocking.explorer.motions import create_pulse, read_pulse_arguments
 from rocking.explorer.parameters import Texts
-from rocking.explorer.payload import Payload, phrase
+from rocking.explorer.payload import Payload
 from rocking.inputs.declared import SCALINGS
 from rocking.motion.motion import Motion
 from rocking.response.figure import sample_interval
@@ -32,12 +32,8 @@ SWEPT: Final = {"a": "amplitude", "omega": "frequency"}
 TRANSIENT_PERIODS: Final = 299
 RECORDED_PERIODS: Final = 64
 
-#: The same for a case without a period after those, and number of periods of its trajectory.
+#: The same for a case without a period after those.
 _LONG_TRANSIENT, _MAX_STATES = 7000, 1024
-_DRAWN_PERIODS: Final = RECORDED_PERIODS // 2
-
-#: Largest drawn rotation, divided by the slenderness.
-_MAX_ROTATION: Final = 1.5
 
 
 class Sine(NamedTuple):
@@ -91,11 +87,11 @@ def compute_units(case: Case) -> dict[str, float]:
     return {"a": min(case.block.uplift_thresholds(case.model)), "omega": p / (2.0 * math.pi)}
 
 
-def find_sine(case: Case) -> Sine | None:
-    """Return the sine of a case, scaled like its motion; None for other motions."""
+def find_sine(case: Case) -> Sine:
+    """Return the sine of a case, scaled like its motion."""
     text = case.texts.get("motion", "")
     if case.motion is None or text.partition(":")[0] != "sine":
-        return None
+        raise OptionError("periodic motion requires a sine, which repeats for ever: choose one in {}", "motion")
     pulse, unscaled = read_pulse_arguments(text), create_pulse(text).coefficients
     largest_index = np.unravel_index(np.argmax(np.abs(unscaled)), unscaled.shape)
     amplitude = pulse["amplitude"] * float(case.motion.coefficients[largest_index] / unscaled[largest_index])
@@ -103,29 +99,12 @@ def find_sine(case: Case) -> Sine | None:
     return Sine(abs(amplitude), pulse["frequency"], phase, pulse["cycles"])
 
 
-def suggest_sine(case: Case) -> Sine:
-    """Return a sine with the peak acceleration and frequency (or else velocity) of the motion, or above uplift."""
-    motion, text, units = case.motion, case.texts.get("motion", ""), compute_units(case)
-    if motion is None or motion.pga == 0.0:
-        return Sine(1.5 * units["a"], 3.0 * units["omega"], 0.0, 10.0)
-    parameters = read_pulse_arguments(text) if is_pulse(text) else {}
-    frequency = parameters.get("frequency") or motion.pga / (2.0 * math.pi * motion.pgv)
-    return Sine(float(f"{motion.pga:.6g}"), float(f"{frequency:.6g}"), 0.0, 10.0)
-
-
 def describe_orbit(case: Case) -> Payload:
-    """Return the normalised phase plane of a case under an infinite sine, and its orbit in words.
-
-    For another motion the header contains only ``offer``: text, amplitude (m/s^2) and frequency (Hz) of a sine.
-    """
+    """Return the normalised phase plane of a case under its sine without end, and its orbit in words."""
     require_sticking(case)
     sine = find_sine(case)
-    if sine is None:
-        suggested = suggest_sine(case)
-        offer = {"motion": suggested.text, "amplitude": suggested.amplitude, "frequency": suggested.frequency}
-        return Payload({"offer": offer})
     strobe = stroboscopic_map(case.block, sine.period(), model=case.model, chattering=case.chattering)
-    start = (case.initial_rotation, case.initial_velocity)
+    start = tuple(case.options.get(f"initial_{name}", 0.0) for name in ("rotation", "velocity"))
     for transient, recorded in ((TRANSIENT_PERIODS, RECORDED_PERIODS), (_LONG_TRANSIENT, _MAX_STATES)):
         data = bifurcation_diagram(
             lambda _: (case.block, strobe.motion), [1.0], start, direction="afresh", transient_periods=transient,
@@ -135,33 +114,25 @@ def describe_orbit(case: Case) -> Payload:
         if period:
             break
     states = np.stack([data.coordinate.values.ravel(), data.velocity.values.ravel()], axis=-1)
+    arrays: dict[str, Floats] = {}
     if period > 0:
         orbit = create_orbit(strobe, states[-1], period)
-        response, states = orbit.response, orbit.states
-        sentence: dict[str, Any] | str = f"{orbit._headline().capitalize()}."
-    elif period == 0:
-        response = simulate_periods(strobe, states[-_DRAWN_PERIODS], _DRAWN_PERIODS)
-        sentence = phrase("orbit.no_period", longest=recorded // 2, after=transient + recorded)
+        course = sample_interval(orbit.response, 0.0, orbit.response.duration)
+        states, sentence = orbit.states, f"{orbit._headline().capitalize()}."
+        arrays = {"rotation": course.rotation, "velocity": course.velocity, "jump": course.impact_rows.astype(float)}
     else:
-        response = simulate_periods(strobe, np.array(start), transient + recorded)
-        states = np.empty((0, 2))
-        key = "orbit.overturns" if response.overturned else "orbit.given_up"
-        sentence = phrase(key, after=math.ceil(response.duration * sine.frequency))
-    first = max(0.0, response.duration - max(period, _DRAWN_PERIODS) / sine.frequency)
-    course = sample_interval(response, first, response.duration)
-    is_beyond = np.abs(course.rotation) > _MAX_ROTATION
-    count = int(np.argmax(is_beyond)) if is_beyond.any() else len(is_beyond)
+        words = {OVERTURNED: "The block overturns", NOT_FOLLOWED: "The block requires too many steps"}
+        text = words.get(period, f"No period up to {recorded // 2} was found")
+        sentence = f"{text} within {transient + recorded} periods."
     normalised = normalise_states(case, states)
     header = {
-        "offer": None,
         "sentence": sentence,
         "duration": 1.0 / sine.frequency,
         "at": {name: getattr(sine, SWEPT[name]) / unit for name, unit in compute_units(case).items()},
         "period": max(period, 0),
     }
-    arrays = {"rotation": course.rotation[:count], "velocity": course.velocity[:count]}
-    arrays["jump"] = course.impact_rows[course.impact_rows < count - 1].astype(float)
-    return Payload(header, arrays | {"x": normalised[:, 0], "y": normalised[:, 1]})
+    is_known = np.isfinite(states[:, 0])
+    return Payload(header, arrays | {"x": normalised[is_known, 0], "y": normalised[is_known, 1]})
 
 
 def normalise_states(case: Case, states: Floats) -> Floats:
@@ -177,8 +148,6 @@ def read_sweep(case: Case, texts: Texts) -> Sweep:
     """Read a diagram: ``sweep`` (``a`` or ``omega``), ``sweep_from``, ``sweep_to``, and ``sweep_points``."""
     require_sticking(case)
     sine = find_sine(case)
-    if sine is None:
-        raise OptionError("a diagram needs a sine, of which one period repeats for ever: choose one", "motion")
     name = checks.choice(texts.get("sweep") or "a", "sweep", OptionError, [*SWEPT])
     omega = sine.frequency / compute_units(case)["omega"]
     ends = (0.9, float(f"{max(1.5, 2.5 * omega):.2g}")) if name == "a" else AXES["omega"].close
@@ -210,27 +179,24 @@ def simulate_sweep(sweep: Sweep) -> Generator[Payload]:
             yield Payload(header, {"states": kept.ravel(), "drawn": normalise_states(sweep.case, kept)[:, 0]})
 
 
-def _describe_period(period: int, impacts: float) -> dict[str, Any]:
+def _describe_period(period: int, impacts: float) -> str:
     if period <= 0:
-        return phrase({OVERTURNED: "sweep.overturns", NOT_FOLLOWED: "sweep.given_up", 0: "sweep.no_period"}[period])
+        return {OVERTURNED: "overturns", NOT_FOLLOWED: "requires too many steps", 0: "no period found"}[period]
     if not impacts:
-        return phrase("sweep.still")
-    return phrase("sweep.period_rest" if math.isinf(impacts) else "sweep.period", period=period)
+        return "stays at rest"
+    return f"period {period}, with complete chattering" if math.isinf(impacts) else f"period {period}"
 
 
 def describe_sweep(sweep: Sweep) -> dict[str, Any]:
     """Describe a diagram."""
-    name = sweep.axis.name
-    return {"name": name, "label": phrase(f"axis.{name}"), "values": sweep.axis.values.tolist()}
+    return {"name": sweep.axis.name, "values": sweep.axis.values.tolist()}
 
 
 def sweep_point_to_texts(sweep: Sweep, value: float, state: Sequence[float] = ()) -> dict[str, str]:
     """Return the texts of the case at a value of the parameter, from a state (or from rest)."""
     dropped = {*SCALINGS, "initial_rotation", "initial_velocity"}
     texts = {name: text for name, text in sweep.case.texts.items() if name not in dropped}
-    sine, pulse = sweep.sine_at(value), read_pulse_arguments(texts["motion"])
-    changes = {name: number for name, number in sine._asdict().items() if number != pulse.get(name, 0.0)}
-    change_pulse(texts, **changes)
+    texts["motion"] = sweep.sine_at(value).text
     if len(state):
         texts |= {"initial_rotation": repr(state[0]), "initial_velocity": repr(state[1])}
     return texts

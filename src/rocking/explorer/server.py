@@ -7,16 +7,18 @@ import secrets
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable
 from functools import cache
-from importlib import resources
-from pathlib import PurePosixPath
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import anyio
 import anyio.to_thread
 from starlette.applications import Starlette
+from starlette.datastructures import MutableHeaders
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import JSONResponse, Response, StreamingResponse
-from starlette.routing import Route
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rocking.core.tables import to_plain
 from rocking.errors import RockingError
@@ -35,28 +37,16 @@ EXCHANGE: Final = "/api/secret"
 #: Maximum number of unopened links.
 _MAX_LINKS: Final = 100
 
-#: Content types of the page's own files.
-CONTENT_TYPES: Final = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-
 _BINARY: Final = "application/octet-stream"
 _HEADERS: Final = {"x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-store"}
+
+#: Folder of the page's own files.
+FOLDER: Final = Path(__file__).with_name("page")
 
 _LINK_REQUIRED: Final = (
     "this page requires the link that rocking explore printed, which opens once; open it, or start rocking explore "
     "again; in a notebook, run the cell again"
 )
-
-
-def page_files() -> dict[str, bytes]:
-    """Return the page's own files by path."""
-    root = resources.files("rocking.explorer") / "page"
-    folders = ("", "standalone/")
-    return {
-        folder + entry.name: entry.read_bytes()
-        for folder in folders
-        for entry in root.joinpath(folder).iterdir()
-        if not entry.is_dir()
-    }
 
 
 class App:
@@ -71,26 +61,26 @@ class App:
     def __init__(self, explorer: Explorer, framed_by: str = "'none'") -> None:
         self.explorer = explorer
         self._secret, self._tokens = secrets.token_urlsafe(32), list[str]()
-        self._files = page_files()
-        self._html = fill_page(self._files["index.html"].decode(), load_english_texts())
+        self._html = fill_page(FOLDER.joinpath("index.html").read_text("utf-8"), load_english_texts())
         self._frames = f"frame-ancestors {framed_by}"
         self._policy = (
             "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
             f"base-uri 'none'; form-action 'none'; {self._frames}"
         )
         self._threads, self._streams = anyio.CapacityLimiter(4), anyio.CapacityLimiter(2)
-        self.asgi = Starlette(
+        starlette = Starlette(
             routes=[
                 Route("/", self._send_page),
                 Route("/block", self._send_block),
-                Route("/page/{path:path}", self._send_file),
+                Mount("/page", StaticFiles(directory=FOLDER)),
                 Route(EXCHANGE, self._exchange, methods=["POST"]),
-                Route("/api/files", self._guard(self._receive_file), methods=["POST"]),
-                *(Route(f"/api/{name}", self._guard(self._answer(name))) for name in explorer.names),
+                Route("/api/files", self._receive_file, methods=["POST"]),
+                *(Route(f"/api/{name}", self._answer(name)) for name in explorer.names),
             ],
             exception_handlers={RockingError: _respond_invalid, Exception: _respond_failure},
         )
-        self.asgi.router.redirect_slashes = False
+        starlette.router.redirect_slashes = False
+        self.asgi = _Headers(starlette)
 
     def new_token(self) -> str:
         """Return a token that opens the page once."""
@@ -98,19 +88,12 @@ class App:
         return self._tokens[-1]
 
     async def _send_page(self, _: Request) -> Response:
-        return _respond(self._html, "text/html", {"content-security-policy": self._policy})
+        return HTMLResponse(self._html, headers={"content-security-policy": self._policy})
 
     async def _send_block(self, _: Request) -> Response:
         """Return the standalone page, which leads to this one."""
         html = await self._run_in_thread(_build_block_page)
-        return _respond(html, "text/html", {"content-security-policy": self._frames})
-
-    async def _send_file(self, request: Request) -> Response:
-        path = request.path_params["path"]
-        content_type = CONTENT_TYPES.get(PurePosixPath(path).suffix)
-        if content_type is None or path not in self._files:
-            return Response("there is no such file", 404, _HEADERS, "text/plain")
-        return _respond(self._files[path], content_type, {"cache-control": "no-cache"})
+        return HTMLResponse(html, headers={"content-security-policy": self._frames})
 
     async def _exchange(self, request: Request) -> Response:
         """Return the secret for an unused token."""
@@ -118,27 +101,21 @@ class App:
         if token is None:
             return _respond_problem(_LINK_REQUIRED, 403)
         self._tokens.remove(token)
-        return _respond(self._secret, "text/plain")
-
-    def _guard(self, respond: Handler) -> Handler:
-        """Return a handler that requires the secret."""
-
-        async def check(request: Request) -> Response:
-            return await respond(request) if _carries(request, self._secret) else _respond_problem(_LINK_REQUIRED, 403)
-
-        return check
+        return PlainTextResponse(self._secret)
 
     def _answer(self, name: str) -> Handler:
         """Return a handler that sends the explorer's answer, computed in a thread."""
 
         async def respond(request: Request) -> Response:
+            if not _carries(request, self._secret):
+                return _respond_problem(_LINK_REQUIRED, 403)
             answer = await self._run_in_thread(lambda: self.explorer.answer(name, Query(request.query_params)))
             if isinstance(answer, Stream):
                 parts = self._encode_parts(answer, request.query_params.get("motion", ""))
-                return StreamingResponse(parts, media_type=_BINARY, headers=_HEADERS)
+                return StreamingResponse(parts, media_type=_BINARY)
             if isinstance(answer, Payload | bytes):
-                return _respond(answer if isinstance(answer, bytes) else pack(answer), _BINARY)
-            return JSONResponse(to_plain(answer), headers=_HEADERS)
+                return Response(answer if isinstance(answer, bytes) else pack(answer), media_type=_BINARY)
+            return JSONResponse(to_plain(answer))
 
         return respond
 
@@ -166,6 +143,8 @@ class App:
 
     async def _receive_file(self, request: Request) -> Response:
         """Store the body of a request as a file, and describe it."""
+        if not _carries(request, self._secret):
+            return _respond_problem(_LINK_REQUIRED, 403)
         length, data = request.headers.get("content-length", "0"), bytearray()
         if not length.isdecimal() or int(length) > MAX_FILE_SIZE:
             return _respond_problem(TOO_LARGE, 413)
@@ -178,7 +157,25 @@ class App:
             return Response(status_code=400)
         name = request.query_params.get("name", "")
         description = await self._run_in_thread(lambda: self.explorer.add_file(name, bytes(data)))
-        return JSONResponse(to_plain(description), headers=_HEADERS)
+        return JSONResponse(to_plain(description))
+
+
+class _Headers:
+    """Application that adds headers to every response of another one."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+
+        async def send_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                caching = {"cache-control": "no-cache"} if scope["path"].startswith("/page/") else {}
+                MutableHeaders(scope=message).update(_HEADERS | caching)
+            await send(message)
+
+        await self.app(scope, receive, send_headers)
 
 
 @cache
@@ -201,17 +198,13 @@ def _describe_error(error: RockingError, motion: str) -> dict[str, Any]:
     return {"problem": error.text(lambda name: field_label(name, motion)), "argument": error.argument}
 
 
-def _respond(content: str | bytes, media_type: str, headers: dict[str, str] | None = None) -> Response:
-    return Response(content, media_type=media_type, headers=_HEADERS | (headers or {}))
-
-
 def _respond_problem(problem: str, status: int) -> Response:
-    return JSONResponse({"problem": problem, "argument": None}, status, _HEADERS)
+    return JSONResponse({"problem": problem, "argument": None}, status)
 
 
 async def _respond_invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RockingError)
-    return JSONResponse(_describe_error(error, request.query_params.get("motion", "")), 422, _HEADERS)
+    return JSONResponse(_describe_error(error, request.query_params.get("motion", "")), 422)
 
 
 async def _respond_failure(_: Request, error: Exception) -> Response:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -54,17 +54,12 @@ class SimulatedCase:
     case: Case
     response: Response
 
-    @classmethod
-    def from_case(cls, case: Case) -> SimulatedCase:
-        """Simulate a case."""
-        return cls(case, case.simulate())
-
     @functools.cached_property
     def refined(self) -> Response:
         """Same response with more impacts resolved before each proven rest."""
         if self.case.chattering.name != _REFINED.name:
             return self.response
-        refined = replace(self.case, chattering=_REFINED).simulate()
+        refined = self.case.simulate(chattering=_REFINED)
         return refined if refined.rests_by_rounding == self.response.rests_by_rounding else self.response
 
     def select_response(self, start: float, end: float) -> Response:
@@ -77,19 +72,6 @@ class SimulatedCase:
         if window is None or window[0] >= duration:
             return compute_active_span(self.response)
         return check_window(window, duration)
-
-    @functools.cached_property
-    def outline(self) -> Floats | None:
-        """Trapezoids of a mesh's outline in its rocking plane; None for other blocks."""
-        return None if self.case.body is None else self.case.body.find_outline(self.case.azimuth)
-
-    @functools.cached_property
-    def ground(self) -> Motion | None:
-        """Horizontal motion whose displacement is drawn; records are filtered against drift."""
-        if self.case.motion is None:
-            return None
-        motion = self.case.motion.with_vertical(None)
-        return motion.processed(baseline=1, band_pass=(1.0 / MAX_DRAWN_PERIOD, None)) if has_drift(motion) else motion
 
 
 def find_unresolved(response: Response, start: float, end: float) -> list[float]:
@@ -116,12 +98,13 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
     visible = shown.select_response(start, end)
     marks = visible.impacts["time"][(visible.impacts["time"] >= start) & (visible.impacts["time"] <= end)]
     share = chattering_episodes(response).share_at_rest
+    outline = None if case.body is None else case.body.find_outline(case.azimuth)
     header = {
         "block": {
             "sides": [vars(side) for side in block.sides],
             "thresholds_g": [threshold / STANDARD_GRAVITY for threshold in thresholds],
             "gravity_g": block.gravity / STANDARD_GRAVITY,
-            "outline": _describe_outline(block, shown.outline),
+            "outline": _describe_outline(block, outline),
             "notes": [*map(str, list_block_notes(block)), *(case.body.solid.notes if case.body else ())],
             "body": None if case.body is None else case.body.plane(case.azimuth),
         },
@@ -139,8 +122,8 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
             "unresolved": max(find_unresolved(response, start, end), default=None),
         },
     }  # fmt: skip
-    outline = {} if shown.outline is None else {"outline": shown.outline.ravel()}
-    return Payload(header, {**_sample_window(case, visible, start, end, marks), **sample_events(response), **outline})
+    arrays = {**_sample_window(case, visible, start, end, marks), **sample_events(response)}
+    return Payload(header, arrays | ({} if outline is None else {"outline": outline.ravel()}))
 
 
 def describe_outcome(response: Response) -> str:
@@ -164,7 +147,9 @@ def describe_details(shown: SimulatedCase, window: tuple[float, float] | None) -
     course = sample_interval(response, start, end)
     x, y = compute_boundary(response)
     times = np.linspace(start, end, MAX_POINTS // 4)
-    ground = shown.ground
+    ground = None if shown.case.motion is None else shown.case.motion.with_vertical(None)
+    if ground is not None and has_drift(ground):
+        ground = ground.processed(baseline=1, band_pass=(1.0 / MAX_DRAWN_PERIOD, None))
     moved = np.zeros_like(times) if ground is None else ground.displacement(np.minimum(times, ground.duration))
     arrays = {
         "course_time": course.time - start, "course_rotation": course.rotation, "course_velocity": course.velocity,

@@ -18,7 +18,7 @@ from rocking.errors import OptionError, StudyError
 from rocking.explorer.inputs import block_to_texts
 from rocking.explorer.motions import motion_to_texts
 from rocking.explorer.parameters import read_count
-from rocking.explorer.payload import Payload, phrase
+from rocking.explorer.payload import Payload
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import read_number
 from rocking.inputs.texts import write_path
@@ -80,7 +80,7 @@ class StudyView:
             "name": self.name,
             "status": str(self.study.status),
             "axes": [self._describe_axis(name) for name in self._varied],
-            "choices": choices | {"motion": self._list_names("motion"), "polarity": signs},
+            "choices": choices | {"motion": self._list_motions(), "polarity": signs},
             "quantities": [*QUANTITIES],
         }
 
@@ -126,37 +126,26 @@ class StudyView:
             coordinate = read_number(texts.get(f"at_{direction}", ""), f"at_{direction}")
             checks.finite(coordinate, f"at_{direction}", OptionError)
             at[name] = int(np.argmin(np.abs(self.axes[name] - coordinate)))
-        sides, motion = self._find_parameters(tuple(at[name] for name in self._grid)), product.motions[at["motion"]]
+        block, motion = self._blocks[tuple(at[name] for name in self._grid)], product.motions[at["motion"]]
         factor = product.signs[at["polarity"]] * float(product.scales.factors(motion)[self._scales[at["scale"]]])
-        block = Block.from_parameters(**sides, gravity=float(product.blocks.gravity))
-        point_texts = block_to_texts(block) | motion_to_texts(motion, uploads, factor)
+        sides = {name: getattr(product.blocks, name)[block].tolist() for name in _PARAMETERS}
+        parameters = Block.from_parameters(**sides, gravity=float(product.blocks.gravity))
+        point_texts = block_to_texts(parameters) | motion_to_texts(motion, uploads, factor)
         point_texts |= {"model": product.model, "chattering": str(product.chattering)}
         return point_texts if product.duration is None else point_texts | {"duration": repr(product.duration)}
-
-    def _find_parameters(self, position: tuple[int, ...]) -> dict[str, list[float]]:
-        """Return the parameters of both sides of the block at a position on the grid."""
-        return {name: getattr(self.study.product.blocks, name)[self._blocks[position]].tolist() for name in _PARAMETERS}
 
     def _read_index(self, texts: Mapping[str, str], name: str) -> int:
         """Return the index of a parameter's value in a text, or 0."""
         return read_count(texts.get(f"{name}_index") or "0", f"{name}_index", 0, len(self.axes[name]) - 1)
 
     def _describe_axis(self, name: str) -> dict[str, Any]:
-        measure, label = self.study.product.scales.measure or FACTOR, phrase(f"axis.{name}")
-        unit = "" if measure.units == "1" else measure.units
-        names = {"label": label, "unit": _PARAMETERS.get(name, "")}
-        names = {"label": measure.quantity.capitalize(), "unit": unit} if name == "scale" else names
-        description = {"name": name, **names, "values": self.axes[name].tolist()}
-        is_named = name in ("block", "motion") and len(self.axes[name]) <= _MAX_NAMES
-        return description | {"names": self._list_names(name)} if is_named else description
+        description = {"name": name, "unit": _PARAMETERS.get(name, ""), "values": self.axes[name].tolist()}
+        if name == "scale":
+            measure = self.study.product.scales.measure or FACTOR
+            unit = "" if measure.units == "1" else measure.units
+            description |= {"label": measure.quantity.capitalize(), "unit": unit}
+        is_named = name == "motion" and len(self.axes[name]) <= _MAX_NAMES
+        return description | {"names": self._list_motions()} if is_named else description
 
-    def _list_names(self, axis: str) -> list[str]:
-        """Return the names of numbered blocks or motions."""
-        if axis == "motion":
-            return [str(name) for name in self.study.results().motion.values]
-        blocks = (self._find_parameters((k,)) for k in range(len(self.axes["block"])))
-        texts = (
-            {name: ", ".join(f"{number:.4g}" for number in dict.fromkeys(pair)) for name, pair in block.items()}
-            for block in blocks
-        )
-        return [f"p = {row['p']} rad/s, α = {row['alpha']} rad, η = {row['restitution']}" for row in texts]
+    def _list_motions(self) -> list[str]:
+        return [str(name) for name in self.study.results().motion.values]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import itertools
 import json
 import threading
 from collections import OrderedDict
@@ -145,13 +146,9 @@ class UploadStore:
 
     def add_motion(self, motion: Motion) -> str:
         """Store a motion of the program, and return its key."""
-        components = [motion] if motion.vertical is None else [motion, motion.vertical]
-        contents = [
-            content
-            for component in components
-            for content in (component.breakpoints.tobytes(), component.coefficients.tobytes(), component.name.encode())
-        ]
-        key = hashlib.sha256(b"".join(contents)).hexdigest()[:_KEY_LENGTH]
+        parts = [part for part in (motion, motion.vertical) if part is not None]
+        contents = ((part.breakpoints.tobytes(), part.coefficients.tobytes(), part.name.encode()) for part in parts)
+        key = hashlib.sha256(b"".join(itertools.chain(*contents))).hexdigest()[:_KEY_LENGTH]
         with self._lock:
             self._motions[key] = motion
         return key

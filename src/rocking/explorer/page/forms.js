@@ -171,7 +171,7 @@ export class MotionForm {
     this.list = list;
     this.reload = reload;
     this.names = namesOf("motion", "start");
-    this.motion = choice("motion", "Shaken by", [], (value) => this.another(value));
+    this.motion = choice("motion", parameter("motion").label, [], (value) => this.another(value));
     this.vertical = choice("vertical", parameter("vertical").label, [], () => this.tell());
     this.missing = make("div");
     this.corrections = make("details", {}, [make("summary", {}, ["Corrections"]), ...["baseline", "highpass"].map((name) => {
@@ -259,6 +259,7 @@ export class MotionForm {
   /** Choose a record whose questions are open. @param {import("./records.js").Row} row */
   wait(row) {
     choose(this.motion.select, idOf(row.texts));
+    if (this.texts.motion === "none") for (const each of this.starts) each.show(each.spec.default);
     this.showFields();
   }
 

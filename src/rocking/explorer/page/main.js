@@ -1,7 +1,7 @@
 // The page: one state, in its address; forms that change it, and three tabs that show it.
 
 import {Problem} from "./api.js";
-import {one} from "./standalone/dom.js";
+import {one, put} from "./standalone/dom.js";
 import {BlockForm, ModelForm, MotionForm, announce} from "./forms.js";
 import {RecordList, isMesh, sendFile} from "./records.js";
 import {Shake, figuresOf} from "./shake.js";
@@ -134,11 +134,10 @@ class Page {
     const sentence = error instanceof Problem ? error.message : error ? `The page has a fault: ${error}` : null, argument = error instanceof Problem ? error.argument : null;
     this.problems.delete(place);
     if (sentence) this.problems.set(place, sentence);
-    const marked = (/** @type {string} */ root) => one(root).querySelectorAll("[aria-invalid]");
-    for (const each of [...marked(place), ...(this.problems.size ? [] : marked("settings"))]) { each.removeAttribute("aria-invalid"); each.removeAttribute("aria-errormessage"); }
+    for (const each of document.querySelectorAll(`[data-refused="${place}"]`)) for (const name of ["aria-invalid", "aria-errormessage", "data-refused"]) each.removeAttribute(name);
     if (argument) {
       const name = CSS.escape(argument), fields = `[data-argument="${name}"], [data-other="${name}"]`;
-      for (const each of [...one(place).querySelectorAll(fields), ...one("settings").querySelectorAll(fields)]) if (each.checkVisibility()) { each.setAttribute("aria-invalid", "true"); each.setAttribute("aria-errormessage", "problem"); }
+      for (const each of [...one(place).querySelectorAll(fields), ...one("settings").querySelectorAll(fields)]) if (each.checkVisibility()) put(each, {"aria-invalid": "true", "aria-errormessage": "problem", "data-refused": place});
     }
     one("main").classList.toggle("stale", this.problems.has("settings") && Boolean(this.shown));
     one("old").hidden = !(this.problems.has("settings") && this.shown);

@@ -5,7 +5,7 @@ import {Chart} from "./chart.js";
 import {make, one} from "./standalone/dom.js";
 import {specification, writeAddress} from "./state.js";
 import {amongst, joined, short, typed} from "./numbers.js";
-import {known, phrase, say} from "./texts.js";
+import {known, labelOf, phrase} from "./texts.js";
 import {axisUnit} from "./units.js";
 import {isTyped, optionsOf} from "./forms.js";
 import {csv, offer} from "./save.js";
@@ -90,7 +90,7 @@ export class View {
 
   /** Show what the map has. @param {string[]} axes @param {any[]} all */
   fill(axes, all) {
-    const label = (/** @type {string} */ name) => { const {label: words, unit} = all.find((each) => each.name === name); return unit ? `${say(words)} (${axisUnit(unit)[1]})` : say(words); };
+    const label = (/** @type {string} */ name) => { const axis = all.find((each) => each.name === name); return axis.unit ? `${labelOf(axis)} (${axisUnit(axis.unit)[1]})` : labelOf(axis); };
     one("quantity").replaceChildren(...optionsOf((this.study ? this.study.quantities : specification.quantities).map((/** @type {string} */ name) => [name, phrase(`quantity.${name}`)])));
     one("quantity").value = this.quantity;
     for (const which of ["x", "y"]) {
@@ -161,6 +161,7 @@ export class View {
   /** A slice of a study. */
   async slice() {
     const {map} = this.page.state, names = this.study.axes.map((/** @type {any} */ each) => each.name);
+    document.body.dataset.map = "running";
     if (!names.includes(map.x)) map.x = names[0];
     if (!names.includes(map.y) || map.y === map.x) map.y = names.find((/** @type {string} */ each) => each !== map.x);
     const {header, arrays} = await payload("/api/study", {...map, quantity: this.quantity});
@@ -211,7 +212,7 @@ export class View {
       if (ink) image.data.set([1, 3, 5].map((at) => parseInt(ink.slice(at, at + 2), 16)).concat(255), 4 * ((up.length - 1 - r) * across.length + c));
     }));
     pen.putImageData(image, 0, 0);
-    const box = this.part ?? [left, right, low, high], label = (/** @type {any} */ axis) => (axis.unit ? `${say(axis.label)} (${axis.unit})` : say(axis.label));
+    const box = this.part ?? [left, right, low, high], label = (/** @type {any} */ axis) => (axis.unit ? `${labelOf(axis)} (${axis.unit})` : labelOf(axis));
     const layers = [{class: "pixels", picture: canvas.toDataURL(), box: [left, right, low, high]}], mark = (/** @type {string} */ name, /** @type {number[]} */ [a, b]) => [{class: `dot ${name} around`, dots: [[a], [b]]}, {class: `dot ${name}`, dots: [[a], [b]]}];
     const lines = curve ? ["curve around", "curve exact"].map((look) => ({class: look, line: [x.values, curve]})) : [];
     this.chart.show({
@@ -231,7 +232,7 @@ export class View {
   say(at) {
     if (!this.about || !at.every(Number.isFinite)) return;
     const [row, column] = this.place(at), {x, y} = this.about, index = row * x.values.length + column;
-    const coordinate = (/** @type {any} */ axis, /** @type {number} */ k) => `${say(axis.label)} = ${joined(amongst(axis.values, k), axis.unit)}${axis.names ? ` (${axis.names[k]})` : ""}`;
+    const coordinate = (/** @type {any} */ axis, /** @type {number} */ k) => `${labelOf(axis)} = ${joined(amongst(axis.values, k), axis.unit)}${axis.names ? ` (${axis.names[k]})` : ""}`;
     const said = Object.entries(this.values).map(([name, all]) => this.word(name, all[index])).filter(Boolean);
     one("map-at").textContent = `${coordinate(x, column)}, ${coordinate(y, row)}: ${said.join("; ") || "not computed yet"}.`;
   }

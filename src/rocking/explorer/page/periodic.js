@@ -3,10 +3,9 @@
 import {Latest, json, parts, payload} from "./api.js";
 import {Chart, around, gaps} from "./chart.js";
 import {one} from "./standalone/dom.js";
-import {namesOf, writeAddress} from "./state.js";
+import {writeAddress} from "./state.js";
 import {amongst, short, typed} from "./numbers.js";
-import {say} from "./texts.js";
-import {acceleration} from "./units.js";
+import {labelOf} from "./texts.js";
 import {choose, isTyped} from "./forms.js";
 import {csv, offer} from "./save.js";
 
@@ -14,7 +13,7 @@ const DIRECTIONS = ["up", "down"], FIELDS = ["sweep", "sweep_from", "sweep_to", 
 
 /** What a sweep found at a value. @typedef {{stride: number, drawn: Float64Array, states: Float64Array, words: string, overturned: boolean}} Found */
 
-const NOTHING = {drawn: new Float64Array(0), states: new Float64Array(0)};
+const NONE = new Float64Array(0), NOTHING = {drawn: NONE, states: NONE};
 
 export class View {
   /** @param {any} page */
@@ -41,10 +40,6 @@ export class View {
     });
     one("diagram").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => this.press(event));
     one("sweep-open").addEventListener("click", () => this.open());
-    one("orbit-sine").addEventListener("click", () => {
-      const kept = Object.entries(page.state.texts).filter(([name]) => !namesOf("motion").includes(name));
-      page.restate({...Object.fromEntries(kept), motion: this.orbit.header.offer.motion});
-    });
   }
 
   enter() { this.update(); }
@@ -58,14 +53,12 @@ export class View {
 
   async run() {
     this.running = new AbortController();
-    const {signal} = this.running, {texts, sweep} = this.page.state, found = await payload("/api/orbit", texts), {offer: offered, sentence, duration} = found.header;
+    const {signal} = this.running, {texts, sweep} = this.page.state, found = await payload("/api/orbit", texts), {sentence, duration} = found.header;
     if (signal.aborted) return;
     this.orbit = found;
-    one("orbit").hidden = Boolean(offered);
-    one("orbit-sine").hidden = !offered;
-    one("orbit-verdict").textContent = offered ? "Periodic motion requires a sine as the ground motion." : say(sentence);
-    one("orbit-about").textContent = offered ? "" : `One period of the sine lasts ${short(duration)} s, and repeats for ever.`;
-    if (offered) { one("orbit-sine").textContent = `Use the nearest sine: ${acceleration(offered.amplitude)} at ${short(offered.frequency)} Hz`; return; }
+    one("orbit").hidden = false;
+    one("orbit-verdict").textContent = sentence;
+    one("orbit-about").textContent = `One period of the sine lasts ${short(duration)} s, and repeats for ever.`;
     this.drawPlane(found);
     document.body.dataset.sweep = "running";
     let painted = 0;
@@ -92,7 +85,7 @@ export class View {
     indices.forEach((/** @type {number} */ index, /** @type {number} */ k) => {
       for (let other = index - stride + 1; other < index + stride; other += 1) if ((found.get(other)?.stride ?? 0) > stride) found.delete(other);
       const end = at + counts[k];
-      found.set(index, {stride, drawn: drawn.subarray(at, end), states: states.subarray(2 * at, 2 * end), words: say(words[k]), overturned: overturned[k]});
+      found.set(index, {stride, drawn: drawn.subarray(at, end), states: states.subarray(2 * at, 2 * end), words: words[k], overturned: overturned[k]});
       at = end;
     });
   }
@@ -111,7 +104,7 @@ export class View {
   }
 
   /** @param {import("./api.js").Payload} found */
-  drawPlane({header: {period}, arrays: {rotation, velocity, jump, x, y}}) {
+  drawPlane({header: {period}, arrays: {rotation = NONE, velocity = NONE, jump = NONE, x, y}}) {
     const [zero, before, after] = [() => 0, (/** @type {number} */ k) => velocity[k], (/** @type {number} */ k) => velocity[k + 1]].map((value) => Array.from(jump, value));
     this.plane.show({x: {...around([rotation, x]), label: "rotation / slenderness"}, y: {...around([velocity, y]), label: "velocity / (p · slenderness)"}, layers: [
       {class: "zero", along: "x", rules: [0]}, {class: "zero", along: "y", rules: [0]}, {class: "line ink", line: gaps(rotation, velocity, Array.from(jump))}, {class: "jump", segments: [zero, before, zero, after]}, {class: period ? "dot accent large" : "dot accent", dots: [x, y]},
@@ -119,11 +112,11 @@ export class View {
   }
 
   draw() {
-    const {name, values, label} = this.about, half = 0.5 * (values[1] - values[0]), states = this.orbit.arrays.x, at = this.orbit.header.at[name];
+    const {name, values} = this.about, half = 0.5 * (values[1] - values[0]), states = this.orbit.arrays.x, at = this.orbit.header.at[name];
     const y = around([states, ...DIRECTIONS.flatMap((each) => Array.from(this.found[each].values(), ({drawn}) => drawn))]), top = y.high - 0.02 * (y.high - y.low);
     const dots = (/** @type {string} */ direction) => { const all = /** @type {number[][]} */ ([[], [], []]); for (const [index, {drawn, overturned}] of this.found[direction]) { if (overturned) all[2].push(values[index]); for (const each of drawn) { all[0].push(values[index]); all[1].push(each); } } return all; };
     const [up, down] = DIRECTIONS.map(dots), [index, k] = this.mark, point = this.points(index)[k];
-    this.chart.show({x: {low: values[0] - half, high: values[values.length - 1] + half, label: say(label)}, y: {...y, label: "rotation / slenderness, once a period"}, layers: [
+    this.chart.show({x: {low: values[0] - half, high: values[values.length - 1] + half, label: labelOf(this.about)}, y: {...y, label: "rotation / slenderness, once a period"}, layers: [
       {class: "limit accent", along: "y", rules: [at]}, {class: "dot ground wide", dots: [down[0], down[1]]}, {class: "dot ink fine", dots: [up[0], up[1]]},
       {class: "dot over wide", dots: [down[2], down[2].map(() => top)]}, {class: "dot over", dots: [up[2], up[2].map(() => top)]}, {class: "dot accent", dots: [Array.from(states, () => at), states]},
       {class: "dot mark", dots: [[values[index]], [point?.y ?? top]]},
@@ -157,7 +150,7 @@ export class View {
   /** @param {number} index */
   say(index) {
     const words = DIRECTIONS.map((each) => { const found = this.found[each].get(index); return found && `swept ${each}wards: ${found.words}`; }).filter(Boolean);
-    one("sweep-at").textContent = `${say(this.about.label)} = ${amongst(this.about.values, index)}; ${words.join("; ") || "not computed yet"}.`;
+    one("sweep-at").textContent = `${labelOf(this.about)} = ${amongst(this.about.values, index)}; ${words.join("; ") || "not computed yet"}.`;
   }
 
   /** @param {KeyboardEvent} event */

@@ -101,8 +101,8 @@ export function questions(rows, answer) {
     return [make("div", {class: "missing", role: "group"}, [
       make("p", {}, [`${open.length === 1 ? open[0].file : `${open.length} files`} ${name === "units" ? "without units" : "without a sampling step"}. Choose the right one:`]),
       make("table", {class: "rows"}, [
-        make("tr", {}, [make("td"), ...choices.map((value) => make("th", {scope: "col"}, [make("button", {type: "button", on: {click: () => answer(open, name, value)}}, [name === "dt" ? `${value} s` : value])]))]),
-        ...open.slice(0, 8).map((row) => make("tr", {}, [make("th", {scope: "row"}, [row.file]), ...choices.map((value) => make("td", {}, [result(row, value)]))])),
+        ...(open.length > 1 ? [make("tr", {}, [make("td"), ...open.slice(0, 8).map((row) => make("th", {scope: "col"}, [row.file]))])] : []),
+        ...choices.map((value) => make("tr", {}, [make("th", {scope: "row"}, [make("button", {type: "button", on: {click: () => answer(open, name, value)}}, [name === "dt" ? `${value} s` : value])]), ...open.slice(0, 8).map((row) => make("td", {}, [result(row, value)]))])),
       ]),
       ...(name === "dt" ? [make("label", {}, ["another (s) ", other])] : []),
     ])];

@@ -1,9 +1,8 @@
 // The block on its moving ground, to scale, at one moment; and a body of a mesh from above.
 
-import {draw, one, put, stepOf} from "./standalone/dom.js";
+import {draw, make, one, put, stepOf} from "./standalone/dom.js";
 import {length, ofG} from "./units.js";
 import {short} from "./numbers.js";
-import {say} from "./texts.js";
 
 const BELOW = 34, ABOVE = 14, SIZE = 252, MARGIN = 16;
 const still = window.matchMedia("(prefers-reduced-motion: reduce)");
@@ -84,6 +83,6 @@ export function drawPlan(place, {header: {body}, arrays: {azimuth, acceleration,
     draw("path", {class: "edges", d: edges}), draw("path", {class: "towards", d: `M${at(0, 0)}L${at(reach, 0)}`}),
     draw("text", {x: SIZE / 2, y: 12, "text-anchor": "middle"}, ["N"]), draw("text", {x: SIZE - 8, y: SIZE / 2 + 4, "text-anchor": "middle"}, ["E"]),
   ]);
-  const words = [`${say(body.about)} The body is lifted first towards ${short(body.weakest_azimuth, 4)}°, above ${ofG(gravity * body.weakest)}. The curve is the acceleration that lifts it, with circles ${ofG(gravity * step)} apart. Click to turn it.`, say(body.left_out), say(body.repaired)];
-  place.replaceChildren(svg, ...words.map((text) => Object.assign(document.createElement("p"), {className: "soft", textContent: text})));
+  const about = `The body is lifted first towards ${short(body.weakest_azimuth, 4)}°, above ${ofG(gravity * body.weakest)}. The curve is the acceleration that lifts it, with circles ${ofG(gravity * step)} apart. Click to turn it.`;
+  place.replaceChildren(svg, make("p", {class: "soft"}, [about]), make("details", {}, [make("summary", {}, ["All numbers of the body"]), make("pre", {}, [body.summary.join("\n")])]));
 }

@@ -15,7 +15,7 @@ import {offer, slug, table} from "./save.js";
 
 const NARROWEST = 1e-10, REACH = 1.6, PAUSE = 150;
 const UNITS = /** @type {[number, string][]} */ ([[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]]);
-const FILES = [["svg", "Figure, SVG"], ["png", "Figure, PNG"], ["csv", "Histories, CSV"], ["events.csv", "Events, CSV"], ["impacts.csv", "Impacts, CSV"], ["nc", "All, NetCDF"]];
+const FILES = [["csv", "Histories, CSV"], ["events.csv", "Events, CSV"], ["impacts.csv", "Impacts, CSV"], ["nc", "All, NetCDF"]];
 
 /** How times of a narrow window are written: after an origin, in a suitable unit. @param {number} from @param {number} to */
 function scaleOf(from, to) {
@@ -108,8 +108,9 @@ export class Shake {
 
   files() {
     if (!this.shown || !this.details) return;
-    const {texts = {}, page: {state}} = this, name = slug(caseName(this.shown.header));
-    offer(FILES.map(([form, label]) => [`${name}.${form}`, label, () => file("/api/export", {...texts, form, .../^(svg|png)$/.test(form) ? ends(state) : {}})]), this.details.header.python, this.details.header.command, this.page);
+    const {texts = {}} = this, name = slug(caseName(this.shown.header));
+    const figures_ = ["rotation", "ground"].flatMap((figure, k) => /** @type {("svg" | "png")[]} */ (["svg", "png"]).map((form) => [`${name}-${figure}.${form}`, `${k ? "Ground" : "Rotation"}, ${form.toUpperCase()}`, () => this.histories[k].file(form)]));
+    offer([...figures_, ...FILES.map(([form, label]) => [`${name}.${form}`, label, () => file("/api/export", {...texts, form})])], this.details.header.python, this.details.header.command, this.page);
   }
 
   enter() {

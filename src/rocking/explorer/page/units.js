@@ -2,7 +2,7 @@
 
 import {make, one} from "./standalone/dom.js";
 import {NONE, joined, short, span} from "./numbers.js";
-import {measures, phrase} from "./texts.js";
+import {phrase} from "./texts.js";
 
 /** Standard gravity, m/s². */
 const G = 9.80665;
@@ -44,7 +44,6 @@ const writer = (name, which = 1) => (value, digits = 3) => {
 };
 /** Quantities in m/s², rad, m and m/s as the page writes them. */
 export const acceleration = writer("acceleration_in"), angle = writer("angle_in"), length = writer("length_in"), velocity = writer("length_in", 2);
-Object.assign(measures, {acceleration, angle, length});
 /** @param {number} value in g @param {number} [digits] */
 export const ofG = (value, digits) => acceleration(value * G, digits);
 

@@ -189,6 +189,7 @@ class Page {
       if (this.time >= this.shown.picture.until - 1e-9) {
         this.stop();
         this.answered = true;
+        this.strip.paint();
         this.tell();
         document.body.dataset.played = String(Number(document.body.dataset.played ?? 0) + 1);
       } else requestAnimationFrame(tick);

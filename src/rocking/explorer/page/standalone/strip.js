@@ -21,6 +21,8 @@ export class Strip {
     this.width = this.height = this.span = this.from = this.unit = this.upper = this.middle = this.tall = this.knobTime = this.most = 0;
     this.sign = this.share = 1;
     this.held = false;
+    /** Times and places of the curve. @type {{times: Float64Array, x: Float64Array, y: Float64Array} | null} */
+    this.drawn = null;
     /** @type {SVGSVGElement} */
     this.svg = one("strip");
     this.axes = draw("g", {class: "axes"});
@@ -91,7 +93,8 @@ export class Strip {
     const y = (/** @type {number} */ turned) => this.middle - (visible(turned / alpha) / span) * this.tall;
     const stillGround = !shown.shaking.pieces;
     put(this.area, {d: stillGround ? "" : `${line(corners.map((/** @type {number} */ time) => this.x(time)), acceleration.map((/** @type {number} */ each) => this.upper - each * this.unit))}V${this.upper}H${LEFT}Z`});
-    put(this.curve, {d: line(x, rotation.map((/** @type {number} */ each) => y(each))), class: `curve ${shown.overturned ? "over" : ""}`});
+    this.drawn = {times, x, y: rotation.map((/** @type {number} */ each) => y(each))};
+    put(this.curve, {class: `curve ${shown.overturned && this.page.answered ? "over" : ""}`});
     const [plus, minus] = shown.body.sides.map((/** @type {any} */ side) => side.alpha), right = this.width - RIGHT;
     put(this.band, {x: LEFT, y: y(plus), width: right - LEFT, height: y(-minus) - y(plus)});
     const {uplift} = shown;
@@ -147,6 +150,10 @@ export class Strip {
   /** Show the present moment. */
   follow() {
     if (!this.width) return;
+    if (this.drawn) { // before the outcome is guessed, up to this moment
+      const {times, x, y} = this.drawn, count = this.page.answered ? times.length : times.filter((/** @type {number} */ each) => each <= this.page.time).length;
+      put(this.curve, {d: count > 1 ? line(x.slice(0, count), y.slice(0, count)) : ""});
+    }
     put(this.cursor, {d: `M${this.x(this.page.time)} ${TOP - 6}V${this.height - BOTTOM + 4}`});
   }
 }
