@@ -109,7 +109,7 @@ class ProcessingMethods(MotionMeasures):
             raise MotionError(message)
         factors = compute_rotation_factors(azimuths, target)
         breakpoints, rows = piecewise.align_pieces(self, other)
-        fields: dict[str, Any] = {"channel": f"{target:g} deg", "number": None, "azimuth": target, "reversed": False}
+        fields: dict[str, Any] = {"channel": f"{target:g} deg", "number": None, "azimuth": target, "is_reversed": False}
         origin = replace(self.description.origin or Origin(), **fields)
         first, second = (f"{azimuths[k]:g} deg: {part._describe_origin()}" for k, part in enumerate((self, other)))
         text = f"at {target:g} deg, from {first}; and {second}"
