@@ -233,9 +233,9 @@ def describe_extrapolated_shares(rate: Rate) -> list[str]:
     ]
 
 
-def check_measure(hazard: HazardCurve, measure: Measure) -> None:
+def check_measure(hazard: HazardCurve | None, measure: Measure) -> None:
     """Raise an OptionError if the measures of a hazard curve and a fragility differ."""
-    if measure != hazard.measure:
+    if hazard is not None and measure != hazard.measure:
         raise OptionError(
             f"the fragility and the hazard curve must have the same measure; got {measure.label} and "
             f"{hazard.measure.label}; fit the fragility against the measure of the hazard curve"

@@ -13,7 +13,6 @@ from cyclopts import Parameter
 from rocking.analysis.curve import check_nrml_names
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.fragility import fragility as fit_simulated
-from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.risk import check_measure
 from rocking.calibration.tables import read_observed
 from rocking.cli.options import (
@@ -35,7 +34,6 @@ from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import write_csv
 from rocking.errors import FitError, OptionError
-from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Polarity
 
 if TYPE_CHECKING:
@@ -107,10 +105,9 @@ def fragility(
         records: dict[str, Any] = {}
         if outcomes is not None:
             observed = read_observed(outcomes, intensity_measure, **motion.read_metadata(), **motion.read_corrections())
-            _check_hazard(curve, observed["measure"])
             fitted = fit_fragility(**observed, confidence=risk.confidence)
         else:
-            _check_hazard(curve, intensity_measure)
+            check_measure(curve, intensity_measure)  # before the simulations
             loaded = motion.read_all(names)
             records, settings = loaded.to_dict(), measure.create_arguments(motion.component)
             settings |= model.create_arguments() | bodies
@@ -140,11 +137,6 @@ def fragility(
                 _add_record_names(fitted, result.get("records", [])).to_csv(folder / "outcomes.csv", "outcomes")
             write_results(folder, figures=figures, result=result)
         print_result(result, "\n\n".join(texts), as_json=output.as_json)
-
-
-def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
-    if curve is not None:
-        check_measure(curve, measure)
 
 
 def _find_standing_limit(names: list[str]) -> str:

@@ -35,7 +35,7 @@ from rocking.cli.output import (
     write_results,
 )
 from rocking.core.progress import note
-from rocking.core.tables import format_table, to_json
+from rocking.core.tables import format_table, list_some, to_json
 from rocking.errors import OptionError, RecordError
 from rocking.inputs.notes import list_reading_notes
 from rocking.inputs.pulses import FAMILIES, PulseFamily
@@ -196,8 +196,7 @@ def records(
     else:
         print("\n\n".join([listing.summary() for listing in listings] + [*messages.values()]))
     if messages:
-        unreadable = ", ".join([*messages][:5]) + (f" and {len(messages) - 5} more" if len(messages) > 5 else "")
-        raise RecordError(f"{len(messages)} of {len(files)} files cannot be read: {unreadable}")
+        raise RecordError(f"{len(messages)} of {len(files)} files cannot be read: {list_some([*messages])}")
 
 
 def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:

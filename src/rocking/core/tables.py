@@ -100,6 +100,18 @@ def format_count(number: float, noun: str) -> str:
     return f"{text} {noun[:-1]}ies" if noun.endswith("y") else f"{text} {noun}s"
 
 
+def list_some(names: Sequence[str], most: int = 5) -> str:
+    """Return the first of some names, and the number of others."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def format_reasons(reasons: Mapping[str, str]) -> list[str]:
+    """Return one line for each reason, after some of the names to which it applies."""
+    by_reason = {reason: [name for name in reasons if reasons[name] == reason] for reason in reasons.values()}
+    return [f"{list_some(names)}: {reason}" for reason, names in by_reason.items()]
+
+
 def format_within(value: float, bounds: tuple[float, float], format_number: Callable[[float], str]) -> str:
     """Format a number or, if it is out of bounds, the bound after < or >."""
     low, high = bounds
