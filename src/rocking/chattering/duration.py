@@ -103,7 +103,7 @@ def chattering_time(
     --------
     is_complete : Determine whether chattering is complete.
     critical_amplitude : Compute the largest amplitude with complete chattering.
-    sequence : Resolve one sequence impact by impact.
+    chattering_sequence : Resolve one sequence impact by impact.
 
     Notes
     -----
@@ -176,7 +176,7 @@ class ChatteringSequence:
 
     See Also
     --------
-    sequence : Resolve one sequence impact by impact.
+    chattering_sequence : Resolve one sequence impact by impact.
 
     Examples
     --------
@@ -269,7 +269,7 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
 
     See Also
     --------
-    sequence : Resolve one sequence impact by impact.
+    chattering_sequence : Resolve one sequence impact by impact.
 
     Examples
     --------
