@@ -1,8 +1,8 @@
 """Protocols of bodies with one coordinate, for example blocks.
 
 Between impacts (see `kernels.state.BLOCK_DTYPE`), u'' = lambda u - gain (threshold + side a/g), with any stiffness
-lambda, with or without damping, with one or two sides, or between two stops. Everything above the kernels uses only these
-protocols.
+lambda, with or without damping, with one or two sides, or between two stops. Everything above the kernels uses only
+these protocols.
 """
 
 from __future__ import annotations

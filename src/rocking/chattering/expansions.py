@@ -192,7 +192,7 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
     Notes
     -----
     Source: Eq. 32 of the paper. Correction: Eqs 31 and 32 print 32/5 for 32/15, because T_{0;3} stops at Phi^(5)
-    although Phi^(6) enters at the same order. The exact value is the first interval of `sequence`.
+    although Phi^(6) enters at the same order. The exact value is the first interval of `chattering_sequence`.
 
     Examples
     --------

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.chattering.duration import chattering_time, critical_amplitude, sequence
+from rocking.chattering.duration import chattering_sequence, chattering_time, critical_amplitude
 from rocking.chattering.expansions import MAX_ORDER, asymptotic_table, first_impact_speed, first_interval
 from rocking.core import checks
 from rocking.core.result import Result, format_some_rows
@@ -183,7 +183,7 @@ def chattering_report(
     """
     if p is not None:
         p = checks.positive(p, "p", OptionError, "rad/s")
-    chattering = sequence(a, omega, eta)
+    chattering = chattering_sequence(a, omega, eta)
     interval = speed = 0.0 if chattering.is_complete else math.nan
     if chattering.impacts.size:
         interval, speed = chattering.impacts[["interval", "speed_before"]][0]

@@ -17,10 +17,10 @@ from rocking.analysis.risk import check_measure
 from rocking.calibration.tables import read_observed
 from rocking.cli.options import (
     BLOCK_OPTIONS,
-    MEASURE_OPTIONS,
+    INTENSITY_OPTIONS,
     MODEL_OPTIONS,
     RECORD_OPTIONS,
-    RISK,
+    RISK_OPTIONS,
     EnsembleOptions,
     MeasureOptions,
     MotionOptions,
@@ -29,7 +29,7 @@ from rocking.cli.options import (
     SlipSchemeOptions,
     parse_limit_states,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, skip_on_error, write_results
+from rocking.cli.output import OUTPUT_OPTIONS, OutputOptions, print_result, skip_on_error, write_results
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import write_csv
@@ -48,12 +48,12 @@ def fragility(
     larger: Annotated[bool, Parameter(negative="")] = False,
     taxonomy: str = "rocking-block",
     standing: float | None = None,
-    risk: Annotated[RiskOptions, RISK] = RiskOptions(),
-    measure: Annotated[MeasureOptions, MEASURE_OPTIONS] = MeasureOptions(),
+    risk: Annotated[RiskOptions, RISK_OPTIONS] = RiskOptions(),
+    measure: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
     block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
     motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
     model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Fit the probability that a block overturns, or exceeds a rotation, against the intensity of the motions.
 

@@ -26,7 +26,7 @@ from rocking.cli.options import (
     read_records,
 )
 from rocking.cli.output import (
-    OUTPUT,
+    OUTPUT_OPTIONS,
     OutputOptions,
     PrintOptions,
     create_subfolder,
@@ -76,7 +76,7 @@ def simulate(
     block: Annotated[ObjectOptions, BLOCK_OPTIONS] = ObjectOptions(),
     motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
     model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Simulate a block under a record and describe its response; for several of either, print one line for each pair.
 
@@ -150,7 +150,7 @@ def check(
     block: Annotated[FreeObjectOptions, BLOCK_OPTIONS] = FreeObjectOptions(),
     motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
     model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compare rules of thumb with the simulated response of a block under records.
 
@@ -179,7 +179,7 @@ def check(
 def records(
     *names: Names,
     file: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
-    output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
+    output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions(),
 ) -> None:
     """List the shipped records, or show the content of record files and how it was interpreted.
 
@@ -212,7 +212,7 @@ def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:
     return listing
 
 
-def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
+def pulses(*, output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions()) -> None:
     """List the pulses that --pulse accepts, with their parameters and defaults."""
     families = FAMILIES.values()
     if output.as_json:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Number of letters in a line, more than in any table.
-_WIDTH: Final = 100_000
+_MAX_LINE_LENGTH: Final = 100_000
 
 #: Relative rounding error after a few operations.
 _DECIMAL_ROUNDING: Final = 2.0**-50
@@ -77,7 +77,7 @@ def format_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
         table.add_column(Text(name), justify="right" if numeric else "left", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(format_cell(entry)) for entry in row))
-    console = Console(file=io.StringIO(), width=_WIDTH, color_system=None, legacy_windows=False)
+    console = Console(file=io.StringIO(), width=_MAX_LINE_LENGTH, color_system=None, legacy_windows=False)
     with console.capture() as captured:
         console.print(table)
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
